@@ -1,0 +1,37 @@
+"""What can go wrong between a sensor and a frame.
+
+Each error is also the builtin kind that a caller would expect to catch.
+"""
+
+__all__ = [
+    "CalibrationError",
+    "CaptureError",
+    "FrameError",
+    "SensorError",
+    "SensorTimeoutError",
+    "UnreadableSourceError",
+]
+
+
+class CaptureError(Exception):
+    """Base of every error raised by `capture`."""
+
+
+class CalibrationError(CaptureError, ValueError):
+    """A calibration is malformed or physically impossible."""
+
+
+class FrameError(CaptureError, ValueError):
+    """A frame's arrays do not have the shape, dtype or size that its calibration states."""
+
+
+class UnreadableSourceError(CaptureError, OSError):
+    """A recording or frame file is missing, truncated or not of the format its name says."""
+
+
+class SensorError(CaptureError, RuntimeError):
+    """The driver or the device refused: no device, no stream, or it went away."""
+
+
+class SensorTimeoutError(SensorError, TimeoutError):
+    """The sensor sent nothing for longer than allowed."""

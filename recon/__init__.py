@@ -1,0 +1,1 @@
+"""Frame to face: pure functions on arrays."""

@@ -1,0 +1,24 @@
+"""Why a frame did not become a face: always one of these, never a bad cloud."""
+
+__all__ = ["FaceWithoutDepthError", "NoDepthError", "NoFaceError", "ReconstructionError",
+           "TooLittleDepthError"]
+
+
+class ReconstructionError(Exception):
+    """Base of every error raised by `recon`."""
+
+
+class NoFaceError(ReconstructionError):
+    """No face in the colour image, or none whose size fits its depth."""
+
+
+class NoDepthError(ReconstructionError):
+    """The whole depth image is empty."""
+
+
+class FaceWithoutDepthError(ReconstructionError):
+    """A face was seen in colour, but the sensor measured no depth on it."""
+
+
+class TooLittleDepthError(ReconstructionError):
+    """Fewer seeds on the face than a fit needs."""

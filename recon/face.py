@@ -1,0 +1,123 @@
+"""The result: initial cloud, dense cloud, report."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from recon.settings import Settings
+
+__all__ = ["DenseCloud", "Face", "FaceCandidate", "PointCloud", "Report"]
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """Coloured points.
+
+    Attributes
+    ----------
+    points : (n, 3) float32, mm, depth camera frame
+    colors : (n, 3) uint8, RGB
+
+    Raises
+    ------
+    ValueError
+        Where an array's shape or dtype is not as above, or a coordinate is not finite.
+    """
+
+    points: NDArray[np.float32]
+    colors: NDArray[np.uint8]
+
+    def __post_init__(self) -> None:
+        _check("points", self.points, np.float32, (len(self.points), 3))
+        _check("colors", self.colors, np.uint8, (len(self.points), 3))
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+@dataclass(frozen=True, eq=False)
+class DenseCloud(PointCloud):
+    """The seeds propagated over a regular (X, Y) grid.
+
+    Attributes
+    ----------
+    normals : (n, 3) float32, unit length, toward the camera, from the fitted surface's gradient
+    cells : (n, 2) int32, (row, column) of each point on the grid, sorted by row, then column
+    grid_shape : (rows, columns) of that grid
+    grid_step_mm : distance of neighbouring grid points, mm
+    """
+
+    normals: NDArray[np.float32]
+    cells: NDArray[np.int32]
+    grid_shape: tuple[int, int]
+    grid_step_mm: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check("normals", self.normals, np.float32, (len(self.points), 3))
+        _check("cells", self.cells, np.int32, (len(self.points), 2))
+        if len(self.cells) and (self.cells.min() < 0 or (self.cells >= self.grid_shape).any()):
+            raise ValueError(f"cells must lie on the {self.grid_shape} grid")
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True)
+
+
+class FaceCandidate(_Model):
+    """A detector's box and what the depth said of it."""
+
+    box: tuple[int, int, int, int]
+    """x, y, width, height; pixels of the colour image."""
+    depth_mm: float | None
+    """Median depth in the middle of the box; None where nothing was measured."""
+    width_mm: float | None
+    """The box's width at that depth."""
+    verdict: str
+    """`chosen`, `farther`, or why it is no face."""
+
+
+class Report(_Model):
+    """What was done to the frame, as written by `--report`."""
+
+    capture_id: str = ""
+    face_box: tuple[int, int, int, int]
+    """x, y, width, height; pixels of the colour image."""
+    candidates: tuple[FaceCandidate, ...]
+    """Every box the detector gave, the chosen one first."""
+    initial_points: int
+    dense_points: int
+    mean_spacing_mm: float
+    r0_mm: float
+    noise_mm: float
+    """Standard deviation of the seeds about the fitted surface."""
+    timings_ms: dict[str, float]
+    """Wall time of each stage, and `total`."""
+    settings: Settings
+    calibration: str
+    """Which calibration was used."""
+    skew_us: int
+    """Depth time stamp less colour time stamp, microseconds."""
+    version: str
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Face:
+    """One reconstructed face."""
+
+    initial: PointCloud
+    dense: DenseCloud
+    report: Report
+
+
+def _check(name: str, array: NDArray[Any], dtype: type[np.generic], shape: tuple[int, ...]) -> None:
+    if array.dtype != dtype or array.shape != shape:
+        raise ValueError(
+            f"{name} must be {np.dtype(dtype)} {shape}, found {array.dtype} {array.shape}"
+        )
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite")

@@ -1,0 +1,69 @@
+"""The knobs of the reconstruction, and the presets that set them."""
+
+from enum import StrEnum
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+__all__ = ["Neighbors", "Preset", "Settings"]
+
+
+class Preset(StrEnum):
+    """A named choice of all settings; a setting given beside it wins."""
+
+    PAPER = "paper"
+    """The paper's R0 and the little smoothing that meets its reported error."""
+    FAITHFUL = "faithful"
+    """The paper's R0 with the smoothing that a sensor's noise asks for."""
+    BEST = "best"
+    """The most accurate found; chosen on other heads than the reported ones."""
+
+
+class Neighbors(StrEnum):
+    """How the neighbourhood of a seed is found."""
+
+    RANDOMIZED = "randomized"
+    """Randomized kd-trees, as in the paper; approximate, differs between runs."""
+    EXACT = "exact"
+    """One exact kd-tree."""
+    LATTICE = "lattice"
+    """The depth image's own pixels: exact where the seeds come from one image."""
+
+
+_PRESETS: dict[Preset, dict[str, Any]] = {
+    Preset.PAPER: {"r0_factor": 6.0, "smoothing": 0.1, "neighbors": Neighbors.RANDOMIZED},
+    Preset.FAITHFUL: {"r0_factor": 6.0, "smoothing": 3.0, "neighbors": Neighbors.RANDOMIZED},
+    Preset.BEST: {"r0_factor": 8.0, "smoothing": 1.0, "neighbors": Neighbors.LATTICE},
+}
+
+
+class Settings(BaseModel):
+    """Settings of `reconstruct`; what is not given comes from the preset."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    preset: Preset = Preset.BEST
+    r0_factor: Annotated[float, Field(ge=2, le=40)] = 0.0
+    """R0 of Eq. (3) in units of the seeds' mean spacing."""
+    smoothing: Annotated[float, Field(ge=0.05, le=1000)] = 0.0
+    """lambda: weight of the squared norm against the squared residuals (unitless)."""
+    neighbors: Neighbors = Neighbors.LATTICE
+    """How the mean spacing is measured."""
+    ratio: Annotated[float, Field(ge=1, le=100)] = 10.0
+    """Dense points for each seed."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_preset(cls, given: Any) -> Any:
+        if not isinstance(given, dict):
+            return given
+        try:
+            preset = Preset(given.get("preset", Preset.BEST))
+        except ValueError:
+            return given  # the field's own validation says what is wrong
+        return _PRESETS[preset] | given
+
+    @classmethod
+    def of(cls, preset: Preset | str, **changes: Any) -> Self:
+        """Give a preset with some settings changed."""
+        return cls(preset=Preset(preset), **changes)

@@ -1,0 +1,1 @@
+"""Processes, messages, storage, command line."""
