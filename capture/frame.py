@@ -11,7 +11,7 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from capture.errors import CalibrationError, FrameError
 
@@ -22,8 +22,9 @@ _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Side = Annotated[int, Field(gt=0, le=16384)]
 _Row = tuple[_Finite, _Finite, _Finite]
 
-_UNDISTORT_ITERATIONS = 50
+_UNDISTORT_ITERATIONS = 20
 _UNDISTORT_TOLERANCE = 1e-12
+_INVERTIBLE_PX = 1e-6
 _ROTATION_TOLERANCE = 1e-4
 
 
@@ -80,12 +81,12 @@ class CameraModel(_Model):
         -------
         (..., 3) float64, mm, this camera's frame
         """
-        pixels = np.asarray(pixels, np.float64)
+        pixels = np.asarray(pixels, dtype=np.float64)
         if pixels.shape[-1:] != (2,):
             raise ValueError(f"pixels must have shape (..., 2), got {pixels.shape}")
         z = np.broadcast_to(np.asarray(depth_mm, np.float64), pixels.shape[:-1])
-        x, y = self._undistort((pixels[..., 0] - self.cx) / self.fx,
-                               (pixels[..., 1] - self.cy) / self.fy)
+        centered = np.subtract(pixels, (self.cx, self.cy), dtype=np.float64)
+        x, y = self._undistort(centered[..., 0] / self.fx, centered[..., 1] / self.fy)
         return np.stack([x * z, y * z, z], axis=-1)
 
     def rays(self) -> NDArray[np.float64]:
@@ -117,17 +118,37 @@ class CameraModel(_Model):
     def _undistort(
         self, xd: NDArray[np.float64], yd: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Invert `_distort` by fixed-point iteration on the residual."""
+        """Invert `_distort` by Newton's method."""
         if not any(self.distortion):
             return xd, yd
+        k1, k2, p1, p2, k3 = self.distortion
         x, y = xd, yd
         for _ in range(_UNDISTORT_ITERATIONS):
             ex, ey = self._distort(x, y)
             ex, ey = xd - ex, yd - ey
-            x, y = x + ex, y + ey
             if max(np.abs(ex).max(initial=0), np.abs(ey).max(initial=0)) < _UNDISTORT_TOLERANCE:
                 break
+            r2 = x * x + y * y
+            radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+            growth = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))
+            xx = radial + growth * x * x + 2 * p1 * y + 6 * p2 * x
+            yy = radial + growth * y * y + 6 * p1 * y + 2 * p2 * x
+            xy = growth * x * y + 2 * p1 * x + 2 * p2 * y
+            determinant = xx * yy - xy * xy
+            x = x + (yy * ex - xy * ey) / determinant
+            y = y + (xx * ey - xy * ex) / determinant
         return x, y
+
+    @model_validator(mode="after")
+    def _invertible(self) -> Self:
+        """Refuse a distortion that folds the image over itself: its pixels have no one ray."""
+        u, v = np.meshgrid(np.linspace(0, self.width - 1, 9), np.linspace(0, self.height - 1, 9))
+        pixels = np.stack([u, v], axis=-1)
+        with np.errstate(all="ignore"):
+            off = np.abs(self.project(self.back_project(pixels, 1.0)) - pixels)
+        if not (off < _INVERTIBLE_PX).all():
+            raise ValueError("distortion cannot be inverted over the whole image")
+        return self
 
 
 @lru_cache(maxsize=8)
@@ -269,4 +290,5 @@ def _check(name: str, array: NDArray[Any], dtype: type[np.generic], ndim: int) -
     if not isinstance(array, np.ndarray) or array.dtype != dtype or array.ndim != ndim:
         found = (f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray)
                  else type(array).__name__)
-        raise FrameError(f"{name} must be a {ndim}-dimensional {np.dtype(dtype)} array, found {found}")
+        raise FrameError(
+            f"{name} must be a {ndim}-dimensional {np.dtype(dtype)} array, found {found}")

@@ -1,0 +1,104 @@
+"""The whole method on one page: one frame in, one face out.
+
+After Zhang, Yu, Wang, Dong, Liu, "Dense 3D Facial Reconstruction from a Single Depth Image in
+Unconstrained Environment".
+"""
+
+import time
+from importlib.metadata import version
+
+from capture.frame import RgbdFrame
+from recon.densify import densify
+from recon.detect import detect_face
+from recon.errors import TooLittleDepthError
+from recon.face import Face, PointCloud, Report
+from recon.neighbors import mean_spacing
+from recon.rbf import MIN_SEEDS, fit_surface
+from recon.registration import register
+from recon.segment import segment_face
+from recon.settings import Settings
+
+__all__ = ["reconstruct"]
+
+_FEW_SEEDS = 2000
+# A whole frame at 30 frames a second: the face may have moved in between.
+_MUCH_SKEW_US = 33_000
+
+
+def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
+    """Turn one depth + colour frame into a dense, coloured face.
+
+    Parameters
+    ----------
+    frame : depth, mm, and colour with their calibration
+    settings : the `best` preset where None
+
+    Returns
+    -------
+    Face
+        Both clouds in the depth camera's frame, mm, and the report.
+
+    Raises
+    ------
+    ReconstructionError
+        `NoDepthError`, `NoFaceError`, `FaceWithoutDepthError` or `TooLittleDepthError`.
+    """
+    settings = settings or Settings()
+    focal_px = frame.calibration.color.fx
+    clock = _Stopwatch()
+    registered = register(frame)
+    clock.lap("registration")
+    found = detect_face(frame.color, registered, focal_px)
+    clock.lap("detection")
+    seeds = segment_face(registered, found.box, found.depth_mm, focal_px)
+    if len(seeds.points) < MIN_SEEDS:
+        raise TooLittleDepthError(
+            f"{len(seeds.points)} depth readings on the face, a fit needs at least {MIN_SEEDS}")
+    clock.lap("segmentation")
+    spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
+    r0 = settings.r0_factor * spacing
+    clock.lap("neighbors")
+    surface = fit_surface(seeds.points, r0, settings.smoothing)
+    clock.lap("rbf")
+    dense = densify(seeds, surface, spacing, settings.ratio)
+    clock.lap("propagation")
+    initial = PointCloud(seeds.points, seeds.colors)
+    report = Report(
+        face_box=found.box,
+        candidates=found.candidates,
+        initial_points=len(initial),
+        dense_points=len(dense),
+        mean_spacing_mm=spacing,
+        r0_mm=r0,
+        noise_mm=surface.noise,
+        timings_ms=clock.timings_ms(),
+        settings=settings,
+        calibration=frame.calibration_origin,
+        skew_us=frame.skew_us,
+        version=version("denseface"),
+        warnings=_warnings(frame, len(initial)),
+    )
+    return Face(initial, dense, report)
+
+
+def _warnings(frame: RgbdFrame, seeds: int) -> tuple[str, ...]:
+    found = []
+    if seeds < _FEW_SEEDS:
+        found.append(f"only {seeds} seeds: the face is far away or mostly unmeasured")
+    if abs(frame.skew_us) > _MUCH_SKEW_US:
+        found.append(f"depth and colour were taken {frame.skew_us / 1000:.1f} ms apart")
+    return tuple(found)
+
+
+class _Stopwatch:
+    def __init__(self) -> None:
+        self._start = self._last = time.perf_counter()
+        self._laps: dict[str, float] = {}
+
+    def lap(self, name: str) -> None:
+        now = time.perf_counter()
+        self._laps[name] = (now - self._last) * 1e3
+        self._last = now
+
+    def timings_ms(self) -> dict[str, float]:
+        return self._laps | {"total": (time.perf_counter() - self._start) * 1e3}

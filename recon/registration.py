@@ -1,0 +1,110 @@
+"""Stage 1: every depth pixel as a 3D point, and where the colour camera sees it."""
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from capture.frame import RgbdFrame
+from recon.errors import NoDepthError
+
+__all__ = ["Registration", "register"]
+
+# A point is hidden when another, nearer one falls on the same spot of the colour image. A steep
+# surface differs by a few millimetres from spot to spot without hiding itself.
+_HIDDEN_MM = 15.0
+_HIDDEN_SHARE = 0.02
+
+_T = TypeVar("_T", bound=np.generic)
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """The depth image as points, tied to the colour image; one entry for each depth pixel.
+
+    Attributes
+    ----------
+    points : (H, W, 3) float32, mm, depth camera frame; zero where nothing was measured
+    valid : (H, W) bool, a depth was measured
+    pixels : (H, W, 2) float32, (u, v) in the colour image; NaN where not `valid`
+    color_depth : (H, W) float32, mm, z in the colour camera's frame; zero where not `valid`
+    visible : (H, W) bool, inside the colour image and not hidden by a nearer surface
+    colors : (H, W, 3) uint8, RGB, bilinear; zero where not `visible`
+    """
+
+    points: NDArray[np.float32]
+    valid: NDArray[np.bool_]
+    pixels: NDArray[np.float32]
+    color_depth: NDArray[np.float32]
+    visible: NDArray[np.bool_]
+    colors: NDArray[np.uint8]
+
+
+def register(frame: RgbdFrame) -> Registration:
+    """Tie depth to colour through both cameras' intrinsics, distortion and relative pose.
+
+    Points are back-projected by Eq. (1), moved to the colour camera and projected there; a
+    z-buffer in the colour image finds those that the colour camera cannot see.
+
+    Raises
+    ------
+    NoDepthError
+        Where no pixel has a depth.
+    """
+    valid = frame.depth > 0
+    if not valid.any():
+        raise NoDepthError("the depth image is empty: every pixel is 0 (no reading)")
+    z = frame.depth[valid].astype(np.float64)
+    points = np.concatenate([frame.depth_camera.rays()[valid] * z[:, None], z[:, None]], axis=1)
+    moved = frame.depth_to_color.apply(points)
+    color_camera = frame.calibration.color
+    in_front = moved[:, 2] > 0
+    uv = np.full((len(points), 2), np.nan)
+    uv[in_front] = color_camera.project(moved[in_front])
+    inside = in_front & ((uv > -0.5) & (uv < (color_camera.width - 0.5,
+                                              color_camera.height - 0.5))).all(axis=1)
+    seen = inside.copy()
+    pitch = max(1.0, color_camera.fx / frame.depth_camera.fx)
+    seen[inside] = _unhidden(uv[inside], moved[inside, 2], pitch,
+                             (color_camera.height, color_camera.width))
+
+    visible = _scatter(valid, seen)
+    pixels = _scatter(valid, uv.astype(np.float32), fill=np.nan)
+    colors = np.asarray(cv2.remap(
+        frame.color, pixels[..., 0], pixels[..., 1], cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE), np.uint8)
+    colors[~visible] = 0
+    return Registration(
+        points=_scatter(valid, points.astype(np.float32)),
+        valid=valid,
+        pixels=pixels,
+        color_depth=_scatter(valid, np.where(in_front, moved[:, 2], 0).astype(np.float32)),
+        visible=visible,
+        colors=colors,
+    )
+
+
+def _unhidden(
+    uv: NDArray[np.float64], z: NDArray[np.float64], pitch: float, shape: tuple[int, int]
+) -> NDArray[np.bool_]:
+    """Say which points no nearer one hides, by a z-buffer with cells of one depth pixel's size."""
+    cells = np.floor((uv + 0.5) / pitch).astype(np.intp)
+    rows, columns = (int(np.ceil(side / pitch)) + 1 for side in shape)
+    flat = cells[:, 1] * columns + cells[:, 0]
+    nearest = np.full(rows * columns, np.inf, np.float32)
+    np.minimum.at(nearest, flat, z.astype(np.float32))
+    # Each point covers about its cell and the next: without this, a far surface would shine
+    # through between the samples of a near one.
+    covered = cv2.erode(nearest.reshape(rows, columns), np.ones((3, 3), np.uint8)).ravel()
+    unhidden: NDArray[np.bool_] = z <= covered[flat] + np.maximum(_HIDDEN_MM, _HIDDEN_SHARE * z)
+    return unhidden
+
+
+def _scatter(
+    valid: NDArray[np.bool_], values: NDArray[_T], fill: float = 0
+) -> NDArray[_T]:
+    image = np.full(valid.shape + values.shape[1:], fill, values.dtype)
+    image[valid] = values
+    return image

@@ -1,0 +1,44 @@
+"""Small made-up frames and calibrations."""
+
+import numpy as np
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from capture.frame import Calibration, CameraModel, DepthToColor, RgbdFrame
+
+
+def camera(width: int = 160, height: int = 120, f: float = 150.0, **changes: object) -> CameraModel:
+    return CameraModel(**{"width": width, "height": height, "fx": f, "fy": f,
+                          "cx": (width - 1) / 2, "cy": (height - 1) / 2} | changes)
+
+
+def calibration(**changes: object) -> Calibration:
+    return Calibration(**{"depth": camera(), "color": camera(),
+                          "depth_to_color": DepthToColor(translation_mm=(25, 0, 0))} | changes)
+
+
+def frame(
+    depth: NDArray[np.uint16], color: NDArray[np.uint8], calib: Calibration | None = None, **more
+) -> RgbdFrame:
+    return RgbdFrame(depth, color, 1000, 2000, calib or calibration(), **more)
+
+
+@st.composite
+def cameras(draw: st.DrawFn) -> CameraModel:
+    width = draw(st.integers(64, 1920))
+    height = round(width * draw(st.sampled_from([3 / 4, 9 / 16, 4 / 5])))
+    f = draw(st.floats(0.8, 2.0)) * width
+    small = st.floats(-0.02, 0.02)
+    return CameraModel(
+        width=width, height=height, fx=f, fy=f * draw(st.floats(0.95, 1.05)),
+        cx=width * draw(st.floats(0.4, 0.6)), cy=height * draw(st.floats(0.4, 0.6)),
+        distortion=(draw(st.floats(-0.1, 0.1)), draw(st.floats(-0.1, 0.1)),
+                    draw(small) / 10, draw(small) / 10, draw(small)))
+
+
+@st.composite
+def poses(draw: st.DrawFn) -> DepthToColor:
+    angles = draw(st.tuples(*[st.floats(-15, 15)] * 3))
+    rows = Rotation.from_euler("xyz", angles, degrees=True).as_matrix().tolist()
+    return DepthToColor(rotation=rows, translation_mm=draw(st.tuples(*[st.floats(-80, 80)] * 3)))
