@@ -13,23 +13,23 @@ _ANY_WEIGHT = 1e-12
 def average_neighbors(
     colors: NDArray[np.uint8],
     places: NDArray[np.integer],
-    shape: tuple[int, int],
+    wanted: NDArray[np.bool_],
     radius: float,
     spacing: float,
 ) -> NDArray[np.uint8]:
-    """Average scattered colours at every pixel of an image by a Gaussian of growing radius.
+    """Average scattered colours over an image by a Gaussian of growing radius.
 
     Parameters
     ----------
     colors : (n, 3) uint8, RGB, n >= 1
     places : (n, 2) int, (row, column) of each
-    shape : (rows, columns) of the image
+    wanted : (rows, columns) bool, the pixels of the image that need a colour
     radius : standard deviation where colours are dense, pixels; doubled as long as none is near
     spacing : usual distance of neighbouring colours, pixels
 
     Returns
     -------
-    (rows, columns, 3) uint8, RGB
+    (rows, columns, 3) uint8, RGB; zero where not `wanted`
 
     Raises
     ------
@@ -38,6 +38,7 @@ def average_neighbors(
     """
     if not len(colors):
         raise ValueError("colors must not be empty")
+    shape = wanted.shape
     flat = places[:, 0] * shape[1] + places[:, 1]
     # The last channel counts the colours: the mean is sum over count, blurred alike.
     sums = np.stack([
@@ -45,7 +46,7 @@ def average_neighbors(
         for weights in (*colors.T.astype(np.float64), None)
     ], axis=-1).astype(np.float32)
     mean = np.zeros((*shape, 3), np.float32)
-    unknown = np.ones(shape, bool)
+    unknown = wanted.copy()
     least = _LEAST_WEIGHT / spacing**2
     while unknown.any():
         blurred = cv2.GaussianBlur(sums, (0, 0), radius, borderType=cv2.BORDER_CONSTANT)

@@ -64,7 +64,7 @@ class DenseCloud(PointCloud):
 
 
 class _Model(BaseModel):
-    model_config = ConfigDict(frozen=True)
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 
 
 class FaceCandidate(_Model):

@@ -7,13 +7,17 @@ Unconstrained Environment".
 import time
 from importlib.metadata import version
 
+import numpy as np
+from numpy.typing import NDArray
+
 from capture.frame import RgbdFrame
+from recon.adapt import AdaptiveSurface, blend_surfaces
 from recon.densify import densify
 from recon.detect import detect_face
 from recon.errors import TooLittleDepthError
 from recon.face import Face, PointCloud, Report
 from recon.neighbors import mean_spacing
-from recon.rbf import MIN_SEEDS, fit_surface
+from recon.rbf import MIN_SEEDS, Surface, fit_surface
 from recon.registration import register
 from recon.segment import segment_face
 from recon.settings import Settings
@@ -46,19 +50,18 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     settings = settings or Settings()
     focal_px = frame.calibration.color.fx
     clock = _Stopwatch()
-    registered = register(frame)
+    registered = register(frame, settings.depth_offset_mm)
     clock.lap("registration")
     found = detect_face(frame.color, registered, focal_px)
     clock.lap("detection")
-    seeds = segment_face(registered, found.box, found.depth_mm, focal_px)
+    seeds = segment_face(registered, found.box, focal_px)
     if len(seeds.points) < MIN_SEEDS:
         raise TooLittleDepthError(
             f"{len(seeds.points)} depth readings on the face, a fit needs at least {MIN_SEEDS}")
     clock.lap("segmentation")
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
-    r0 = settings.r0_factor * spacing
     clock.lap("neighbors")
-    surface = fit_surface(seeds.points, r0, settings.smoothing)
+    surface = _fit(seeds.points, spacing, settings)
     clock.lap("rbf")
     dense = densify(seeds, surface, spacing, settings.ratio)
     clock.lap("propagation")
@@ -69,7 +72,7 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
         initial_points=len(initial),
         dense_points=len(dense),
         mean_spacing_mm=spacing,
-        r0_mm=r0,
+        r0_mm=settings.r0_factor * spacing,
         noise_mm=surface.noise,
         timings_ms=clock.timings_ms(),
         settings=settings,
@@ -79,6 +82,16 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
         warnings=_warnings(frame, len(initial)),
     )
     return Face(initial, dense, report)
+
+
+def _fit(
+    points: NDArray[np.float32], spacing: float, settings: Settings
+) -> Surface | AdaptiveSurface:
+    fine = fit_surface(points, settings.r0_factor * spacing, settings.smoothing)
+    if settings.coarse_r0_factor is None:
+        return fine
+    coarse = fit_surface(points, settings.coarse_r0_factor * spacing, settings.coarse_smoothing)
+    return blend_surfaces(fine, coarse, points, spacing)
 
 
 def _warnings(frame: RgbdFrame, seeds: int) -> tuple[str, ...]:

@@ -42,11 +42,16 @@ class Registration:
     colors: NDArray[np.uint8]
 
 
-def register(frame: RgbdFrame) -> Registration:
+def register(frame: RgbdFrame, depth_offset_mm: float = 0.0) -> Registration:
     """Tie depth to colour through both cameras' intrinsics, distortion and relative pose.
 
     Points are back-projected by Eq. (1), moved to the colour camera and projected there; a
     z-buffer in the colour image finds those that the colour camera cannot see.
+
+    Parameters
+    ----------
+    frame : depth, mm, and colour with their calibration
+    depth_offset_mm : added to each depth, mm
 
     Raises
     ------
@@ -56,7 +61,7 @@ def register(frame: RgbdFrame) -> Registration:
     valid = frame.depth > 0
     if not valid.any():
         raise NoDepthError("the depth image is empty: every pixel is 0 (no reading)")
-    z = frame.depth[valid].astype(np.float64)
+    z = frame.depth[valid] + np.float64(depth_offset_mm)
     points = np.concatenate([frame.depth_camera.rays()[valid] * z[:, None], z[:, None]], axis=1)
     moved = frame.depth_to_color.apply(points)
     color_camera = frame.calibration.color

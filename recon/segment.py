@@ -10,6 +10,7 @@ from itertools import pairwise
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_fill_holes
 
 from recon.colors import average_neighbors
 from recon.errors import FaceWithoutDepthError
@@ -20,20 +21,28 @@ __all__ = ["CLUSTERS", "Seeds", "cluster_depths", "crop_to_box", "keep_face", "s
 CLUSTERS = 3
 """The paper's: face, body or hair, background."""
 
-# The cascades' box ends inside the forehead and near the chin and may sit half a cheek aside: the
-# crop is its centre and what a head can reach from there, in millimetres.
-_REACH_SIDE_MM = 100.0
-_REACH_UP_MM = 125.0
-_REACH_DOWN_MM = 125.0
+# The cascades' box ends inside the forehead and near the chin, and sits aside of a turned face:
+# how far a face reaches from its centre, in widths of the box.
+_REACH_SIDE = 0.72
+_REACH_UP = 0.85
+_REACH_DOWN = 0.80
+# How far behind its front a face reaches, in widths of the box, by how far below the centre: the
+# ears at the top, the jaw, then the chin, behind which neck and chest begin.
+_BELOW = (0.20, 0.35, 0.50, 0.60, 0.70, 0.75, 0.80)
+_BEHIND = (0.95, 0.60, 0.48, 0.415, 0.30, 0.20, 0.0)
+# The part of the box, each way from its centre, in which the front is sought.
+_FRONT_PART = 0.3
 # Two clusters are parts of one surface unless this much empty depth lies between them.
 _GAP_MM = 60.0
 # From pixel to pixel a face's surface steps less than this.
 _STEP_MM = 12.0
-# Ear to nose tip, with room for the largest head.
-_HEAD_DEPTH_MM = 150.0
 # Unmeasured spots up to this many pixels across do not cut the surface in two.
 _BRIDGE_PX = 5
+# What sticks out of the outline by less than this is no part of a head.
+_SPUR_MM = 10.0
 _SEED = 1
+
+Box = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +63,7 @@ class Seeds:
 
 
 def segment_face(
-    registered: Registration, box: tuple[int, int, int, int], depth_mm: float, focal_px: float
+    registered: Registration, box: Box, focal_px: float
 ) -> Seeds:
     """Cut the face's own points out of the depth image.
 
@@ -62,7 +71,6 @@ def segment_face(
     ----------
     registered : the depth tied to the colour image
     box : x, y, width, height of the face; pixels of the colour image
-    depth_mm : the face's depth, in the colour camera's frame
     focal_px : focal length of the colour camera, pixels
 
     Raises
@@ -70,34 +78,30 @@ def segment_face(
     FaceWithoutDepthError
         Where nothing was measured around the middle of the box.
     """
-    center = (box[0] + box[2] / 2, box[1] + box[3] / 2)
-    crop = crop_to_box(registered, center, depth_mm, focal_px)
+    crop = crop_to_box(registered, box)
     if not crop.any():
         raise FaceWithoutDepthError(f"no depth was measured in the face's box {box}")
-    cluster = cluster_depths(registered, crop, center)
-    face = keep_face(registered, cluster, center)
+    cluster = cluster_depths(registered, crop, box)
+    face = keep_face(registered, cluster, box, focal_px)
     return Seeds(registered.points[face], _colors(registered, face),
                  np.argwhere(face).astype(np.int32))
 
 
-def crop_to_box(
-    registered: Registration, center: tuple[float, float], depth_mm: float, focal_px: float
-) -> NDArray[np.bool_]:
-    """Keep the depth pixels that project into the box, widened to what a head can reach.
+def crop_to_box(registered: Registration, box: Box) -> NDArray[np.bool_]:
+    """Keep the depth pixels that project into the box, widened to what the face can reach.
 
     The crop is an ellipse about the box's centre: a head is round, and the corners of its box
     hold shoulders. Gives (H, W) bool.
     """
-    pixel_mm = depth_mm / focal_px
-    across = (registered.pixels[..., 0] - center[0]) * pixel_mm / _REACH_SIDE_MM
-    down = (registered.pixels[..., 1] - center[1]) * pixel_mm
-    down = down / np.where(down < 0, _REACH_UP_MM, _REACH_DOWN_MM)
-    inside: NDArray[np.bool_] = registered.valid & (across * across + down * down < 1)
+    across, down = _in_box(registered, box)
+    reach = np.where(down < 0, _REACH_UP, _REACH_DOWN)
+    inside: NDArray[np.bool_] = registered.valid & (
+        (across / _REACH_SIDE) ** 2 + (down / reach) ** 2 < 1)
     return inside
 
 
 def cluster_depths(
-    registered: Registration, crop: NDArray[np.bool_], center: tuple[float, float]
+    registered: Registration, crop: NDArray[np.bool_], box: Box
 ) -> NDArray[np.bool_]:
     """Cluster the cropped depths by k-means, Eq. (2), and keep the face's.
 
@@ -115,44 +119,52 @@ def cluster_depths(
     label_image = np.full(crop.shape, -1, np.int32)
     labels = np.asarray(labels, np.int32).ravel()
     label_image[crop] = labels
-    middle = _nearest_pixel(registered, crop, center)
+    middle = _nearest_pixel(registered, crop, box)
     kept = _joined(z, labels, int(label_image[middle]))
     return crop & np.isin(label_image, list(kept))
 
 
 def keep_face(
-    registered: Registration, cluster: NDArray[np.bool_], center: tuple[float, float]
+    registered: Registration, cluster: NDArray[np.bool_], box: Box, focal_px: float
 ) -> NDArray[np.bool_]:
-    """Keep what is connected with the middle of the box by small steps, and no deeper than a head.
+    """Keep what small steps connect with the middle of the box, as deep as a head, but no neck.
 
     Gives (H, W) bool.
     """
-    start = _nearest_pixel(registered, cluster, center)
+    start = _nearest_pixel(registered, cluster, box)
     depth, known = _bridged(registered.points[..., 2], cluster)
     blocked = np.zeros((depth.shape[0] + 2, depth.shape[1] + 2), np.uint8)
     blocked[1:-1, 1:-1] = ~known
     cv2.floodFill(depth, blocked, (int(start[1]), int(start[0])), 0.0,
                   _STEP_MM, _STEP_MM, 8 | cv2.FLOODFILL_MASK_ONLY | (2 << 8))
     face: NDArray[np.bool_] = cluster & (blocked[1:-1, 1:-1] == 2)
+    across, down = _in_box(registered, box)
     z = registered.points[..., 2]
-    front = np.percentile(z[face], 2)
-    face &= z < front + _HEAD_DEPTH_MM
-    # A pixel with hardly a neighbour is an edge's flying pixel.
-    neighbours = cv2.filter2D(face.astype(np.uint8), -1, np.ones((3, 3), np.uint8),
-                              borderType=cv2.BORDER_CONSTANT)
-    return face & (neighbours >= 4)
+    middle = face & (np.abs(across) < _FRONT_PART) & (np.abs(down) < _FRONT_PART)
+    front = float(np.percentile(z[middle if middle.any() else face], 2))
+    box_mm = box[2] * front / focal_px
+    face &= z < front + box_mm * np.interp(down, _BELOW, _BEHIND)
+    return face & _smooth_outline(face, _SPUR_MM * focal_px / front)
+
+
+def _in_box(
+    registered: Registration, box: Box
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Where each depth pixel is seen from the box's centre, rightward and down, in box widths."""
+    x, y, width, height = box
+    return ((registered.pixels[..., 0] - np.float32(x + width / 2)) / np.float32(width),
+            (registered.pixels[..., 1] - np.float32(y + height / 2)) / np.float32(width))
 
 
 def _nearest_pixel(
-    registered: Registration, among: NDArray[np.bool_], center: tuple[float, float]
+    registered: Registration, among: NDArray[np.bool_], box: Box
 ) -> tuple[int, int]:
-    """The depth pixel of `among` that is seen nearest the given place of the colour image."""
+    """The depth pixel of `among` that is seen nearest the middle of the box."""
     seen = among & registered.visible
     if not seen.any():
         raise FaceWithoutDepthError("no depth was measured where the colour camera sees the face")
-    at = np.argwhere(seen)
-    gap = registered.pixels[seen] - np.array(center, np.float32)
-    row, column = at[np.argmin((gap * gap).sum(axis=1))]
+    across, down = _in_box(registered, box)
+    row, column = np.argwhere(seen)[np.argmin((across**2 + down**2)[seen])]
     return int(row), int(column)
 
 
@@ -186,20 +198,30 @@ def _colors(registered: Registration, face: NDArray[np.bool_]) -> NDArray[np.uin
     seen = face & registered.visible
     inner = _away_from_outline(face) & seen
     trusted = inner if inner.any() else seen
+    colors = registered.colors[face]
     if not trusted.any():
-        return np.zeros((int(face.sum()), 3), np.uint8)
-    averaged = average_neighbors(registered.colors[trusted], np.argwhere(trusted), face.shape, 1, 1)
-    return np.where(trusted[face][:, None], registered.colors[face], averaged[face])
+        return colors
+    low, high = np.argwhere(face).min(axis=0), np.argwhere(face).max(axis=0) + 1
+    window = np.s_[low[0]:high[0], low[1]:high[1]]
+    averaged = average_neighbors(registered.colors[trusted], np.argwhere(trusted) - low,
+                                 (face & ~trusted)[window], 1, 1)
+    return np.where(trusted[face][:, None], colors, averaged[face[window]])
+
+
+def _smooth_outline(face: NDArray[np.bool_], spur_px: float) -> NDArray[np.bool_]:
+    """The face's area without spurs: at a depth edge the sensor sets pixels to either side."""
+    side = 2 * round(spur_px / 2) + 1
+    opened = cv2.morphologyEx(
+        _solid(face), cv2.MORPH_OPEN, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
+    return np.asarray(opened > 0, np.bool_)
 
 
 def _away_from_outline(face: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """The face without its outermost pixels; holes inside it have no outline."""
-    solid = cv2.morphologyEx(face.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8))
-    outside = solid == 0
-    count, parts = cv2.connectedComponents(outside.astype(np.uint8), connectivity=4)
-    if count > 1:
-        border = np.unique(np.concatenate([parts[0], parts[-1], parts[:, 0], parts[:, -1]]))
-        outside &= np.isin(parts, border)
-    inner = cv2.erode((~outside).astype(np.uint8), np.ones((5, 5), np.uint8),
-                      borderType=cv2.BORDER_CONSTANT, borderValue=1)
-    return face & (inner > 0)
+    return face & (cv2.erode(_solid(face), np.ones((5, 5), np.uint8)) > 0)
+
+
+def _solid(face: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """The face's area, (H, W) uint8, 0 or 1, its holes filled."""
+    closed = cv2.morphologyEx(face.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
+    return np.asarray(binary_fill_holes(closed), np.uint8)

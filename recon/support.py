@@ -1,0 +1,46 @@
+"""Where the seeds support a surface: over them and the holes they enclose, not past their rim."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_fill_holes
+
+__all__ = ["support_on_grid"]
+
+# In units of the mean spacing. Gaps narrower than twice the closing are none; the support ends at
+# the rim, counted outward from the outermost seeds.
+_CLOSING = 1.2
+_RIM = 0.2
+
+
+def support_on_grid(
+    points: NDArray[np.float32], spacing: float, step: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Give the grid points over the seeds, with enclosed holes but nothing past the rim.
+
+    Parameters
+    ----------
+    points : (n, 3) float32, mm
+    spacing : mean spacing of the seeds, mm
+    step : distance of grid points, mm
+
+    Returns
+    -------
+    xs, ys : (columns,), (rows,) float64, mm
+    support : (rows, columns) bool
+    """
+    reach = (_CLOSING + 1) * spacing
+    low, high = points[:, :2].min(axis=0) - reach, points[:, :2].max(axis=0) + reach
+    columns, rows = (int(n) for n in np.ceil((high - low) / step) + 1)
+    xs, ys = low[0] + step * np.arange(columns), low[1] + step * np.arange(rows)
+    place = np.rint((points[:, :2] - low) / step).astype(np.intp)
+    empty = np.ones((rows, columns), np.uint8)
+    empty[place[:, 1], place[:, 0]] = 0
+    closed = _distance(empty) * step <= _CLOSING * spacing
+    solid = binary_fill_holes(closed)
+    return xs, ys, _distance(solid.astype(np.uint8)) * step > (_CLOSING - _RIM) * spacing
+
+
+def _distance(image: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Distance of each pixel to the nearest zero, pixels."""
+    return np.asarray(cv2.distanceTransform(image, cv2.DIST_L2, cv2.DIST_MASK_PRECISE), np.float32)
