@@ -1,1 +1,48 @@
-"""The public face."""
+"""The public face: what other programs import.
+
+Everything is imported when first used, so that `import denseface` costs nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from capture import RgbdFrame, open_source
+    from recon import Face, Settings, reconstruct
+    from service.client import Client
+    from service.export import load_face, save_face
+
+    __version__: str
+
+__all__ = [
+    "Client", "Face", "RgbdFrame", "Settings", "__version__", "load_face", "open_source",
+    "reconstruct", "save_face",
+]
+
+_HOMES = {
+    "Client": "service.client",
+    "Face": "recon",
+    "RgbdFrame": "capture",
+    "Settings": "recon",
+    "load_face": "service.export",
+    "open_source": "capture",
+    "reconstruct": "recon",
+    "save_face": "service.export",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        value: Any = version("denseface")
+    elif name in _HOMES:
+        value = getattr(import_module(_HOMES[name]), name)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -23,9 +23,12 @@ CLUSTERS = 3
 
 # The cascades' box ends inside the forehead and near the chin, and sits aside of a turned face:
 # how far a face reaches from its centre, in widths of the box.
-_REACH_SIDE = 0.72
-_REACH_UP = 0.85
+_REACH_SIDE = 0.68
+_REACH_UP = 0.74
 _REACH_DOWN = 0.80
+# A superellipse of this power, between an ellipse (2) and the box itself: a head is round, and
+# the corners of its box hold shoulders.
+_ROUNDNESS = 2.5
 # How far behind its front a face reaches, in widths of the box, by how far below the centre: the
 # ears at the top, the jaw, then the chin, behind which neck and chest begin.
 _BELOW = (0.20, 0.35, 0.50, 0.60, 0.70, 0.75, 0.80)
@@ -90,13 +93,12 @@ def segment_face(
 def crop_to_box(registered: Registration, box: Box) -> NDArray[np.bool_]:
     """Keep the depth pixels that project into the box, widened to what the face can reach.
 
-    The crop is an ellipse about the box's centre: a head is round, and the corners of its box
-    hold shoulders. Gives (H, W) bool.
+    Gives (H, W) bool.
     """
     across, down = _in_box(registered, box)
     reach = np.where(down < 0, _REACH_UP, _REACH_DOWN)
     inside: NDArray[np.bool_] = registered.valid & (
-        (across / _REACH_SIDE) ** 2 + (down / reach) ** 2 < 1)
+        np.abs(across / _REACH_SIDE) ** _ROUNDNESS + np.abs(down / reach) ** _ROUNDNESS < 1)
     return inside
 
 

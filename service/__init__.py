@@ -1,1 +1,1 @@
-"""Processes, messages, storage, command line."""
+"""Processes, messages, storage and the command line."""

@@ -1,5 +1,6 @@
 """A Kinect v1 that is not there: frames of heads whose true shape is known."""
 
+from tests.simulator.accuracy import Accuracy, measure
 from tests.simulator.heads import Head, head_names, load_head, shared_folder
 from tests.simulator.kinect import KINECT_CALIBRATED, KINECT_DEFAULT, KinectModel
 from tests.simulator.labels import Label
@@ -7,6 +8,21 @@ from tests.simulator.scene import Light, Person, Scene
 from tests.simulator.sensor import Simulated, simulate
 from tests.simulator.truth import Truth
 
-__all__ = ["KINECT_CALIBRATED", "KINECT_DEFAULT", "Head", "KinectModel", "Label", "Light",
-           "Person", "Scene", "Simulated", "Truth", "head_names", "load_head", "shared_folder",
-           "simulate"]
+__all__ = [
+    "KINECT_CALIBRATED",
+    "KINECT_DEFAULT",
+    "Accuracy",
+    "Head",
+    "KinectModel",
+    "Label",
+    "Light",
+    "Person",
+    "Scene",
+    "Simulated",
+    "Truth",
+    "head_names",
+    "load_head",
+    "measure",
+    "shared_folder",
+    "simulate",
+]

@@ -1,0 +1,91 @@
+"""Addresses: the hub's own, and the one for publications that follows from it."""
+
+import socket
+from ipaddress import ip_address
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from service.errors import AddressError, HubRunningError
+from service.settings import private_folder
+
+__all__ = ["check_bindable", "publications_of", "socket_file"]
+
+_MAX_SOCKET_PATH = 107 - len(".publications")
+_PUBLICATIONS = ".publications"
+
+
+def socket_file(address: str) -> Path | None:
+    """Give the file of an `ipc://` address, None for `tcp://`.
+
+    Raises
+    ------
+    AddressError
+        Where the address is neither, or its path or port is impossible.
+    """
+    if address.startswith("ipc://"):
+        path = Path(address.removeprefix("ipc://"))
+        if not path.is_absolute() or len(str(path)) > _MAX_SOCKET_PATH:
+            raise AddressError(
+                f"{address}: an ipc address is ipc:// and an absolute path of at most "
+                f"{_MAX_SOCKET_PATH} bytes")
+        return path
+    _host_and_port(address)
+    return None
+
+
+def publications_of(address: str) -> str:
+    """Give where the hub of this address publishes: the next port, or a file beside.
+
+    Raises
+    ------
+    AddressError
+        As `socket_file`.
+    """
+    if socket_file(address):
+        return address + _PUBLICATIONS
+    host, port = _host_and_port(address)
+    return f"tcp://{f'[{host}]' if ':' in host else host}:{port + 1}"
+
+
+def check_bindable(address: str) -> None:
+    """Refuse what the hub may not bind, and an `ipc` address that another hub serves.
+
+    Raises
+    ------
+    AddressError
+        Where the address would be open to other machines: that needs CURVE keys, which this
+        version does not have.
+    HubRunningError
+        Where a hub answers there already: binding would silently take its place.
+    """
+    path = socket_file(address)
+    if path is None:
+        host, _ = _host_and_port(address)
+        try:
+            loopback = ip_address(host).is_loopback
+        except ValueError:
+            loopback = False
+        if not loopback:
+            raise AddressError(
+                f"{address}: refused, it is not a loopback address: other machines may only be "
+                "let in with CURVE security, use tcp://127.0.0.1:PORT or ipc://PATH")
+        return
+    private_folder(path.parent)
+    with socket.socket(socket.AF_UNIX) as probe:
+        try:
+            probe.connect(str(path))
+        except OSError:
+            return
+    raise HubRunningError(f"{address}: another hub is listening there")
+
+
+def _host_and_port(address: str) -> tuple[str, int]:
+    try:
+        parts = urlsplit(address)
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        host = port = None
+    # The port after it is the publications'.
+    if not host or not port or port == 65535 or address.partition("://")[0] != "tcp" or parts.path:
+        raise AddressError(f"{address}: expected ipc://PATH or tcp://HOST:PORT")
+    return host, port

@@ -1,0 +1,89 @@
+"""The command `denseface`: one line on stderr where something is wrong, and an exit status.
+
+0 done; 1 the job failed; 2 wrong usage or unreadable input; 130 after Ctrl-C.
+"""
+
+import argparse
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from types import FrameType
+from typing import NoReturn
+
+from service.commands import COMMANDS, load
+
+__all__ = ["main"]
+
+_FAILED, _USAGE, _CTRL_C, _BROKEN_PIPE, _TERMINATED = 1, 2, 130, 141, 143
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        self.exit(_USAGE, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and give its exit status."""
+    args = _parser().parse_args(arguments)
+    signal.signal(signal.SIGTERM, _terminated)
+    try:
+        status: int = load(args.command).run(args)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read has left; keep Python from saying so again at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return _BROKEN_PIPE
+    except KeyboardInterrupt:
+        return _CTRL_C
+    except Exception as error:
+        if args.debug:
+            raise
+        line = " ".join(str(error).split()) or type(error).__name__
+        print(f"denseface {args.command}: {line}", file=sys.stderr)
+        return _status_of(error)
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="denseface", description="One press, one depth frame, one dense coloured 3D face.",
+        allow_abbrev=False)
+    parser.add_argument("--version", action=_Version)
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name, text in COMMANDS.items():
+        command = commands.add_parser(
+            name, help=text, description=text[0].upper() + text[1:] + ".", allow_abbrev=False)
+        command.add_argument(
+            "--debug", action="store_true", help="show a traceback where something goes wrong")
+        load(name).add_arguments(command)
+    return parser
+
+
+class _Version(argparse.Action):
+    def __init__(self, option_strings: Sequence[str], dest: str) -> None:
+        super().__init__(option_strings, dest, nargs=0, help="show the version and exit")
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from importlib.metadata import version
+
+        print(version("denseface"))
+        parser.exit()
+
+
+def _status_of(error: Exception) -> int:
+    from capture.errors import CalibrationError, FrameError, UnreadableSourceError
+    from service.errors import (
+        FormatError,
+        LocalProtocolError,
+        SettingsError,
+        UsageError,
+    )
+
+    wrong_input = (CalibrationError, FrameError, UnreadableSourceError, FormatError,
+                   LocalProtocolError, SettingsError, UsageError)
+    return _USAGE if isinstance(error, wrong_input) else _FAILED
+
+
+def _terminated(number: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001
+    raise SystemExit(_TERMINATED)

@@ -1,0 +1,37 @@
+"""The subcommands, one module each.
+
+Each has `add_arguments(parser)` and `run(args) -> exit status`, and imports what is heavy in `run`:
+`denseface --help` is to be quick.
+"""
+
+import argparse
+from importlib import import_module
+from typing import Protocol, cast
+
+__all__ = ["COMMANDS", "Command", "load"]
+
+COMMANDS = {
+    "reconstruct": "make a dense face of one frame of a file",
+    "up": "run the whole service on this machine",
+    "press": "take a frame now and wait for its face",
+    "subscribe": "follow the faces as they are published",
+    "status": "say who is connected to the hub and what was done",
+    "hub": "run the hub alone",
+    "capture": "run a capture process alone",
+    "worker": "run a reconstruction worker alone",
+}
+
+
+class Command(Protocol):
+    """What each module here is."""
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """State the command's flags."""
+
+    def run(self, args: argparse.Namespace) -> int:
+        """Do it and give the exit status."""
+
+
+def load(name: str) -> Command:
+    """Import a command's module."""
+    return cast("Command", import_module(f"service.commands.{name}"))

@@ -1,0 +1,95 @@
+"""Flags that several commands share."""
+
+import argparse
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from recon.settings import Settings
+    from service.settings import ServiceSettings
+
+__all__ = ["add_address", "add_daemon", "add_hub", "add_recon", "recon_arguments",
+           "recon_settings", "service_settings", "start_daemon"]
+
+
+def add_address(parser: argparse.ArgumentParser) -> None:
+    """Say where the hub is."""
+    parser.add_argument(
+        "--address", metavar="ADDRESS",
+        help="the hub's, ipc://PATH or tcp://127.0.0.1:PORT (default: DENSEFACE_ADDRESS, "
+             "else this user's own)")
+
+
+def add_daemon(parser: argparse.ArgumentParser) -> None:
+    """Say how a process logs."""
+    parser.add_argument("--log", choices=("text", "json"), default="text",
+                        help="form of the log on stderr (default: text)")
+
+
+def add_hub(parser: argparse.ArgumentParser) -> None:
+    """Say where things are kept."""
+    parser.add_argument("--data", type=Path, metavar="DIR",
+                        help="folder of frames and faces (default: DENSEFACE_DATA, else this "
+                             "user's data folder)")
+
+
+def add_recon(parser: argparse.ArgumentParser) -> None:
+    """Say how faces are made."""
+    parser.add_argument("--preset", metavar="NAME", help="paper, faithful or best (default: best)")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="changes",
+                        help="change one setting of the reconstruction; may be repeated")
+
+
+def recon_arguments(args: argparse.Namespace) -> list[str]:
+    """Give the flags of `add_recon` again, for a child process."""
+    given = ["--preset", args.preset] if args.preset else []
+    for change in args.changes:
+        given += ["--set", change]
+    return given
+
+
+def recon_settings(args: argparse.Namespace) -> "Settings":
+    """Read `--preset` and `--set`.
+
+    Raises
+    ------
+    UsageError
+        One line that names the setting, what was found and what was expected.
+    """
+    from pydantic import ValidationError
+
+    from recon.settings import Settings
+    from service.errors import UsageError
+
+    given = {"preset": args.preset} if args.preset else {}
+    for change in args.changes:
+        name, equals, value = change.partition("=")
+        if not equals or name not in Settings.model_fields:
+            raise UsageError(f"--set {change}: expected NAME=VALUE with NAME one of "
+                             f"{', '.join(Settings.model_fields)}")
+        given[name] = value
+    try:
+        return Settings.model_validate(given)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        name = ".".join(str(part) for part in first["loc"])
+        flag = "--preset" if name == "preset" and args.preset else f"--set {name}"
+        raise UsageError(f"{flag}: {first['msg']}, found {first['input']!r}") from error
+
+
+def service_settings(args: argparse.Namespace) -> "ServiceSettings":
+    """Put the flags over the environment."""
+    from service.settings import ServiceSettings
+
+    return ServiceSettings.of(
+        os.environ, address=args.address, data=getattr(args, "data", None))
+
+
+def start_daemon(args: argparse.Namespace, name: str) -> None:
+    """Do what every process of the service does first."""
+    from service.log import configure
+    from service.stopping import die_with_parent
+
+    die_with_parent()
+    configure(args.log, name)

@@ -1,0 +1,47 @@
+"""`denseface subscribe`."""
+
+import argparse
+from pathlib import Path
+
+from service.commands import options
+
+__all__ = ["add_arguments", "run"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """State the flags."""
+    options.add_address(parser)
+    parser.add_argument("--save", type=Path, metavar="DIR",
+                        help="write each face as DIR/ID.ply with its report, DIR/ID.json")
+    parser.add_argument("--count", type=int, metavar="N", help="end after N captures")
+    parser.add_argument("--after", type=int, metavar="SEQUENCE",
+                        help="start after this sequence number; 0 is all that is kept "
+                             "(default: only what comes from now on)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do it."""
+    from service.client import Client, PublishedFailure
+    from service.errors import UsageError
+    from service.files import FaceFiles
+
+    for name in ("count", "after"):
+        value = getattr(args, name)
+        if value is not None and value < (name == "count"):
+            raise UsageError(f"--{name} {value}: expected a number that is not negative, or zero")
+    if args.save and not args.save.is_dir():
+        raise UsageError(f"--save {args.save}: no such folder")
+    with Client(options.service_settings(args).address) as client:
+        for number, outcome in enumerate(client.published(after=args.after), start=1):
+            if isinstance(outcome, PublishedFailure):
+                print(f"{outcome.sequence} {outcome.capture_id} failed: {outcome.error}",
+                      flush=True)
+            else:
+                if args.save:
+                    path = args.save / f"{outcome.capture_id}.ply"
+                    FaceFiles(path, path.with_suffix(".json"), None).write(outcome.face)
+                points = len(outcome.face.dense)
+                print(f"{outcome.sequence} {outcome.capture_id} {points} points", flush=True)
+            if number == args.count:
+                break
+    return 0

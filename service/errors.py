@@ -1,0 +1,100 @@
+"""What can go wrong between a press and a published face.
+
+Each error is also the builtin kind that a caller would expect to catch.
+"""
+
+__all__ = [
+    "AddressError",
+    "CaptureFailedError",
+    "ClientTimeoutError",
+    "CorruptFileError",
+    "FormatError",
+    "HubRunningError",
+    "LocalProtocolError",
+    "PressRefusedError",
+    "ProtocolError",
+    "RemoteProtocolError",
+    "RequestFailedError",
+    "ServiceError",
+    "SettingsError",
+    "StoreError",
+    "UnknownCaptureError",
+    "UsageError",
+]
+
+
+class ServiceError(Exception):
+    """Base of every error raised by `service`."""
+
+
+class ProtocolError(ServiceError, ValueError):
+    """A message is not as `service.wire` describes it."""
+
+
+class LocalProtocolError(ProtocolError):
+    """We tried to send a message that it may not send."""
+
+
+class RemoteProtocolError(ProtocolError):
+    """The other side sent something that is no message: drop it, do not answer it."""
+
+
+class ClientTimeoutError(ServiceError, TimeoutError):
+    """The hub did not answer, or the face was not ready, in the time allowed."""
+
+
+class PressRefusedError(ServiceError, RuntimeError):
+    """The press led to no capture: no sensor, no frame in time, no room on the disk."""
+
+
+class CaptureFailedError(ServiceError, RuntimeError):
+    """The capture was accepted and ended without a face.
+
+    Attributes
+    ----------
+    capture_id : the capture
+    error : name of the error that ended it, such as `NoFaceError`
+    dead : given up after repeated attempts (a dead letter), rather than answered "no face"
+    """
+
+    def __init__(self, capture_id: str, error: str, message: str, *, dead: bool = False) -> None:
+        super().__init__(f"capture {capture_id}: {message} ({error})")
+        self.capture_id = capture_id
+        self.error = error
+        self.dead = dead
+
+
+class RequestFailedError(ServiceError, RuntimeError):
+    """The hub could not answer: it says why."""
+
+
+class UnknownCaptureError(ServiceError, LookupError):
+    """The hub has no capture of this id."""
+
+
+class StoreError(ServiceError, OSError):
+    """The data folder cannot be read or written."""
+
+
+class CorruptFileError(StoreError):
+    """A file of the data folder does not have the contents that its checksum states."""
+
+
+class SettingsError(ServiceError, ValueError):
+    """A setting of the service is unknown or has an impossible value."""
+
+
+class AddressError(SettingsError):
+    """An address is malformed, or one that the hub may not bind."""
+
+
+class HubRunningError(ServiceError, RuntimeError):
+    """Another hub already serves this address or data folder."""
+
+
+class FormatError(ServiceError, ValueError):
+    """A file's ending names no known format, or its contents are not of that format."""
+
+
+class UsageError(ServiceError, ValueError):
+    """The command line asks for something that does not exist."""

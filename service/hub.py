@@ -1,0 +1,156 @@
+"""The hub without sockets: messages and the time in, messages out.
+
+Nothing here waits, sends or reads a clock, so every order of events can be tested. What is to be
+durable goes through the store before the message that says so is given out. The life of a capture
+is the table in `service.states`.
+"""
+
+from collections.abc import Iterator
+from hashlib import sha256
+from importlib.metadata import version
+
+import structlog
+
+from recon.settings import Settings
+from service import messages
+from service.errors import ServiceError
+from service.intake import Intake
+from service.jobs import Jobs
+from service.outcomes import Outcomes
+from service.outputs import Output, Publish, Topic, send
+from service.roster import Roster
+from service.settings import ServiceSettings
+from service.states import CaptureState
+from service.store import Store
+from service.wire import Packet
+
+__all__ = ["Hub", "settings_hash"]
+
+
+def settings_hash(settings: Settings) -> str:
+    """Name settings in 16 hexadecimal digits."""
+    return sha256(settings.model_dump_json().encode()).hexdigest()[:16]
+
+
+class Hub:
+    """Takes presses, keeps frames, hands out jobs, publishes outcomes.
+
+    Parameters
+    ----------
+    store : what was accepted before is resumed
+    settings : time-outs and limits
+    recon : settings of every job accepted from now on
+    """
+
+    def __init__(self, store: Store, settings: ServiceSettings, recon: Settings) -> None:
+        self._store = store
+        self._settings = settings
+        self._roster = Roster()
+        self._outcomes = Outcomes(store)
+        self._intake = Intake(store, self._roster, settings, recon, settings_hash(recon))
+        self._jobs = Jobs(store, self._roster, settings.attempts, self._outcomes.concluded)
+        self._status_due = 0.0
+        self._log = structlog.get_logger("hub")
+
+    def receive(self, now: float, peer: bytes, packet: Packet) -> list[Output]:
+        """Take one message from a peer.
+
+        Parameters
+        ----------
+        now : seconds, of a clock that only goes forward
+        peer : the sender's routing id
+        """
+        outputs: list[Output] = []
+        try:
+            outputs.extend(self._receive(now, peer, packet))
+            outputs.extend(self._jobs.dispatch(now))
+        except ServiceError as error:
+            self._log.error("message failed", kind=packet.message.kind, reason=str(error))
+            request = getattr(packet.message, "request", None)
+            if request is not None:
+                outputs.append(send(peer, messages.RequestFailed(
+                    request=request, message=str(error))))
+        return outputs
+
+    def tick(self, now: float) -> list[Output]:
+        """Do what is due: time-outs, silent peers, status. To be called a few times a second."""
+        outputs: list[Output] = []
+        try:
+            outputs.extend(self._intake.tick(now))
+            outputs.extend(self._outcomes.tick(now))
+            for peer in self._roster.silent(now - self._settings.silence_s):
+                outputs.extend(self._gone(peer, "silent"))
+            outputs.extend(self._jobs.dispatch(now))
+            if now >= self._status_due:
+                self._status_due = now + self._settings.heartbeat_s
+                outputs.append(Publish(Topic.STATUS, Packet(self._status())))
+        except ServiceError as error:
+            self._log.error("tick failed", reason=str(error))
+        return outputs
+
+    def unreachable(self, peer: bytes) -> list[Output]:
+        """Take note that a message to a peer could not be delivered."""
+        return list(self._gone(peer, "unreachable"))
+
+    def _receive(self, now: float, peer: bytes, packet: Packet) -> Iterator[Output]:
+        match packet.message:
+            case messages.Press() as message:
+                yield from self._intake.press(now, peer, message, self._jobs.queued)
+            case messages.GetFace() as message:
+                yield from self._outcomes.get_face(now, peer, message)
+            case messages.GetNext() as message:
+                yield from self._outcomes.get_next(peer, message)
+            case messages.GetStatus(request=request):
+                yield send(peer, self._status(request))
+            case messages.SensorReady(name=name, source=source):
+                if self._roster.sensor_ready(peer, name, now):
+                    self._log.info("sensor ready", name=name, source=source)
+            case messages.WorkerReady(name=name, credit=credit):
+                self._worker_ready(now, peer, name, credit)
+            case messages.Heartbeat(holding=holding):
+                if not self._roster.heartbeat(peer, holding, now):
+                    yield send(peer, messages.Announce())
+            case messages.Goodbye():
+                yield from self._gone(peer, "goodbye")
+            case messages.Frame() as message:
+                yield from self._frame(peer, message, packet)
+            case messages.FrameFailed(capture_id=capture_id, message=reason):
+                yield from self._intake.refuse(capture_id, reason)
+            case messages.Result() as message:
+                yield from self._jobs.result(peer, message, packet)
+            case messages.JobFailed() as message:
+                yield from self._jobs.failed(peer, message)
+
+    def _frame(self, peer: bytes, message: messages.Frame, packet: Packet) -> Iterator[Output]:
+        before = self._store.find(message.capture_id)
+        yield from self._intake.frame(peer, message, packet)
+        if before is None and self._store.find(message.capture_id):
+            self._jobs.add(message.capture_id)
+
+    def _worker_ready(self, now: float, peer: bytes, name: str, credit: int) -> None:
+        known = self._roster.workers.get(peer)
+        if known is None:
+            self._log.info("worker ready", name=name)
+        worker = self._roster.worker_ready(peer, name, credit, now)
+        if worker.free and worker.job:
+            self._jobs.lost(worker)
+
+    def _gone(self, peer: bytes, reason: str) -> Iterator[Output]:
+        say = self._log.info if reason == "goodbye" else self._log.warning
+        if sensor := self._roster.sensors.pop(peer, None):
+            say("sensor gone", name=sensor.name, reason=reason)
+            yield from self._intake.sensor_gone(peer, reason)
+        if worker := self._roster.workers.pop(peer, None):
+            say("worker gone", name=worker.name, reason=reason)
+            self._jobs.lost(worker)
+
+    def _status(self, request: int = 0) -> messages.Status:
+        counts = self._store.counts()
+        return messages.Status(
+            request=request, epoch=self._store.epoch, sequence=self._store.last_sequence(),
+            hub_version=version("denseface"),
+            sensors=tuple(sensor.name for sensor in self._roster.sensors.values()),
+            workers=tuple(worker.name for worker in self._roster.workers.values()),
+            pressed=len(self._intake), queued=self._jobs.queued, working=self._jobs.working,
+            done=counts.get(CaptureState.DONE, 0), failed=counts.get(CaptureState.FAILED, 0),
+            dead=counts.get(CaptureState.DEAD, 0))

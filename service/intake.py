@@ -1,0 +1,117 @@
+"""The hub's first half: a press becomes a frame that is safe on the disk, or is refused."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import structlog
+
+from recon.settings import Settings
+from service import messages
+from service.errors import StoreError
+from service.outputs import Output, send
+from service.roster import Roster
+from service.settings import ServiceSettings
+from service.states import CaptureEvent, CaptureState, advance
+from service.store import Store
+from service.wire import Packet
+
+__all__ = ["Intake"]
+
+
+@dataclass
+class _Press:
+    """A press that waits for its frame; not on the disk, so it is lost with the hub."""
+
+    sensor: bytes
+    deadline: float
+    pressers: dict[bytes, int] = field(default_factory=dict)
+    """The last request of each client that pressed this id."""
+
+
+class Intake:
+    """Presses that wait for their frame."""
+
+    def __init__(
+        self, store: Store, roster: Roster, settings: ServiceSettings, recon: Settings,
+        recon_hash: str,
+    ) -> None:
+        self._store = store
+        self._roster = roster
+        self._settings = settings
+        self._recon = recon
+        self._recon_hash = recon_hash
+        self._presses: dict[str, _Press] = {}
+        self._log = structlog.get_logger("hub")
+
+    def __len__(self) -> int:
+        return len(self._presses)
+
+    def press(
+        self, now: float, peer: bytes, message: messages.Press, queued: int
+    ) -> Iterator[Output]:
+        """Ask a sensor for a frame, unless this id is known already."""
+        capture_id, request = message.capture_id, message.request
+        state = self._state(capture_id)
+        if state is CaptureState.PRESSED:
+            self._presses[capture_id].pressers[peer] = request
+            return
+        if state is not None:
+            yield send(peer, messages.PressAccepted(request=request, capture_id=capture_id))
+            return
+        sensor = self._roster.sensor()
+        if sensor is None or queued + len(self) >= self._settings.queue:
+            reason = ("no sensor is connected" if sensor is None
+                      else f"{self._settings.queue} frames wait for a worker already")
+            self._log.warning("press refused", capture_id=capture_id, reason=reason)
+            yield send(peer, messages.PressRefused(
+                request=request, capture_id=capture_id, message=reason))
+            return
+        self._log.info("pressed", capture_id=capture_id, sensor=sensor.name)
+        deadline = now + self._settings.take_timeout_s
+        self._presses[capture_id] = _Press(sensor.peer, deadline, {peer: request})
+        yield send(sensor.peer, messages.Take(capture_id=capture_id))
+
+    def frame(self, peer: bytes, message: messages.Frame, packet: Packet) -> Iterator[Output]:
+        """Keep a frame, then say so: to the sensor and to all who pressed."""
+        capture_id = message.capture_id
+        state = self._state(capture_id)
+        if advance(state, CaptureEvent.STORED) is None:
+            yield send(peer, messages.FrameAccepted(capture_id=capture_id) if state else
+                       messages.FrameRefused(capture_id=capture_id, message="nobody waits for it"))
+            return
+        try:
+            self._store.accept(packet, self._recon, self._recon_hash)
+        except StoreError as error:
+            yield send(peer, messages.FrameRefused(capture_id=capture_id, message=str(error)))
+            yield from self.refuse(capture_id, str(error))
+            return
+        self._log.info("accepted", capture_id=capture_id)
+        yield send(peer, messages.FrameAccepted(capture_id=capture_id))
+        for presser, request in self._presses.pop(capture_id).pressers.items():
+            yield send(presser, messages.PressAccepted(request=request, capture_id=capture_id))
+
+    def refuse(self, capture_id: str, reason: str) -> Iterator[Output]:
+        """Tell all who pressed that there is no capture."""
+        if press := self._presses.pop(capture_id, None):
+            self._log.warning("press refused", capture_id=capture_id, reason=reason)
+            for presser, request in press.pressers.items():
+                yield send(presser, messages.PressRefused(
+                    request=request, capture_id=capture_id, message=reason))
+
+    def sensor_gone(self, peer: bytes, reason: str) -> Iterator[Output]:
+        """Refuse what a sensor that went away was asked for."""
+        for capture_id in [key for key, press in self._presses.items() if press.sensor == peer]:
+            yield from self.refuse(capture_id, f"the sensor went away ({reason})")
+
+    def tick(self, now: float) -> Iterator[Output]:
+        """Refuse what took too long."""
+        late = [key for key, press in self._presses.items() if now >= press.deadline]
+        for capture_id in late:
+            limit = self._settings.take_timeout_s
+            yield from self.refuse(capture_id, f"no frame from the sensor in {limit:g} s")
+
+    def _state(self, capture_id: str) -> CaptureState | None:
+        if capture_id in self._presses:
+            return CaptureState.PRESSED
+        stored = self._store.find(capture_id)
+        return stored.state if stored else None

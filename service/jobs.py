@@ -1,0 +1,155 @@
+"""The hub's second half: a kept frame becomes an outcome, whatever happens to the workers."""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+
+import structlog
+from pydantic import ValidationError
+
+from recon.settings import Settings
+from service import messages
+from service.errors import CorruptFileError, ProtocolError, StoreError
+from service.outputs import Output, send
+from service.roster import Roster, Worker
+from service.states import CaptureEvent, CaptureState, advance
+from service.store import Store, Stored
+from service.wire import Packet
+
+__all__ = ["Jobs"]
+
+_LOST = ("WorkerLost", "the worker that held it went away")
+
+
+class Jobs:
+    """Frames that wait for a worker or are held by one."""
+
+    def __init__(
+        self, store: Store, roster: Roster, attempts: int,
+        concluded: Callable[[str], Iterator[Output]],
+    ) -> None:
+        """Take up what the store has unfinished; `concluded` announces an outcome."""
+        self._store = store
+        self._roster = roster
+        self._attempts = attempts
+        self._concluded = concluded
+        self._queue = deque(store.unfinished())
+        self._reasons: dict[str, tuple[str, str]] = {}
+        self._log = structlog.get_logger("hub")
+        if self._queue:
+            self._log.info("resumed", accepted=len(self._queue))
+
+    @property
+    def queued(self) -> int:
+        """Frames that wait for a worker."""
+        return len(self._queue)
+
+    @property
+    def working(self) -> int:
+        """Frames held by a worker."""
+        return sum(worker.job is not None for worker in self._roster.workers.values())
+
+    def add(self, capture_id: str) -> None:
+        """Queue a frame that was just kept."""
+        self._queue.append(capture_id)
+
+    def dispatch(self, now: float) -> Iterator[Output]:
+        """Give frames to free workers, oldest first; give up what has no attempt left."""
+        while self._queue:
+            capture_id = self._queue[0]
+            stored = self._store.find(capture_id)
+            if stored is None or stored.state is not CaptureState.ACCEPTED:
+                self._queue.popleft()
+            elif stored.attempts >= self._attempts:
+                yield from self._give_up(capture_id, *self._reasons.get(capture_id, _LOST))
+            elif worker := self._roster.free_worker():
+                yield from self._give(now, capture_id, stored, worker)
+            else:
+                return
+
+    def result(
+        self, peer: bytes, message: messages.Result, packet: Packet
+    ) -> Iterator[Output]:
+        """Keep and announce a face, unless this capture has its outcome."""
+        capture_id = message.capture_id
+        if not self._expected(peer, capture_id, message.settings_hash, CaptureEvent.RESULT):
+            return
+        try:
+            message.face.join(packet.arrays)
+            self._store.finish(packet)
+        except (ProtocolError, StoreError) as error:
+            self._retry(capture_id, type(error).__name__, str(error))
+        else:
+            self._log.info("done", capture_id=capture_id)
+            yield from self._concluded(capture_id)
+
+    def failed(self, peer: bytes, message: messages.JobFailed) -> Iterator[Output]:
+        """Announce "no face", or try again."""
+        event = CaptureEvent.REJECTED if message.final else CaptureEvent.LOST
+        if not self._expected(peer, message.capture_id, message.settings_hash, event):
+            return
+        if message.final:
+            self._store.fail(message.capture_id, message.error, message.message, dead=False)
+            self._log.info("failed", capture_id=message.capture_id, error=message.error)
+            yield from self._concluded(message.capture_id)
+        else:
+            self._retry(message.capture_id, message.error, message.message)
+
+    def lost(self, worker: Worker) -> None:
+        """Take back what a worker held that went away or came back without an answer."""
+        capture_id, worker.job = worker.job, None
+        if capture_id and self._state(capture_id) is CaptureState.ACCEPTED:
+            self._retry(capture_id, *_LOST)
+
+    def _give(
+        self, now: float, capture_id: str, stored: Stored, worker: Worker
+    ) -> Iterator[Output]:
+        try:
+            header, arrays = self._store.frame(capture_id)
+            settings = Settings.model_validate_json(stored.settings_json)
+        except (CorruptFileError, ProtocolError, ValidationError) as error:
+            yield from self._give_up(capture_id, type(error).__name__, str(error))
+            return
+        attempt = self._store.start_attempt(capture_id)
+        self._queue.popleft()
+        worker.free, worker.job, worker.seen = False, capture_id, now
+        self._log.info("dispatched", capture_id=capture_id, worker=worker.name, attempt=attempt)
+        yield send(worker.peer, messages.Job(
+            capture_id=capture_id, attempt=attempt, settings=settings,
+            settings_hash=stored.settings_hash, frame=header), arrays)
+
+    def _give_up(self, capture_id: str, error: str, reason: str) -> Iterator[Output]:
+        self._store.fail(capture_id, error, reason, dead=True)
+        self._queue.popleft()
+        self._reasons.pop(capture_id, None)
+        self._log.error("dead letter", capture_id=capture_id, error=error, reason=reason)
+        yield from self._concluded(capture_id)
+
+    def _retry(self, capture_id: str, error: str, reason: str) -> None:
+        if capture_id not in self._queue and self._holder(capture_id) is None:
+            self._log.warning(
+                "to be tried again", capture_id=capture_id, error=error, reason=reason)
+            self._reasons[capture_id] = error, reason
+            self._queue.appendleft(capture_id)
+
+    def _expected(self, peer: bytes, capture_id: str, hashed: str, event: CaptureEvent) -> bool:
+        """Say whether an answer is of use; whoever held the job holds it no more."""
+        state = self._state(capture_id)
+        worker = self._roster.workers.get(peer)
+        if worker and worker.job == capture_id:
+            worker.job = None
+        stored = self._store.find(capture_id)
+        if stored and stored.settings_hash == hashed and advance(state, event):
+            return True
+        self._log.info("answer dropped", capture_id=capture_id, answer=str(event))
+        return False
+
+    def _state(self, capture_id: str) -> CaptureState | None:
+        stored = self._store.find(capture_id)
+        if stored is None:
+            return None
+        held = stored.state is CaptureState.ACCEPTED and self._holder(capture_id)
+        return CaptureState.WORKING if held else stored.state
+
+    def _holder(self, capture_id: str) -> Worker | None:
+        return next((worker for worker in self._roster.workers.values()
+                     if worker.job == capture_id), None)

@@ -1,0 +1,76 @@
+"""Who is connected to the hub: sensors and workers, and whether they still live."""
+
+from dataclasses import dataclass, field
+
+__all__ = ["Roster", "Sensor", "Worker"]
+
+
+@dataclass
+class Sensor:
+    """A capture process with its source open."""
+
+    peer: bytes
+    name: str
+    seen: float
+    """When it was last heard, seconds."""
+
+
+@dataclass
+class Worker:
+    """A reconstruction process."""
+
+    peer: bytes
+    name: str
+    seen: float
+    """When it was last known to be alive and, where it has a job, to hold it; seconds."""
+    credit: int = -1
+    """The last `WorkerReady.credit` heard."""
+    free: bool = False
+    job: str | None = None
+    """The capture that it was given."""
+
+
+@dataclass
+class Roster:
+    """Peers by their ZeroMQ routing id."""
+
+    sensors: dict[bytes, Sensor] = field(default_factory=dict)
+    workers: dict[bytes, Worker] = field(default_factory=dict)
+
+    def sensor_ready(self, peer: bytes, name: str, now: float) -> bool:
+        """Note a sensor; True where it is new."""
+        new = peer not in self.sensors
+        self.sensors[peer] = Sensor(peer, name, now)
+        return new
+
+    def worker_ready(self, peer: bytes, name: str, credit: int, now: float) -> Worker:
+        """Note that a worker is free, unless its credit was spent before."""
+        worker = self.workers.setdefault(peer, Worker(peer, name, now))
+        if credit > worker.credit:
+            worker.credit, worker.free, worker.seen = credit, True, now
+        return worker
+
+    def heartbeat(self, peer: bytes, holding: str | None, now: float) -> bool:
+        """Note a sign of life; False where nobody of this id is known."""
+        if sensor := self.sensors.get(peer):
+            sensor.seen = now
+        elif worker := self.workers.get(peer):
+            # A worker that lives without the job it was given never got it: let it go silent.
+            if worker.job is None or worker.job == holding:
+                worker.seen = now
+        else:
+            return False
+        return True
+
+    def free_worker(self) -> Worker | None:
+        """Give the free worker that has been known longest."""
+        return next((worker for worker in self.workers.values() if worker.free), None)
+
+    def sensor(self) -> Sensor | None:
+        """Give the sensor that has been known longest."""
+        return next(iter(self.sensors.values()), None)
+
+    def silent(self, before: float) -> list[bytes]:
+        """Give the peers that were last heard before a time."""
+        everyone: list[Sensor | Worker] = [*self.sensors.values(), *self.workers.values()]
+        return [one.peer for one in everyone if one.seen < before]

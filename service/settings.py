@@ -1,0 +1,104 @@
+"""Settings of the service: where it listens, where it keeps things, how long it waits."""
+
+import os
+import stat
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import platformdirs
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from service.errors import SettingsError
+
+__all__ = ["ServiceSettings", "default_address", "private_folder", "runtime_folder"]
+
+_PREFIX = "DENSEFACE_"
+_Seconds = Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
+
+
+def runtime_folder() -> Path:
+    """Give this user's socket folder: `$XDG_RUNTIME_DIR/denseface`, else a temporary one.
+
+    It is created by `private_folder` when the hub binds, not here.
+    """
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    if runtime and Path(runtime).is_dir():
+        return Path(runtime) / "denseface"
+    return Path(tempfile.gettempdir()) / f"denseface-{os.getuid()}"
+
+
+def default_address() -> str:
+    """Where the hub of this user listens: a socket file that nobody else can open."""
+    return f"ipc://{runtime_folder() / 'hub'}"
+
+
+class ServiceSettings(BaseModel):
+    """Every setting may be given as a flag or as `DENSEFACE_NAME`; the flag wins."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    address: str = Field(default_factory=default_address)
+    """The hub's address: `ipc://PATH` or `tcp://127.0.0.1:PORT`."""
+    data: Path = Field(default_factory=lambda: platformdirs.user_data_path("denseface"))
+    """Folder of frames, faces and their database; created with mode 0700."""
+    heartbeat_s: _Seconds = 1.0
+    """Time between two heartbeats, seconds."""
+    liveness: Annotated[int, Field(ge=2, le=100)] = 3
+    """Heartbeats missed until a peer counts as gone."""
+    attempts: Annotated[int, Field(ge=1, le=100)] = 3
+    """Times that a frame is tried before it becomes a dead letter."""
+    take_timeout_s: _Seconds = 10.0
+    """Longest wait for the sensor's frame after a press, seconds."""
+    job_timeout_s: _Seconds = 60.0
+    """Longest reconstruction; a worker that takes longer ends itself, seconds."""
+    queue: Annotated[int, Field(ge=1, le=100_000)] = 1000
+    """Frames that may wait for a worker; beyond it a press is refused."""
+    resend_s: _Seconds = 2.0
+    """Time after which an unanswered request or frame is sent again, seconds."""
+
+    @property
+    def silence_s(self) -> float:
+        """Silence after which a peer counts as gone, seconds."""
+        return self.heartbeat_s * self.liveness
+
+    @classmethod
+    def of(cls, environment: Mapping[str, str], **flags: Any) -> Self:
+        """Put flags over environment over defaults; a flag of None is not given.
+
+        Raises
+        ------
+        SettingsError
+            One line that names the flag or variable and what is wrong with it.
+        """
+        given = {name: environment[_PREFIX + name.upper()] for name in cls.model_fields
+                 if environment.get(_PREFIX + name.upper())}
+        flags = {name: value for name, value in flags.items() if value is not None}
+        try:
+            return cls(**(given | flags))
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            name = str(first["loc"][0])
+            where = f"--{name.replace('_', '-')}" if name in flags else _PREFIX + name.upper()
+            raise SettingsError(f"{where}: {first['msg']}, found {first['input']!r}") from error
+
+
+def private_folder(path: Path) -> Path:
+    """Create a folder that only this user can enter, or check that it is one.
+
+    Raises
+    ------
+    SettingsError
+        Where it is no folder, belongs to someone else or cannot be made.
+    """
+    try:
+        path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = path.lstat()
+        if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
+            raise SettingsError(f"{path}: must be a folder of user {os.getuid()}")
+        if found.st_mode & 0o077:
+            path.chmod(0o700)
+    except OSError as error:
+        raise SettingsError(f"{path}: {error.strerror or error}") from error
+    return path

@@ -1,0 +1,87 @@
+"""SIGINT and SIGTERM as something that a poll can wait for, and dying with one's parent."""
+
+import ctypes
+import os
+import signal
+import socket
+from types import FrameType, TracebackType
+from typing import Self
+
+__all__ = ["PARENT_VARIABLE", "StopSignal", "die_with_parent"]
+
+PARENT_VARIABLE = "DENSEFACE_PARENT"
+"""Process id of the supervisor that started this process."""
+
+_PR_SET_PDEATHSIG = 1
+_STOPPING = (signal.SIGINT, signal.SIGTERM)
+
+
+class StopSignal:
+    """Inside the `with` block, signals only set `received` and make `fileno()` readable.
+
+    Parameters
+    ----------
+    also : further signals that wake a poll but do not stop, such as SIGCHLD
+    """
+
+    def __init__(self, *also: signal.Signals) -> None:
+        self.received: signal.Signals | None = None
+        self._also = also
+        self._wake, self._written = socket.socketpair()
+        self._wake.setblocking(False)
+        self._written.setblocking(False)
+        self._before: list[tuple[signal.Signals, object]] = []
+        self._fd_before = -1
+
+    def __enter__(self) -> Self:
+        self._fd_before = signal.set_wakeup_fd(self._written.fileno(), warn_on_full_buffer=False)
+        for number in (*_STOPPING, *self._also):
+            self._before.append((number, signal.signal(number, self._note)))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        for number, handler in self._before:
+            signal.signal(number, handler)  # type: ignore[arg-type]
+        signal.set_wakeup_fd(self._fd_before)
+        self._wake.close()
+        self._written.close()
+
+    def __bool__(self) -> bool:
+        return self.received is not None
+
+    def fileno(self) -> int:
+        """Give the descriptor to poll for reading."""
+        return self._wake.fileno()
+
+    def drain(self) -> None:
+        """Forget what woke the poll."""
+        try:
+            while self._wake.recv(4096):
+                pass
+        except BlockingIOError:
+            pass
+
+    @property
+    def exit_status(self) -> int:
+        """130 after Ctrl-C, else 0."""
+        return 130 if self.received is signal.SIGINT else 0
+
+    def _note(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002
+        if number in _STOPPING and self.received is None:
+            self.received = signal.Signals(number)
+
+
+def die_with_parent() -> None:
+    """Have the kernel send SIGTERM when the supervisor dies, however it dies.
+
+    Does nothing in a process that no supervisor started.
+    """
+    parent = os.environ.pop(PARENT_VARIABLE, "")
+    if not parent:
+        return
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+    if str(os.getppid()) != parent:  # it died before the line above
+        raise SystemExit(1)

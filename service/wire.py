@@ -1,0 +1,117 @@
+"""How a message is written on the wire.
+
+A message is a list of byte strings: a JSON header (one of `service.messages`), then the raw arrays
+that the header describes. `encode` and `decode_*` are pure functions; `docs/wire.md` says the same
+in prose.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, TypeAdapter, ValidationError
+
+from service.errors import LocalProtocolError, RemoteProtocolError
+from service.messages import FromHub, Message, ToHub
+from service.payload import Arrays
+
+__all__ = ["MAX_HEADER_BYTES", "MAX_PARTS", "Packet", "decode_from_hub", "decode_to_hub", "encode"]
+
+MAX_HEADER_BYTES = 256 * 1024
+MAX_PARTS = 1 + 16
+
+_TO_HUB: TypeAdapter[ToHub] = TypeAdapter(Annotated[ToHub, Field(discriminator="kind")])
+_FROM_HUB: TypeAdapter[FromHub] = TypeAdapter(Annotated[FromHub, Field(discriminator="kind")])
+
+
+@dataclass(frozen=True)
+class Packet:
+    """A message and the arrays that its header announces."""
+
+    message: Message
+    arrays: Arrays = field(default_factory=dict)
+
+
+def encode(packet: Packet) -> list[bytes]:
+    """Write a message.
+
+    Raises
+    ------
+    LocalProtocolError
+        Where the arrays are not those that the header states, or the header is too long.
+    """
+    message, arrays = packet.message, packet.arrays
+    header = message.model_dump_json().encode()
+    if len(header) > MAX_HEADER_BYTES:
+        raise LocalProtocolError(
+            f"{message.kind}: header has {len(header)} bytes, at most {MAX_HEADER_BYTES} allowed")
+    infos = message.payload.arrays if message.payload else ()
+    if set(arrays) != {info.name for info in infos}:
+        raise LocalProtocolError(
+            f"{message.kind}: arrays {sorted(arrays)} given, "
+            f"{sorted(info.name for info in infos)} expected")
+    for info in infos:
+        array = arrays[info.name]
+        if array.dtype != np.dtype(info.dtype) or array.shape != info.shape:
+            raise LocalProtocolError(
+                f"{message.kind}: {info.name} is {array.dtype} {list(array.shape)}, "
+                f"the header says {info.dtype} {list(info.shape)}")
+    return [header, *(arrays[info.name].astype(info.dtype, copy=False).tobytes()
+                      for info in infos)]
+
+
+def decode_to_hub(parts: Sequence[bytes]) -> Packet:
+    """Read a message that the hub may receive.
+
+    Parameters
+    ----------
+    parts : header, then one buffer for each array; arrays of the result are read-only views
+
+    Raises
+    ------
+    RemoteProtocolError
+        Where a limit, a field, a dtype, a shape or a size is not as it must be.
+    """
+    return _decode(parts, _TO_HUB)
+
+
+def decode_from_hub(parts: Sequence[bytes]) -> Packet:
+    """Read a message that only the hub may send; otherwise as `decode_to_hub`."""
+    return _decode(parts, _FROM_HUB)
+
+
+def _decode(
+    parts: Sequence[bytes], adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub]
+) -> Packet:
+    if not 1 <= len(parts) <= MAX_PARTS:
+        raise RemoteProtocolError(f"message has {len(parts)} parts, 1 to {MAX_PARTS} expected")
+    header, *buffers = parts
+    if len(header) > MAX_HEADER_BYTES:
+        raise RemoteProtocolError(
+            f"header has {len(header)} bytes, at most {MAX_HEADER_BYTES} allowed")
+    message = _header(header, adapter)
+    infos = message.payload.arrays if message.payload else ()
+    if len(buffers) != len(infos):
+        raise RemoteProtocolError(
+            f"{message.kind}: {len(buffers)} arrays follow, {len(infos)} announced")
+    for info, buffer in zip(infos, buffers, strict=True):
+        if len(buffer) != info.nbytes:
+            raise RemoteProtocolError(
+                f"{message.kind}: {info.name} has {len(buffer)} bytes, {info.nbytes} announced")
+    return Packet(message, {
+        info.name: np.frombuffer(buffer, info.dtype).reshape(info.shape)
+        for info, buffer in zip(infos, buffers, strict=True)})
+
+
+def _header(header: bytes, adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub]) -> ToHub | FromHub:
+    try:
+        with np.errstate(all="ignore"):  # absurd calibrations overflow before they are refused
+            message = adapter.validate_json(header)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False, include_context=False)[0]
+        where = ".".join(str(part) for part in first["loc"]) or "header"
+        raise RemoteProtocolError(f"{where}: {first['msg']}"[:500]) from error
+    if "version" not in message.model_fields_set:
+        raise RemoteProtocolError(f"{message.kind}: no version given")
+    return message

@@ -1,0 +1,111 @@
+"""A worker's process: one job at a time, from frame to face."""
+
+import os
+import socket
+from collections.abc import Callable
+
+import cv2
+import structlog
+
+from recon import ReconstructionError, reconstruct
+from recon.face import Face
+from service.background import Background
+from service.link import HubLink
+from service.messages import Announce, Job, JobFailed, Result, WorkerReady
+from service.payload import FaceHeader
+from service.settings import ServiceSettings
+from service.stopping import StopSignal
+from service.wire import Packet
+
+__all__ = ["run"]
+
+
+def run(settings: ServiceSettings) -> int:
+    """Work until SIGINT or SIGTERM, finish the job under way and give the exit status."""
+    cv2.setNumThreads(1)  # one worker for each core; more threads would only fight
+    with (StopSignal() as stop, Background[Face]("recon") as compute,
+          HubLink(settings, "worker") as link):
+        worker = _Worker(settings, link, compute)
+        worker.serve(stop)
+        worker.finish()
+        return stop.exit_status
+
+
+class _Worker:
+    def __init__(
+        self, settings: ServiceSettings, link: HubLink, compute: Background[Face]
+    ) -> None:
+        self._settings = settings
+        self._link = link
+        self._compute = compute
+        self._log = structlog.get_logger("worker")
+        self._job: Job | None = None
+        self._answer: Callable[[], bool] | None = None
+        self._credit = 0
+
+    def serve(self, stop: StopSignal) -> None:
+        for packet in self._link.packets(stop, self._compute, self._holding):
+            if packet is not None:
+                self._receive(packet)
+            if self._compute.ended():
+                self._answer = self._computed()
+            elif self._compute.elapsed_s > self._settings.job_timeout_s:
+                self._log.error("job takes too long", capture_id=self._holding(),
+                                seconds=self._compute.elapsed_s)
+                os._exit(1)
+            if self._answer and self._answer():  # kept until the hub is there to take it
+                self._answer = self._job = None
+                self._credit += 1
+                self._ready()
+
+    def finish(self) -> None:
+        """End the job under way and deliver it."""
+        if self._compute:
+            self._answer = self._computed()
+        if self._answer:
+            self._answer()
+
+    def _holding(self) -> str | None:
+        return self._job.capture_id if self._job else None
+
+    def _ready(self) -> None:
+        self._link.send(WorkerReady(
+            name=f"{socket.gethostname()}/{os.getpid()}", credit=self._credit))
+
+    def _receive(self, packet: Packet) -> None:
+        match packet.message:
+            case Announce():
+                if self._job is None:
+                    self._ready()
+            case Job() as job:
+                if self._job is not None:  # the hub redelivers what this worker does not hold
+                    self._log.warning("job dropped, busy", capture_id=job.capture_id)
+                    return
+                self._job = job
+                self._log.info("job", capture_id=job.capture_id, attempt=job.attempt)
+                self._compute.start(
+                    lambda: reconstruct(job.frame.join(packet.arrays), job.settings))
+
+    def _computed(self) -> Callable[[], bool]:
+        """Give what sends the answer to the present job."""
+        job = self._job
+        if job is None:
+            raise RuntimeError("a computation without a job ended")
+        try:
+            face = self._compute.take()
+            report = face.report.model_copy(update={"capture_id": job.capture_id})
+            header, arrays = FaceHeader.of(Face(face.initial, face.dense, report))
+            result = Result(
+                capture_id=job.capture_id, settings_hash=job.settings_hash, face=header)
+        except Exception as error:
+            final = isinstance(error, ReconstructionError)
+            say = self._log.warning if final else self._log.exception
+            say("no face", capture_id=job.capture_id, error=type(error).__name__,
+                reason=str(error))
+            failure = JobFailed(
+                capture_id=job.capture_id, settings_hash=job.settings_hash,
+                error=type(error).__name__, message=str(error)[:4000], final=final)
+            return lambda: self._link.send(failure)
+        self._log.info("face", capture_id=job.capture_id, points=report.dense_points,
+                       total_ms=round(report.timings_ms.get("total", 0.0)))
+        return lambda: self._link.send(result, arrays)

@@ -1,0 +1,83 @@
+"""How near a reconstructed face is to the true one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from capture.frame import RgbdFrame
+from recon.face import Face
+from tests.simulator.labels import Label
+from tests.simulator.truth import Truth
+
+__all__ = ["Accuracy", "measure"]
+
+GROSS_MM = 5.5
+"""The paper's Figure 9 ends here."""
+NEAR_MM = 2.0
+
+# A point this far off the head's surface is not its rim but on something else.
+_ELSEWHERE_MM = 10.0
+# A reading of the face's pixel that differs more is not of the face.
+_READING_MM = 15.0
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Figures of one face against its truth; distances from points to the head's true surface."""
+
+    initial_points: int
+    dense_points: int
+    mean_mm: float
+    """Mean error of the dense cloud."""
+    sd_mm: float
+    raw_mean_mm: float
+    """Mean error of the initial cloud: the sensor's own."""
+    gross: float
+    """Share of the dense cloud with an error above 5.5 mm."""
+    covered: float
+    """Share of the true visible face that has a dense point within 2 mm."""
+    lost: float
+    """Share of the sensor's readings of the true face that are not in the initial cloud."""
+    elsewhere: float
+    """Share of the dense cloud that lies on walls, shoulders or other people."""
+
+    @property
+    def ratio(self) -> float:
+        """Dense points for each initial one."""
+        return self.dense_points / self.initial_points
+
+
+def measure(face: Face, truth: Truth, frame: RgbdFrame) -> Accuracy:
+    """Compare a face with the true surface that its frame shows."""
+    errors = truth.surface_distance(face.dense.points)
+    nearest, _ = cKDTree(face.dense.points).query(
+        truth.face_points(), distance_upper_bound=NEAR_MM)
+    return Accuracy(
+        initial_points=len(face.initial),
+        dense_points=len(face.dense),
+        mean_mm=float(errors.mean()),
+        sd_mm=float(errors.std()),
+        raw_mean_mm=float(truth.surface_distance(face.initial.points).mean()),
+        gross=float((errors > GROSS_MM).mean()),
+        covered=float(np.isfinite(nearest).mean()),
+        lost=_lost(face, truth, frame),
+        elsewhere=float((
+            (errors > _ELSEWHERE_MM)
+            & ~np.isin(truth.labels_at(face.dense.points), (Label.FACE, Label.HEAD))).mean()),
+    )
+
+
+def _lost(face: Face, truth: Truth, frame: RgbdFrame) -> float:
+    readings = frame.depth > 0
+    z = frame.depth[readings]
+    points = np.concatenate([frame.depth_camera.rays()[readings] * z[:, None], z[:, None]], axis=1)
+    with np.errstate(invalid="ignore"):
+        of_face = (truth.labels_at(points) == Label.FACE) & (
+            np.abs(truth.depth_error(points)) < _READING_MM)
+    kept = np.zeros(readings.shape, bool)
+    row_column: NDArray[np.int64] = np.rint(
+        frame.depth_camera.project(face.initial.points)[:, ::-1]).astype(np.int64)
+    kept[row_column[:, 0], row_column[:, 1]] = True
+    return float((~kept[readings][of_face]).mean())

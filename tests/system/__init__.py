@@ -1,0 +1,1 @@
+"""Tests with real processes, the real OpenNI2 library and real sockets."""

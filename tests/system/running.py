@@ -1,0 +1,117 @@
+"""The command line and the whole service as real processes."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+from service.client import Client
+from service.messages import Status
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+RECORDINGS = REPOSITORY / "fixtures" / "recorded_oni"
+_HEARTBEAT_S = "0.2"
+
+
+def denseface(*arguments: object, **environment: str) -> "subprocess.CompletedProcess[str]":
+    """Run one command to its end."""
+    return subprocess.run(
+        [sys.executable, "-m", "service", *map(str, arguments)], cwd=REPOSITORY, check=False,
+        capture_output=True, text=True, timeout=60, env=os.environ | environment)
+
+
+@dataclass
+class Service:
+    """A running `denseface up`."""
+
+    process: "subprocess.Popen[str]"
+    address: str
+    data: Path
+    log: Path
+
+    def run(self, *arguments: object) -> "subprocess.CompletedProcess[str]":
+        return denseface(*arguments, "--address", self.address)
+
+    def client(self) -> Client:
+        return Client(self.address)
+
+    def status(self) -> Status:
+        with self.client() as client:
+            return client.status()
+
+    def family(self) -> list[psutil.Process]:
+        up = psutil.Process(self.process.pid)
+        return [up, *up.children(recursive=True)]
+
+    def worker(self) -> psutil.Process:
+        """Give the process of the only worker."""
+        (name,) = self.status().workers
+        return psutil.Process(int(name.rpartition("/")[2]))
+
+
+@contextmanager
+def service(
+    source: Path | str, data: Path, *arguments: object, ready: bool = True,
+    environment: dict[str, str] | None = None,
+) -> Iterator[Service]:
+    """Run `denseface up` and make sure that nothing of it stays."""
+    with tempfile.TemporaryDirectory(prefix="df-") as folder:  # socket paths must be short
+        address = f"ipc://{folder}/hub"
+        log = data.with_suffix(".log")
+        with log.open("w") as stderr:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "service", "up", "--source", str(source), "--data",
+                 str(data), "--address", address, "--workers", "1", *map(str, arguments)],
+                cwd=REPOSITORY, stderr=stderr, text=True,
+                env=os.environ | (environment or {}) | {"DENSEFACE_HEARTBEAT_S": _HEARTBEAT_S})
+        running = Service(process, address, data, log)
+        try:
+            if ready:
+                waited = running.run("status", "--wait", "40")
+                assert waited.returncode == 0, waited.stderr + log.read_text()
+            yield running
+        finally:
+            if process.poll() is None:
+                family = running.family()
+                process.terminate()
+                psutil.wait_procs(family, timeout=15)
+                for one in family:
+                    if one.is_running():
+                        one.kill()
+            process.wait()
+
+
+def sockets(running: Service) -> list[Path]:
+    """Give the socket files there are."""
+    folder = Path(running.address.removeprefix("ipc://")).parent
+    return [path for path in folder.iterdir() if path.is_socket()]
+
+
+@contextmanager
+def hub_alone(address: str, data: Path, *arguments: str) -> Iterator[Path]:
+    """Run `denseface hub`, give its log, and stop it in order."""
+    log = data.with_suffix(".log")
+    with log.open("w") as stderr:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "service", "hub", "--address", address, "--data", str(data),
+             *arguments], cwd=REPOSITORY, stderr=stderr)
+    try:
+        yield log
+    finally:
+        process.terminate()
+        assert process.wait(10) == 0
+
+
+def until(true: Callable[[], bool], within_s: float = 30.0) -> None:
+    """Look again and again until something is so."""
+    deadline = time.monotonic() + within_s
+    while not true():
+        assert time.monotonic() < deadline, "did not come about"
+        time.sleep(0.02)

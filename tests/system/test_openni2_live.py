@@ -1,0 +1,176 @@
+"""The virtual sensor, live, through the real OpenNI2 library."""
+
+import re
+
+import numpy as np
+import pytest
+
+from tests.virtual_sensor.clip import write_clip
+from tests.virtual_sensor.process import environment, play, run_python
+
+PERIOD_US = 33_333
+START_US = 1_000_000
+
+
+@pytest.fixture(scope="module")
+def shown():
+    rng = np.random.default_rng(5)
+    return [(rng.integers(0, 6000, (480, 640), np.uint16),
+             rng.integers(0, 256, (480, 640, 3), np.uint8)) for _ in range(3)]
+
+
+@pytest.fixture(scope="module")
+def clip(shown, tmp_path_factory):
+    path = tmp_path_factory.mktemp("clip") / "clip"
+    write_clip(path, shown)
+    return path
+
+
+def number(stamp_us: int) -> int:
+    index, rest = divmod(stamp_us - START_US, PERIOD_US)
+    assert rest == 0
+    return index
+
+
+def test_frames_are_bit_exact_and_not_mirrored(clip, shown):
+    frames, origin = play("openni2:", environment(clip), most=6)
+    assert len(frames) == 6
+    for frame in frames:
+        depth, color = shown[number(frame.depth_timestamp_us) % 3]
+        np.testing.assert_array_equal(frame.depth, depth)
+        np.testing.assert_array_equal(frame.color, color)
+        assert frame.skew_us == 0
+        assert not frame.registered
+    stamps = [frame.depth_timestamp_us for frame in frames]
+    assert stamps == sorted(set(stamps))
+    assert origin.startswith("device: ZPD 120, ZPPS 0.1042, DCRCDIS 2.3, color field of view 62.7")
+    calibration = frames[0].calibration
+    assert calibration.depth.fx == pytest.approx(575.816, abs=1e-3)
+    assert calibration.color.fx == pytest.approx(525, abs=1e-3)
+    assert calibration.depth_to_color.translation_mm == pytest.approx((-23, 0, 0))
+
+
+@pytest.mark.parametrize("skew_us", [-11_700, 11_700])
+def test_the_skew_stays_on_the_frame(clip, skew_us):
+    frames, _ = play("openni2:virtual:0", environment(clip, skew_us=skew_us), most=3)
+    assert [frame.skew_us for frame in frames] == [-skew_us] * 3
+
+
+def test_depth_in_tenths_of_a_millimetre(clip, shown):
+    (frame,), _ = play("openni2:", environment(clip, depth_unit="100um"), most=1)
+    depth, _ = shown[number(frame.depth_timestamp_us) % 3]
+    np.testing.assert_array_equal(frame.depth, np.minimum(depth, 6554))
+
+
+def test_an_argument_wins_over_what_the_sensor_says(clip, tmp_path):
+    (frame,), _ = play("openni2:", environment(clip), most=1)
+    mine = frame.calibration.model_copy(
+        update={"color": frame.calibration.color.model_copy(update={"fx": 500.0})})
+    path = tmp_path / "mine.json"
+    path.write_text(mine.to_json())
+    code = ("import sys; from capture import open_source\n"
+            "with open_source('openni2:', sys.argv[1]) as source:\n"
+            "    frame = next(iter(source))\n"
+            "    print(frame.calibration.color.fx, frame.calibration_origin, source.frame_count)")
+    done = run_python(code, path, env=environment(clip))
+    assert done.stdout == f"500.0 argument {path} None\n"
+
+
+def failing(uri: str, env: dict[str, str], code: str = "") -> tuple[str, str]:
+    """Read until an error; give what was printed and the error's line."""
+    done = run_python(
+        "import sys\nfrom capture import open_source\nfrom capture.openni2 import LiveSource\n"
+        + (code or "for frame in open_source(sys.argv[1]):\n    print(frame.depth_timestamp_us)"),
+        uri, env=env)
+    assert done.returncode == 1, done.stderr
+    return done.stdout, done.stderr.splitlines()[-1]
+
+
+def test_a_sensor_that_is_unplugged(clip):
+    out, error = failing("openni2:", environment(clip, disconnect_after=4))
+    assert len(out.splitlines()) <= 4
+    assert error == ("capture.errors.SensorError: openni2: the sensor virtual:0 was unplugged "
+                     "or failed")
+
+
+def test_a_sensor_that_falls_silent(clip):
+    code = ("source = LiveSource(timeout_s=0.5)\nfor frame in source:\n"
+            "    print(frame.depth_timestamp_us)")
+    out, error = failing("", environment(clip, end="stop"), code)
+    assert len(out.splitlines()) <= 3
+    assert re.match(r"capture\.errors\.SensorTimeoutError: openni2: no depth and color pair within "
+                    r"0\.5 s", error)
+
+
+def test_no_stale_frame_at_a_press(clip):
+    """The sensor sends three frames and no more: a press later must not get one of those."""
+    code = ("from capture.errors import SensorTimeoutError\n"
+            "source = LiveSource(timeout_s=0.3)\n"
+            "from capture._openni2_streams import DEPTH\n"
+            "try:\n"
+            "    while True: source.read()\n"
+            "except SensorTimeoutError: pass\n"
+            "source.streams.wait = lambda *_: None\n"
+            "source.read()")
+    _, error = failing("", environment(clip, end="stop"), code)
+    assert "SensorTimeoutError" in error
+
+
+def test_flush_forgets_what_waits(clip):
+    """Frames wait in the library before the flush; afterwards only newer ones come."""
+    code = ("source = LiveSource()\n"
+            "before = source.read().depth_timestamp_us\n"
+            "while (kind := source.streams.wait(1.0)) is None: pass\n"
+            "source.flush()\n"
+            "assert source.pairer.waiting == (0, 0)\n"
+            "print(source.read().depth_timestamp_us > before + 33_333)\n"
+            "source.close()\nsource.close()")
+    done = run_python("from capture.openni2 import LiveSource\n" + code, env=environment(clip))
+    assert done.stdout == "True\n", done.stderr
+
+
+@pytest.mark.parametrize(("streams", "missing"), [("depth", "color"), ("color", "depth")])
+def test_a_missing_stream_is_named(clip, streams, missing):
+    _, error = failing("openni2:", environment(clip, streams=streams))
+    assert error == (f"capture.errors.SensorError: openni2: has no {missing} stream; depth and "
+                     "color are needed")
+
+
+def test_no_sensor():
+    _, error = failing("openni2:", environment())
+    assert error == "capture.errors.SensorError: openni2: OpenNI2 finds no sensor"
+
+
+@pytest.mark.parametrize("uri", ["nothing", "ä", "/dev/null"])
+def test_another_sensor_than_those_found(clip, uri):
+    _, error = failing(f"openni2:{uri}", environment(clip))
+    assert error == (f"capture.errors.SensorError: openni2:{uri}: no such sensor; "
+                     "found: virtual:0")
+
+
+def test_a_missing_library(tmp_path):
+    env = environment() | {"OPENNI2_REDIST": str(tmp_path)}
+    _, error = failing("openni2:", env)
+    assert error == (f"capture.errors.SensorError: OPENNI2_REDIST={tmp_path}: no libOpenNI2.so "
+                     "in that folder")
+
+
+def test_nothing_is_printed_and_no_folder_left(clip, tmp_path):
+    code = ("from capture import open_source\n"
+            "with open_source('openni2:') as source: next(iter(source))")
+    done = run_python(code, env=environment(clip), cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_forked_process_is_refused(clip):
+    code = ("import os\nfrom capture import open_source\nfrom capture.errors import SensorError\n"
+            "source = open_source('openni2:')\n"
+            "if os.fork() == 0:\n"
+            "    try: open_source('openni2:')\n"
+            "    except SensorError as error: print(error, flush=True)\n"
+            "    os._exit(0)\n"
+            "os.wait()\nsource.close()")
+    done = run_python(code, env=environment(clip))
+    assert "loaded before this process was forked" in done.stdout
+    assert done.returncode == 0

@@ -1,0 +1,72 @@
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from capture import Source, open_source
+from capture.errors import CalibrationError, UnreadableSourceError
+from capture.npz import save_frame
+from tests.unit import frames
+
+ARGUMENT, BESIDE, OWN = (frames.calibration(color=frames.camera(f=f)) for f in (101., 102., 103.))
+
+
+@pytest.fixture
+def saved(tmp_path):
+    path = tmp_path / "take.1.npz"
+    save_frame(path, frames.frame(
+        np.zeros((120, 160), np.uint16), np.zeros((120, 160, 3), np.uint8), OWN))
+    return path
+
+
+def opened(path, calibration=None):
+    with open_source(path, calibration) as source:
+        assert isinstance(source, Source)
+        assert source.uri == str(path)
+        (frame,) = source
+    return frame.calibration.color.fx, frame.calibration_origin
+
+
+def test_precedence_of_calibrations(saved):
+    assert opened(saved) == (103, "npz file")
+    beside = saved.with_name("take.1.calibration.json")
+    beside.write_text(BESIDE.to_json())
+    assert opened(saved) == (102, "beside: take.1.calibration.json")
+    argument = saved.with_name("mine.json")
+    argument.write_text(ARGUMENT.to_json())
+    assert opened(saved, argument) == (101, f"argument {argument}")
+    assert opened(str(saved), str(argument)) == (101, f"argument {argument}")
+    assert opened(saved, ARGUMENT) == (101, "argument")
+
+
+def test_a_calibration_that_wins_must_be_readable(saved):
+    with pytest.raises(CalibrationError, match=r"none\.json: No such file"):
+        open_source(saved, "none.json")
+    saved.with_name("take.1.calibration.json").write_text("{")
+    with pytest.raises(CalibrationError, match=r"take\.1\.calibration\.json"):
+        open_source(saved)
+
+
+@pytest.mark.parametrize("uri", ["", "face.png", "webcam:", "http://x/face.oni2", "npz"])
+def test_unknown_kinds_are_named_with_those_accepted(uri):
+    with pytest.raises(UnreadableSourceError) as caught:
+        open_source(uri)
+    assert str(caught.value).startswith(uri)
+    assert all(kind in str(caught.value) for kind in (".npz", ".oni", "openni2:"))
+
+
+@pytest.mark.parametrize("kind", ["npz", "oni", "ONI"])
+def test_missing_files_and_folders(tmp_path, kind):
+    with pytest.raises(UnreadableSourceError, match=rf"none\.{kind}: no such file"):
+        open_source(tmp_path / f"none.{kind}")
+    (tmp_path / f"dir.{kind}").mkdir()
+    with pytest.raises(UnreadableSourceError, match=rf"dir\.{kind}: is a folder"):
+        open_source(tmp_path / f"dir.{kind}")
+
+
+def test_importing_capture_is_light():
+    code = ("import sys, capture; "
+            "print([m for m in ('primesense', 'cv2', 'open3d', 'scipy') if m in sys.modules])")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

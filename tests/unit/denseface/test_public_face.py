@@ -1,0 +1,24 @@
+"""What other programs import."""
+
+import subprocess
+import sys
+
+import pytest
+
+import denseface
+
+
+@pytest.mark.parametrize("name", denseface.__all__)
+def test_every_public_name_is_there(name):
+    assert getattr(denseface, name) is not None
+    assert name in dir(denseface)
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="'denseface' has no attribute 'nothing'"):
+        _ = denseface.nothing
+
+
+def test_importing_it_costs_nothing():
+    code = "import sys, denseface; sys.exit(bool({'numpy', 'pydantic', 'zmq'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,110 @@
+"""The command line, without a service."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from capture.npz import save_frame
+from service.cli import main
+from tests.unit.frames import calibration, frame
+
+
+@pytest.fixture
+def room(tmp_path):
+    """A frame with depth and without a face."""
+    path = tmp_path / "room.npz"
+    save_frame(path, frame(
+        np.full((120, 160), 900, np.uint16), np.full((120, 160, 3), 90, np.uint8), calibration()))
+    return path
+
+
+def outcome(capsys, *arguments):
+    try:
+        status = main([str(one) for one in arguments])
+    except SystemExit as exit_:
+        status = exit_.code
+    return status, capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    ([], "required: COMMAND"),
+    (["fly"], "invalid choice: 'fly'"),
+    (["reconstruct"], "required: INPUT"),
+    (["reconstruct", "{tmp}/no.npz"], "no.npz"),
+    (["reconstruct", "{tmp}/no.oni"], "no.oni"),
+    (["reconstruct", "{tmp}/garbage.npz"], "garbage.npz"),
+    (["reconstruct", "{tmp}/garbage.oni"], "garbage.oni"),
+    (["reconstruct", "{tmp}/garbage.xyz"], "garbage.xyz"),
+    (["reconstruct", "{tmp}/room.npz", "--frame", "1"], "1 frames (0 to 0), --frame asks for 1"),
+    (["reconstruct", "{tmp}/room.npz", "--frame", "-1"], "--frame asks for -1"),
+    (["reconstruct", "{tmp}/room.npz", "-o", "face.xyz"], ".ply .pcd .npz .obj .glb .stl"),
+    (["reconstruct", "{tmp}/room.npz", "-o", "{tmp}/none/face.ply"], "no such folder"),
+    (["reconstruct", "{tmp}/room.npz", "--report", "r.txt"], "ends in .json"),
+    (["reconstruct", "{tmp}/room.npz", "--preview", "p.jpg"], "ends in .png"),
+    (["reconstruct", "{tmp}/room.npz", "--preset", "fast"], "--preset: "),
+    (["reconstruct", "{tmp}/room.npz", "--set", "speed=9"], "--set speed=9: expected NAME=VALUE"),
+    (["reconstruct", "{tmp}/room.npz", "--set", "ratio"], "--set ratio: expected NAME=VALUE"),
+    (["reconstruct", "{tmp}/room.npz", "--set", "ratio=many"], "--set ratio: "),
+    (["reconstruct", "{tmp}/room.npz", "--calibration", "{tmp}/no.json"], "no.json"),
+    (["reconstruct", "openni2:"], "expected a .npz or .oni file"),
+    (["up", "--workers", "0"], "expected a number from 1 to 256"),
+    (["up", "--address", "tcp://0.0.0.0:5000", "--data", "{tmp}/data"], "CURVE"),
+    (["press", "--timeout", "never"], "expected seconds"),
+    (["press", "--id", "../x", "--address", "ipc:///tmp/none"], "capture id '../x'"),
+    (["press", "--address", "nowhere"], "expected ipc://PATH or tcp://HOST:PORT"),
+    (["press", "--save", "face"], "ending missing"),
+    (["subscribe", "--save", "{tmp}/none"], "no such folder"),
+    (["subscribe", "--count", "0"], "--count 0"),
+])
+def test_wrong_usage_is_one_line_and_status_2(room, capsys, arguments, message):
+    for name in ("garbage.npz", "garbage.oni", "garbage.xyz"):
+        (room.parent / name).write_bytes(b"garbage" * 100)
+    status, text = outcome(capsys, *[one.replace("{tmp}", str(room.parent)) for one in arguments])
+    assert (status, len(text.splitlines())) == (2, 1)
+    assert message in text
+
+
+def test_a_frame_without_a_face_is_one_line_and_status_1(room, tmp_path, capsys):
+    status, text = outcome(capsys, "reconstruct", room, "-o", tmp_path / "face.ply")
+    assert (status, len(text.splitlines())) == (1, 1)
+    assert "face" in text
+    assert not (tmp_path / "face.ply").exists()
+
+
+def test_debug_shows_the_traceback(tmp_path):
+    with pytest.raises(OSError, match=r"no\.npz"):
+        main(["reconstruct", str(tmp_path / "no.npz"), "--debug"])
+
+
+def test_ctrl_c_is_status_130(room, monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("recon.reconstruct", interrupted)
+    assert outcome(capsys, "reconstruct", room) == (130, "")
+
+
+def test_help_imports_nothing_heavy():
+    code = ("import sys, service.cli\n"
+            "try: service.cli.main(['--help'])\n"
+            "except SystemExit: pass\n"
+            "heavy = {'numpy', 'cv2', 'open3d', 'zmq', 'pydantic', 'scipy', 'structlog'}\n"
+            "sys.exit(repr(heavy & set(sys.modules)) if heavy & set(sys.modules) else 0)")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "reconstruct" in done.stdout
+
+
+def test_a_reader_that_leaves_is_no_error():
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [sys.executable, "-c", "import service.cli, sys; from service.commands import status\n"
+         "status.run = lambda args: print('x' * 100000) or 0\n"
+         "sys.exit(service.cli.main(['status']))"],
+        stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (141, "")

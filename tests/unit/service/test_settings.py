@@ -1,0 +1,75 @@
+"""Settings and addresses."""
+
+import socket
+
+import pytest
+
+from service.addresses import check_bindable, publications_of, socket_file
+from service.errors import AddressError, HubRunningError, SettingsError
+from service.settings import ServiceSettings, private_folder
+
+
+def test_a_flag_wins_over_the_environment_and_that_over_the_default(tmp_path):
+    environment = {"DENSEFACE_ATTEMPTS": "5", "DENSEFACE_DATA": "/somewhere", "OTHER": "1"}
+    settings = ServiceSettings.of(environment, data=tmp_path, address=None)
+    assert (settings.attempts, settings.data, settings.liveness) == (5, tmp_path, 3)
+
+
+@pytest.mark.parametrize(("environment", "flags", "message"), [
+    ({"DENSEFACE_ATTEMPTS": "0"}, {}, "DENSEFACE_ATTEMPTS: .*greater than or equal to 1.*'0'"),
+    ({"DENSEFACE_HEARTBEAT_S": "nan"}, {}, "DENSEFACE_HEARTBEAT_S"),
+    ({}, {"job_timeout_s": -1}, "--job-timeout-s"),
+])
+def test_a_wrong_setting_is_named(environment, flags, message):
+    with pytest.raises(SettingsError, match=message):
+        ServiceSettings.of(environment, **flags)
+
+
+def test_the_publications_are_beside_the_hub():
+    assert publications_of("tcp://127.0.0.1:5000") == "tcp://127.0.0.1:5001"
+    assert publications_of("tcp://[::1]:5000") == "tcp://[::1]:5001"
+    assert publications_of("ipc:///run/x/hub") == "ipc:///run/x/hub.publications"
+
+
+@pytest.mark.parametrize("address", [
+    "", "hub", "tcp://", "tcp://127.0.0.1", "tcp://127.0.0.1:0", "tcp://127.0.0.1:65535",
+    "tcp://127.0.0.1:99999", "tcp://127.0.0.1:5000/x", "ipc://relative", "ipc:///" + "x" * 100,
+    "inproc://x", "tcp://[::1:5000"])
+def test_malformed_addresses_are_named(address):
+    with pytest.raises(AddressError, match="ipc"):
+        socket_file(address)
+
+
+@pytest.mark.parametrize("address", [
+    "tcp://0.0.0.0:5000", "tcp://192.168.1.2:5000", "tcp://example.com:5000", "tcp://[::]:5000"])
+def test_the_hub_binds_nothing_that_others_can_reach(address):
+    with pytest.raises(AddressError, match="CURVE"):
+        check_bindable(address)
+
+
+def test_loopback_may_be_bound():
+    check_bindable("tcp://127.0.0.1:5000")
+    check_bindable("tcp://[::1]:5000")
+
+
+def test_a_socket_in_use_is_not_taken_over(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with socket.socket(socket.AF_UNIX) as other:
+        other.bind("hub")  # a relative name: the full path may be too long to bind
+        path = tmp_path / "hub"
+        if len(str(path)) > 90:
+            pytest.skip(f"the temporary folder's path is too long for a socket: {tmp_path}")
+        other.listen()
+        with pytest.raises(HubRunningError, match="another hub"):
+            check_bindable(f"ipc://{path}")
+    check_bindable(f"ipc://{path}")  # left behind by one that was killed
+
+
+def test_a_private_folder_is_private(tmp_path):
+    folder = private_folder(tmp_path / "a" / "b")
+    assert folder.stat().st_mode & 0o777 == 0o700
+    folder.chmod(0o755)
+    assert private_folder(folder).stat().st_mode & 0o777 == 0o700
+    (tmp_path / "link").symlink_to(folder)
+    with pytest.raises(SettingsError, match="must be a folder"):
+        private_folder(tmp_path / "link")

@@ -1,0 +1,137 @@
+"""The data folder."""
+
+import os
+
+import numpy as np
+import pytest
+
+from recon.settings import Settings
+from service import messages
+from service.errors import CorruptFileError, HubRunningError, SettingsError, StoreError
+from service.payload import FaceHeader, FrameHeader
+from service.spool import read_parts, write_parts
+from service.states import CaptureState
+from service.store import FolderStore
+from service.wire import Packet
+from tests.unit.service.faces import small_face, small_frame
+
+
+@pytest.fixture
+def store(tmp_path):
+    with FolderStore(tmp_path / "data") as store:
+        yield store
+
+
+def frame(capture_id: str) -> Packet:
+    header, arrays = FrameHeader.of(small_frame())
+    return Packet(messages.Frame(capture_id=capture_id, frame=header), arrays)
+
+
+def result(capture_id: str, step: float = 2.0) -> Packet:
+    header, arrays = FaceHeader.of(small_face(step=step))
+    return Packet(
+        messages.Result(capture_id=capture_id, settings_hash="0f", face=header), arrays)
+
+
+def test_an_accepted_frame_survives_closing(tmp_path):
+    settings = Settings.of("faithful", ratio=7)
+    with FolderStore(tmp_path / "data") as store:
+        store.accept(frame("a"), settings, "0f")
+        store.accept(frame("b"), settings, "0f")
+        epoch = store.epoch
+    with FolderStore(tmp_path / "data") as store:
+        assert store.epoch == epoch
+        assert store.unfinished() == ["a", "b"]
+        stored = store.find("a")
+        assert stored is not None
+        assert (stored.state, stored.attempts) == (CaptureState.ACCEPTED, 0)
+        assert Settings.model_validate_json(stored.settings_json) == settings
+        header, arrays = store.frame("a")
+        np.testing.assert_array_equal(header.join(arrays).depth, small_frame().depth)
+        assert store.start_attempt("a") == 1
+        assert store.start_attempt("a") == 2
+
+
+def test_outcomes_are_numbered_in_order(store):
+    for name in "abc":
+        store.accept(frame(name), Settings(), "0f")
+    store.finish(result("b"))
+    store.fail("a", "NoFaceError", "no face", dead=False)
+    store.fail("c", "WorkerLost", "gone", dead=True)
+    assert store.unfinished() == []
+    assert store.last_sequence() == 3
+    assert store.counts() == {CaptureState.DONE: 1, CaptureState.FAILED: 1, CaptureState.DEAD: 1}
+    first, second, third = (store.outcome_after(n).message for n in range(3))
+    assert isinstance(first, messages.FaceDone)
+    assert (first.capture_id, first.sequence) == ("b", 1)
+    assert (second.capture_id, second.error, second.dead) == ("a", "NoFaceError", False)
+    assert (third.capture_id, third.dead) == ("c", True)
+    assert store.outcome_after(3) is None
+    assert store.outcome("c").message == third
+    assert store.outcome("d") is None
+
+
+def test_a_second_outcome_changes_nothing(store):
+    store.accept(frame("a"), Settings(), "0f")
+    store.finish(result("a"))
+    store.fail("a", "WorkerLost", "late", dead=True)
+    assert store.last_sequence() == 1
+    assert store.find("a").state is CaptureState.DONE
+
+
+def test_a_damaged_frame_is_named(store, tmp_path):
+    store.accept(frame("a"), Settings(), "0f")
+    path = tmp_path / "data" / "frames" / "a.frame"
+    data = bytearray(path.read_bytes())
+    data[-1] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(CorruptFileError, match=r"a\.frame: contents"):
+        store.frame("a")
+    path.unlink()
+    with pytest.raises(CorruptFileError, match="No such file"):
+        store.frame("a")
+
+
+def test_two_hubs_cannot_have_one_folder(store, tmp_path):
+    with pytest.raises(HubRunningError, match="another hub"):
+        FolderStore(tmp_path / "data")
+
+
+def test_the_folder_is_private_and_swept(tmp_path):
+    (tmp_path / "data" / "frames").mkdir(parents=True)
+    left = tmp_path / "data" / "frames" / ".a.frame.77.tmp"
+    left.write_bytes(b"half")
+    with FolderStore(tmp_path / "data"):
+        assert not left.exists()
+        assert (tmp_path / "data").stat().st_mode & 0o777 == 0o700
+
+
+def test_a_file_in_the_folder_s_place_is_named(tmp_path):
+    (tmp_path / "data").write_text("")
+    with pytest.raises(SettingsError, match="data"):
+        FolderStore(tmp_path / "data")
+
+
+def test_a_database_that_is_none_is_named(tmp_path):
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "captures.sqlite3").write_bytes(b"no database " * 500)
+    with pytest.raises(StoreError, match="not a database"):
+        FolderStore(tmp_path / "data")
+
+
+def test_parts_come_back_as_they_were(tmp_path):
+    parts = [b"header", b"", os.urandom(1000)]
+    checksum = write_parts(tmp_path / "x", parts)
+    assert read_parts(tmp_path / "x", checksum) == parts
+    with pytest.raises(CorruptFileError):
+        read_parts(tmp_path / "x", "0" * 64)
+
+
+def test_a_full_disk_leaves_nothing_half_written(tmp_path, monkeypatch):
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("service.spool.os.fsync", full)
+    with pytest.raises(StoreError, match="No space left"):
+        write_parts(tmp_path / "x", [b"data"])
+    assert list(tmp_path.iterdir()) == []
