@@ -1,5 +1,7 @@
 """Frame to face: pure functions on arrays."""
 
+from typing import TYPE_CHECKING
+
 from recon.errors import (
     FaceWithoutDepthError,
     NoDepthError,
@@ -8,8 +10,10 @@ from recon.errors import (
     TooLittleDepthError,
 )
 from recon.face import DenseCloud, Face, PointCloud, Report
-from recon.pipeline import reconstruct
 from recon.settings import Neighbors, Preset, Settings
+
+if TYPE_CHECKING:
+    from recon.pipeline import reconstruct
 
 __all__ = [
     "DenseCloud",
@@ -26,3 +30,16 @@ __all__ = [
     "TooLittleDepthError",
     "reconstruct",
 ]
+
+
+def __getattr__(name: str) -> object:
+    # OpenCV and SciPy take most of a second: who only handles faces shall not wait for them.
+    if name == "reconstruct":
+        from recon.pipeline import reconstruct
+
+        return reconstruct
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -100,12 +100,12 @@ def test_bad_calibration_is_named_in_one_line(path, value):
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", "NaN", b"\xff\xfe"])
 def test_bad_json_is_a_calibration_error(text):
-    with pytest.raises(CalibrationError, match="x.json"):
+    with pytest.raises(CalibrationError, match=r"x\.json"):
         Calibration.from_json(text, name="x.json")
 
 
 def test_missing_calibration_file(tmp_path):
-    with pytest.raises(CalibrationError, match="nowhere.json: No such file"):
+    with pytest.raises(CalibrationError, match=r"nowhere\.json: No such file"):
         Calibration.from_file(tmp_path / "nowhere.json")
 
 

@@ -15,7 +15,7 @@ def bumpy(n: int, seed: int, *, stretch: float = 1.0, hole: float = 0.0) -> np.n
     xy = rng.uniform(-side / 2, side / 2, (n, 2)) * (stretch, 1 / stretch)
     xy = xy[np.hypot(*xy.T) >= hole]
     z = 700 + 8 * np.sin(xy[:, 0] / 9) + 6 * np.cos(xy[:, 1] / 7) + 0.01 * xy[:, 0] * xy[:, 1]
-    return np.column_stack([xy + (40.0, -25.0), z + rng.normal(0, 1, len(xy))])
+    return np.column_stack([xy[:, 0] + 40, xy[:, 1] - 25, z + rng.normal(0, 1, len(xy))])
 
 
 @settings(deadline=None, max_examples=40)
@@ -82,7 +82,7 @@ def test_noise_is_estimated():
        dz=st.floats(-300, 2000))
 def test_moves_with_its_points(seed, dx, dy, dz):
     points = bumpy(300, seed)
-    moved = points + (dx, dy, dz)
+    moved = np.add(points, (dx, dy, dz))
     heights = fit_surface(points, 14, 2).at(points[:, :2])
     np.testing.assert_allclose(
         fit_surface(moved, 14, 2).at(moved[:, :2]), heights + dz, atol=1e-3)
