@@ -41,8 +41,10 @@ _GAP_MM = 60.0
 _STEP_MM = 12.0
 # Unmeasured spots up to this many pixels across do not cut the surface in two.
 _BRIDGE_PX = 5
-# What sticks out of the outline by less than this is no part of a head.
-_SPUR_MM = 10.0
+# What is narrower than this is no part of a face but an ear, hair, or the frayed edge of depth.
+_SPUR_MM = 30.0
+# A part of the area, cut off from the largest, that is smaller than this share of it.
+_ISLAND_SHARE = 0.15
 _SEED = 1
 
 Box = tuple[int, int, int, int]
@@ -211,11 +213,17 @@ def _colors(registered: Registration, face: NDArray[np.bool_]) -> NDArray[np.uin
 
 
 def _smooth_outline(face: NDArray[np.bool_], spur_px: float) -> NDArray[np.bool_]:
-    """The face's area without spurs: at a depth edge the sensor sets pixels to either side."""
+    """The face's area without spurs and islands.
+
+    At a depth edge the sensor sets pixels to either side; an island is an ear, or hair.
+    """
     side = 2 * round(spur_px / 2) + 1
     opened = cv2.morphologyEx(
         _solid(face), cv2.MORPH_OPEN, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
-    return np.asarray(opened > 0, np.bool_)
+    _, parts = cv2.connectedComponents(opened, connectivity=4)
+    areas = np.bincount(parts.ravel())[1:]
+    kept = 1 + np.flatnonzero(areas >= _ISLAND_SHARE * areas.max(initial=0))
+    return np.isin(parts, kept)
 
 
 def _away_from_outline(face: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -225,5 +233,5 @@ def _away_from_outline(face: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _solid(face: NDArray[np.bool_]) -> NDArray[np.uint8]:
     """The face's area, (H, W) uint8, 0 or 1, its holes filled."""
-    closed = cv2.morphologyEx(face.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
+    closed = cv2.morphologyEx(face.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     return np.asarray(binary_fill_holes(closed), np.uint8)

@@ -11,6 +11,8 @@ __all__ = ["support_on_grid"]
 # the rim, counted outward from the outermost seeds.
 _CLOSING = 1.2
 _RIM = 0.2
+_EVEN = 1.0
+_HALF = 0.5
 
 
 def support_on_grid(
@@ -29,7 +31,7 @@ def support_on_grid(
     xs, ys : (columns,), (rows,) float64, mm
     support : (rows, columns) bool
     """
-    reach = (_CLOSING + 1) * spacing
+    reach = (_CLOSING + _EVEN) * spacing
     low, high = points[:, :2].min(axis=0) - reach, points[:, :2].max(axis=0) + reach
     columns, rows = (int(n) for n in np.ceil((high - low) / step) + 1)
     xs, ys = low[0] + step * np.arange(columns), low[1] + step * np.arange(rows)
@@ -37,7 +39,9 @@ def support_on_grid(
     empty = np.ones((rows, columns), np.uint8)
     empty[place[:, 1], place[:, 0]] = 0
     closed = _distance(empty) * step <= _CLOSING * spacing
-    solid = binary_fill_holes(closed)
+    # The sensor leaves an edge frayed: its outline is evened out, neither grown nor shrunk.
+    solid = cv2.GaussianBlur(binary_fill_holes(closed).astype(np.float32), (0, 0),
+                             _EVEN * spacing / step, borderType=cv2.BORDER_CONSTANT) > _HALF
     return xs, ys, _distance(solid.astype(np.uint8)) * step > (_CLOSING - _RIM) * spacing
 
 
