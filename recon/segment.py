@@ -194,7 +194,8 @@ def _bridged(
     total = cv2.boxFilter(np.where(known, z, np.float32(0)), -1, kernel, normalize=False)
     near = weight > 0.5
     mean = np.divide(total, weight, out=np.zeros_like(total), where=near)
-    return np.where(known, z, mean), known | near
+    # A depth that was measured and is not wanted is no gap: the flood shall not pass over it.
+    return np.where(known, z, mean), known | (near & (z == 0))
 
 
 def _colors(registered: Registration, face: NDArray[np.bool_]) -> NDArray[np.uint8]:
