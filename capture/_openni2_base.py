@@ -6,12 +6,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from capture._chosen import ChosenCalibration
 from capture._openni2_calibration import calibration_of
 from capture._openni2_library import close_at_exit, close_handle
 from capture._openni2_streams import COLOR, DEPTH, Image, Streams
 from capture.errors import FrameError, SensorError
 from capture.frame import RgbdFrame
-from capture.source import ChosenCalibration
 from capture.sync import Pair, Pairer
 
 __all__ = ["OpenNI2Source"]

@@ -3,12 +3,12 @@
 import time
 from collections.abc import Iterator
 
+from capture._chosen import ChosenCalibration
 from capture._openni2_base import OpenNI2Source
 from capture._openni2_library import gone_devices, load, reason
 from capture._openni2_streams import COLOR, DEPTH, Streams
 from capture.errors import SensorError, SensorTimeoutError
 from capture.frame import RgbdFrame
-from capture.source import ChosenCalibration
 
 __all__ = ["LiveSource"]
 

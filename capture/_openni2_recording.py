@@ -4,6 +4,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from capture._chosen import ChosenCalibration
 from capture._oni_file import DEPTH_NODE, IMAGE_NODE, check_oni
 from capture._openni2_base import OpenNI2Source
 from capture._openni2_library import load, open_sources, reason
@@ -11,7 +12,6 @@ from capture._openni2_path import plain_name
 from capture._openni2_streams import COLOR, DEPTH, Streams
 from capture.errors import SensorError, UnreadableSourceError
 from capture.frame import RgbdFrame
-from capture.source import ChosenCalibration
 
 __all__ = ["RecordingSource"]
 

@@ -13,17 +13,15 @@ from collections.abc import Iterator
 from math import prod
 from pathlib import Path
 from types import TracebackType
-from typing import IO, TYPE_CHECKING, Any, NamedTuple, Self
+from typing import IO, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from capture._chosen import ChosenCalibration
 from capture.errors import FrameError, UnreadableSourceError
 from capture.frame import Calibration, RgbdFrame
-
-if TYPE_CHECKING:
-    from capture.source import ChosenCalibration
 
 __all__ = ["NpzSource", "load_frame", "save_frame"]
 
@@ -56,7 +54,7 @@ class NpzSource:
 
     frame_count: int | None = 1
 
-    def __init__(self, path: Path, chosen: "ChosenCalibration | None" = None) -> None:
+    def __init__(self, path: Path, chosen: ChosenCalibration | None = None) -> None:
         self.uri = str(path)
         self._frame = load_frame(path, chosen)
 
@@ -78,7 +76,7 @@ class NpzSource:
         """Nothing is held open."""
 
 
-def load_frame(path: str | Path, chosen: "ChosenCalibration | None" = None) -> RgbdFrame:
+def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> RgbdFrame:
     """Read a frame file.
 
     Parameters

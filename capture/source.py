@@ -13,12 +13,13 @@ URI                what it opens
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple, Protocol, Self, runtime_checkable
+from typing import Protocol, Self, runtime_checkable
 
+from capture._chosen import choose_calibration
 from capture.errors import UnreadableSourceError
 from capture.frame import Calibration, RgbdFrame
 
-__all__ = ["ChosenCalibration", "Source", "open_source"]
+__all__ = ["Source", "open_source"]
 
 _LIVE = "openni2:"
 _ACCEPTED = "accepted: NAME.npz, NAME.oni, openni2: or openni2:URI"
@@ -55,13 +56,6 @@ class Source(Protocol):
         """Let go of the sensor or file; harmless when repeated."""
 
 
-class ChosenCalibration(NamedTuple):
-    """A calibration that wins over what the source says of itself, and where it came from."""
-
-    calibration: Calibration
-    origin: str
-
-
 def open_source(
     uri: str | Path, calibration: Calibration | str | Path | None = None
 ) -> Source:
@@ -89,7 +83,7 @@ def open_source(
     if text.lower().startswith(_LIVE):
         from capture.openni2 import LiveSource
 
-        return LiveSource(text[len(_LIVE):] or None, _chosen(None, calibration))
+        return LiveSource(text[len(_LIVE):] or None, choose_calibration(None, calibration))
     path = Path(text)
     kind = path.suffix.lower()
     if kind not in (".npz", ".oni"):
@@ -100,21 +94,7 @@ def open_source(
     if kind == ".npz":
         from capture.npz import NpzSource
 
-        return NpzSource(path, _chosen(path, calibration))
+        return NpzSource(path, choose_calibration(path, calibration))
     from capture.openni2 import RecordingSource
 
-    return RecordingSource(path, _chosen(path, calibration))
-
-
-def _chosen(
-    path: Path | None, argument: Calibration | str | Path | None
-) -> ChosenCalibration | None:
-    if isinstance(argument, Calibration):
-        return ChosenCalibration(argument, "argument")
-    if argument is not None:
-        return ChosenCalibration(Calibration.from_file(argument), f"argument {argument}")
-    if path is not None:
-        beside = path.with_name(f"{path.stem}.calibration.json")
-        if beside.exists():
-            return ChosenCalibration(Calibration.from_file(beside), f"beside: {beside.name}")
-    return None
+    return RecordingSource(path, choose_calibration(path, calibration))
