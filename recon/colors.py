@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 __all__ = ["average_neighbors"]
 
 _LEAST_WEIGHT = 0.05
-_ANY_WEIGHT = 1e-12
+_SMALLEST = 4
 
 
 def average_neighbors(
@@ -38,23 +38,30 @@ def average_neighbors(
     """
     if not len(colors):
         raise ValueError("colors must not be empty")
-    shape = wanted.shape
-    flat = places[:, 0] * shape[1] + places[:, 1]
-    # The last channel counts the colours: the mean is sum over count, blurred alike.
-    sums = np.stack([
-        np.bincount(flat, weights, minlength=shape[0] * shape[1]).reshape(shape)
-        for weights in (*colors.T.astype(np.float64), None)
-    ], axis=-1).astype(np.float32)
-    mean = np.zeros((*shape, 3), np.float32)
-    unknown = wanted.copy()
-    least = _LEAST_WEIGHT / spacing**2
-    while unknown.any():
-        blurred = cv2.GaussianBlur(sums, (0, 0), radius, borderType=cv2.BORDER_CONSTANT)
-        reaches_all = radius > max(shape)
-        now = unknown & (blurred[..., 3] > (_ANY_WEIGHT if reaches_all else least))
-        mean[now] = blurred[now, :3] / blurred[now, 3:]
-        if reaches_all:
-            break
-        unknown &= ~now
-        radius *= 2
+    sums = np.zeros((*wanted.shape, 4), np.float32)
+    # Channel 3 counts the colours: a mean is sum over count, blurred alike.
+    sums[places[:, 0], places[:, 1], :3] = colors
+    sums[places[:, 0], places[:, 1], 3] = 1
+    mean = _mean(sums, wanted, radius, _LEAST_WEIGHT / spacing**2)
     return np.rint(mean).astype(np.uint8)
+
+
+def _mean(
+    sums: NDArray[np.float32], wanted: NDArray[np.bool_], radius: float, least: float
+) -> NDArray[np.float32]:
+    """Blur; where there is too little near, ask the same of the image at half its size."""
+    blurred = cv2.GaussianBlur(sums, (0, 0), radius, borderType=cv2.BORDER_CONSTANT)
+    count = blurred[..., 3]
+    smallest = max(wanted.shape) <= _SMALLEST
+    known = wanted & (count > (0 if smallest else least))
+    mean = np.zeros((*wanted.shape, 3), np.float32)
+    mean[known] = blurred[known, :3] / count[known, None]
+    missing = wanted & ~known
+    if missing.any() and not smallest:
+        half = (-(-wanted.shape[1] // 2), -(-wanted.shape[0] // 2))
+        below = cv2.resize(missing.astype(np.float32), half, interpolation=cv2.INTER_AREA)
+        coarse = _mean(np.asarray(cv2.resize(blurred, half, interpolation=cv2.INTER_AREA)),
+                       cv2.dilate(below, np.ones((5, 5), np.uint8)) > 0, radius, least)
+        filled = cv2.resize(coarse, wanted.shape[::-1], interpolation=cv2.INTER_LINEAR)
+        mean[missing] = filled[missing]
+    return mean

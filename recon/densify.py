@@ -14,6 +14,7 @@ __all__ = ["densify"]
 # In units of the mean spacing.
 # A colour is the mean of the seeds around it, weighted by a Gaussian of this radius.
 _COLOR_RADIUS = 0.5
+_COARSE = 0.5
 
 
 def densify(
@@ -28,10 +29,10 @@ def densify(
     spacing : mean spacing of the seeds, mm
     ratio : dense points for each seed
     """
-    step = spacing / np.sqrt(ratio)
-    # Filled holes add to the support: one try tells how much, and the step follows.
-    _, _, support = support_on_grid(seeds.points, spacing, step)
-    step *= float(np.sqrt(support.sum() / (ratio * len(seeds.points))))
+    # Filled holes add to the support: a coarse try tells how much, and the step follows.
+    _, _, support = support_on_grid(seeds.points, spacing, _COARSE * spacing)
+    area = np.count_nonzero(support) * (_COARSE * spacing) ** 2
+    step = float(np.sqrt(area / (ratio * len(seeds.points))))
     xs, ys, support = support_on_grid(seeds.points, spacing, step)
 
     cells = np.argwhere(support).astype(np.int32)

@@ -1,28 +1,51 @@
 """Stage 2: the face in the colour image, by Haar cascades, confirmed by its depth."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon.errors import FaceWithoutDepthError, NoFaceError
+from recon.errors import FaceWithoutDepthError, NoDepthError, NoFaceError
 from recon.face import FaceCandidate
 from recon.registration import Registration
 
 __all__ = ["FACE_WIDTH_MM", "Detection", "detect_face", "find_boxes"]
 
+Box = tuple[int, int, int, int]
+"""x, y, width, height; pixels."""
+
 FACE_WIDTH_MM = (110.0, 210.0)
 """How wide a cascade's box around a face is, child to large adult, hair included."""
 
-# Viola and Jones, 2001, doi:10.1109/CVPR.2001.990517. The first that depth confirms ends the
-# search; those after it see faces that it misses (turned, lit from the side).
-_CASCADES = ("haarcascade_frontalface_alt2", "haarcascade_frontalface_default",
-             "haarcascade_frontalface_alt")
-_SCALE_STEP = 1.1
-_MIN_NEIGHBORS = 5
+# Viola and Jones, 2001, doi:10.1109/CVPR.2001.990517.
+_ALT2 = "haarcascade_frontalface_alt2"
+_DEFAULT = "haarcascade_frontalface_default"
+_ALT = "haarcascade_frontalface_alt"
+
+
+class _Rung(NamedTuple):
+    """One way to look for faces."""
+
+    shrink: int
+    """The image is searched at one part in so many of its width."""
+    cascade: str
+    scale_step: float = 1.1
+    min_neighbors: int = 5
+
+
+# The first rung on which depth confirms a face ends the search: most faces are found on the first,
+# the others see those that it misses (far, turned, lit from the side).
+_LADDER = (_Rung(3, _ALT2, 1.2, 3), _Rung(2, _ALT2), _Rung(1, _ALT2), _Rung(1, _DEFAULT),
+           _Rung(1, _ALT))
+# The box found small is sought again at full size, around itself and of about its own size.
+_REFINED = _Rung(1, _ALT2, 1.05, 3)
+_REFINE_AROUND = 0.3
+_REFINE_SIZES = (0.75, 1.25)
 # The cascades were trained on 20-24 pixel faces and gain nothing beyond this width of the image.
 _WIDEST = 640
 # A face farther away has too few depth pixels to be worth a search.
@@ -44,7 +67,7 @@ class Detection:
     candidates : every box, the chosen one first, then by depth
     """
 
-    box: tuple[int, int, int, int]
+    box: Box
     depth_mm: float
     candidates: tuple[FaceCandidate, ...]
 
@@ -66,18 +89,29 @@ def detect_face(
         Where no box was found, or none is a face's size at its depth.
     FaceWithoutDepthError
         Where faces were seen but nothing was measured on them.
+    NoDepthError
+        Where nothing measured lies before the colour camera.
     """
-    scale = min(1.0, _WIDEST / color.shape[1])
     smallest, largest = _box_sizes(registered, focal_px)
     seen: list[FaceCandidate] = []
-    for gray in _grays(color, scale):
-        for cascade in _CASCADES:
-            boxes = find_boxes(gray, cascade, smallest * scale, largest * scale)
-            weighed = [_weigh(_unscaled(box, scale), registered, focal_px) for box in boxes]
+    for gray in _grays(color):
+        to_color = color.shape[1] / gray.shape[1]
+        for rung in _LADDER:
+            boxes = _search(gray, rung, smallest / to_color, largest / to_color)
+            weighed = [_weigh(_scaled(box, to_color), registered, focal_px) for box in boxes]
             seen += weighed
             faces = [c for c in weighed if c.verdict == "face"]
             if faces:
-                return _choose(faces, seen)
+                chosen = _choose(faces, seen)
+                if rung.shrink == 1:
+                    return chosen
+                refined = _weigh(
+                    _scaled(_refine(gray, _scaled(chosen.box, 1 / to_color)), to_color),
+                    registered, focal_px)
+                if refined.verdict != "face" or refined.depth_mm is None:
+                    return chosen
+                return Detection(refined.box, refined.depth_mm, (
+                    refined.model_copy(update={"verdict": "chosen"}), *chosen.candidates[1:]))
     if not seen:
         raise NoFaceError("no face found in the colour image")
     if all(c.depth_mm is None for c in seen):
@@ -90,17 +124,45 @@ def detect_face(
 
 
 def find_boxes(
-    gray: NDArray[np.uint8], cascade: str, smallest: float, largest: float
-) -> list[tuple[int, int, int, int]]:
+    gray: NDArray[np.uint8],
+    cascade: str,
+    smallest: float,
+    largest: float,
+    scale_step: float = 1.1,
+    min_neighbors: int = 5,
+) -> list[Box]:
     """Run one cascade over a (H, W) uint8 image for boxes between two widths, pixels."""
-    low, high = max(20, int(smallest)), max(20, int(np.ceil(largest)))
+    low, high = int(smallest), int(np.ceil(largest))
     found = _cascade(cascade).detectMultiScale(
-        gray, scaleFactor=_SCALE_STEP, minNeighbors=_MIN_NEIGHBORS,
+        gray, scaleFactor=scale_step, minNeighbors=min_neighbors,
         minSize=(low, low), maxSize=(high, high))
     return [(int(x), int(y), int(w), int(h)) for x, y, w, h in found]
 
 
-@lru_cache
+def _search(gray: NDArray[np.uint8], rung: _Rung, smallest: float, largest: float) -> list[Box]:
+    k = rung.shrink
+    if k > 1:
+        gray = np.asarray(cv2.resize(gray, None, fx=1 / k, fy=1 / k, interpolation=cv2.INTER_AREA),
+                          np.uint8)
+    found = find_boxes(gray, rung.cascade, smallest / k, largest / k, rung.scale_step,
+                       rung.min_neighbors)
+    return [_scaled(box, k) for box in found]
+
+
+def _refine(gray: NDArray[np.uint8], box: Box) -> Box:
+    """Find a box again with less rounding; the same one where it is not found again."""
+    x, y, w, h = box
+    around = round(_REFINE_AROUND * w)
+    left, top = max(x - around, 0), max(y - around, 0)
+    near = np.ascontiguousarray(gray[top:y + h + around, left:x + w + around])
+    found = _search(near, _REFINED, _REFINE_SIZES[0] * w, _REFINE_SIZES[1] * w)
+    if not found:
+        return box
+    x, y, w, h = max(found, key=lambda b: b[2])
+    return x + left, y + top, w, h
+
+
+@cache
 def _cascade(name: str) -> cv2.CascadeClassifier:
     path = Path(cv2.__file__).parent / "data" / f"{name}.xml"
     classifier = cv2.CascadeClassifier(str(path))
@@ -109,31 +171,34 @@ def _cascade(name: str) -> cv2.CascadeClassifier:
     return classifier
 
 
-def _grays(color: NDArray[np.uint8], scale: float) -> list[NDArray[np.uint8]]:
+def _grays(color: NDArray[np.uint8]) -> Iterator[NDArray[np.uint8]]:
     """The image as it is, then with its contrast evened out for faces in the dark or lit aslant."""
     gray = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY)
+    scale = _WIDEST / color.shape[1]
     if scale < 1:
         gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    even = cv2.createCLAHE(clipLimit=4.0, tileGridSize=(8, 8)).apply(gray)
-    return [np.asarray(gray, np.uint8), np.asarray(even, np.uint8)]
+    yield np.asarray(gray, np.uint8)
+    yield np.asarray(cv2.createCLAHE(clipLimit=4.0, tileGridSize=(8, 8)).apply(gray), np.uint8)
 
 
 def _box_sizes(registered: Registration, focal_px: float) -> tuple[float, float]:
     """Bound a face's width in pixels by the depths in the scene."""
     z = registered.color_depth[registered.color_depth > 0]
+    if not len(z):
+        raise NoDepthError("no depth lies before the colour camera: is the calibration right?")
     nearest, farthest = (float(value) for value in np.percentile(z, (1, 99)))
     farthest = min(farthest, _FARTHEST_MM)
     nearest = min(max(nearest, _NEAREST_MM), farthest)
     return focal_px * FACE_WIDTH_MM[0] / farthest, focal_px * FACE_WIDTH_MM[1] / nearest
 
 
-def _unscaled(box: tuple[int, int, int, int], scale: float) -> tuple[int, int, int, int]:
-    x, y, w, h = (round(side / scale) for side in box)
+def _scaled(box: Box, factor: float) -> Box:
+    x, y, w, h = (round(side * factor) for side in box)
     return x, y, w, h
 
 
 def _weigh(
-    box: tuple[int, int, int, int], registered: Registration, focal_px: float
+    box: Box, registered: Registration, focal_px: float
 ) -> FaceCandidate:
     """Judge a box by the depth in its middle."""
     x, y, w, h = box

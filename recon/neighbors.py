@@ -14,6 +14,7 @@ _FLANN_INDEX_KDTREE = 1
 _TREES = 4
 # 8 checks overestimate the spacing by up to a tenth, 32 are right.
 _CHECKS = 32
+_FAR = np.float32(1e6)
 
 
 def mean_spacing(
@@ -85,16 +86,21 @@ def lattice_spacing(xy: NDArray[np.float32], pixels: NDArray[np.int32]) -> float
     Seeds without another seed among those pixels do not count: they are stray, and there are few.
     Where no seed has one, the exact tree decides.
     """
-    low = pixels.min(axis=0) - 2
-    rows, columns = pixels.max(axis=0) - low + 3
-    place = (pixels[:, 0] - low[0]) * columns + pixels[:, 1] - low[1]
-    plane = np.full((rows * columns, 2), np.inf, np.float32)
-    plane[place] = xy
-    nearest = np.full(len(xy), np.inf, np.float32)
-    for down in range(-2, 3):
-        for right in range(-2, 3):
-            if down or right:
-                gap = plane[place + down * columns + right] - xy
-                np.minimum(nearest, np.einsum("ij,ij->i", gap, gap), out=nearest)
-    found = np.isfinite(nearest)
-    return float(np.sqrt(nearest[found]).mean()) if found.any() else exact_spacing(xy)
+    low = pixels.min(axis=0)
+    rows, columns = pixels.max(axis=0) - low + 1
+    places = tuple((pixels - low).T)
+    # Where there is no seed, the plane is far away.
+    x, y = np.full((2, rows, columns), _FAR, np.float32)
+    x[places], y[places] = xy.T
+    nearest = np.full((rows, columns), _FAR, np.float32)
+    for down in range(3):
+        for right in range(-2 if down else 1, 3):
+            left, end = max(0, -right), columns - max(0, right)
+            here = np.s_[:rows - down, left:end]
+            there = np.s_[down:, left + right:end + right]
+            gap = (x[here] - x[there]) ** 2 + (y[here] - y[there]) ** 2
+            np.minimum(nearest[here], gap, out=nearest[here])
+            np.minimum(nearest[there], gap, out=nearest[there])
+    squared = nearest[places]
+    found = squared < _FAR
+    return float(np.sqrt(squared[found]).mean()) if found.any() else exact_spacing(xy)

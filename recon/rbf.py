@@ -20,8 +20,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve_banded, cholesky_banded
 
+from recon._kernels import CHANNELS, conjugate_gradients, spread, spread_density
 from recon.errors import TooLittleDepthError
 
 __all__ = ["MIN_SEEDS", "Surface", "fit_surface"]
@@ -32,9 +32,10 @@ MIN_SEEDS = 50
 _NODE_STEP = 0.45
 _NODE_STEP_SHARP = 0.40
 _SHARP_BELOW = 0.3
-# exp(-(2 * 2^2)) on both sides: nodes farther out than this carry nothing.
-_MARGIN = 2.0
-_NEGLIGIBLE = 1e-8
+_NEGLIGIBLE = 1e-5
+# Of the preconditioned residual.
+_TOLERANCE = 1e-6
+_MOST_ITERATIONS = 1000
 # Below this ratio of the principal extents, the seeds lie on a line.
 _COLLINEAR = 1e-3
 
@@ -147,27 +148,82 @@ def fit_surface(
     xy, z = points[:, :2], points[:, 2]
     center = (float(xy[:, 0].mean()), float(xy[:, 1].mean()))
     scale = float(np.abs(xy - center).max())
-    step = (_NODE_STEP_SHARP if smoothing < _SHARP_BELOW else _NODE_STEP) * r0
-    nodes_x, nodes_y = (_nodes(xy[:, axis], step, _MARGIN * r0) for axis in (0, 1))
+    q = _NODE_STEP_SHARP if smoothing < _SHARP_BELOW else _NODE_STEP
+    # How many steps exp(-2 q^2 r^2), and its square root, are not negligible.
+    near, far = (int(np.ceil(np.sqrt(-np.log(_NEGLIGIBLE) / k) / q)) for k in (2, 1))
+    nodes_x, nodes_y = (_nodes(xy[:, axis], q * r0, near) for axis in (0, 1))
+    x, y = ((xy - (nodes_x[0], nodes_y[0])) / (q * r0)).T
+
+    # The polynomial is eliminated: what it explains by itself is taken off first, and the node
+    # weights are sought beside it. In single precision, which the small rest allows.
     P = _polynomial(xy, center, scale)
+    PW = P * W[:, None]
+    Q = P.T @ PW
+    trend = np.linalg.solve(Q, PW.T @ z)
+    rest = z - P @ trend
+    root = 2 * q / np.sqrt(np.pi)  # sqrt(c0)
+    values = np.zeros((len(z), CHANNELS), np.float32)
+    values[:, :6], values[:, 6] = root * PW, root * W * rest
+    sums = spread(x, y, values, 2 * q * q, near, len(nodes_y), len(nodes_x))
+    C, right = sums[..., :6].reshape(-1, 6).astype(np.float64), sums[..., 6]
+    flat = _Flat(len(nodes_y), len(nodes_x), far)
+    weight = W.astype(np.float32)
+    density = spread_density(2 * (x + far), 2 * (y + far), weight, q * q, far, flat.rows,
+                             flat.width).reshape(2, 2, -1)
+    G = np.linalg.solve(np.linalg.cholesky(Q), C.T).reshape(6, len(nodes_y), len(nodes_x))
+    alpha, _ = conjugate_gradients(
+        density, _decay(q, far), smoothing, flat.pad(G), flat.pad(np.ones((1, *right.shape)))[0],
+        flat.width, flat.first, flat.size, flat.pad(right[None])[0], _TOLERANCE, _MOST_ITERATIONS)
+    found = flat.unpad(alpha)
+    beta = trend - np.linalg.solve(Q, C.T @ found.ravel())
 
-    ex, ey = _basis(xy[:, 0], nodes_x, r0), _basis(xy[:, 1], nodes_y, r0)
-    root = 2 * step / (np.sqrt(np.pi) * r0)  # sqrt(c0)
-    targets = np.column_stack([z, P]) * W[:, None]
-    # The right-hand sides A^T W z and A^T W P, flattened with x running fastest.
-    right = root * np.stack([(ey.T @ (ex * t[:, None])).ravel() for t in targets.T], axis=1)
-    factor = cholesky_banded(
-        _gram(xy, W, nodes_x, nodes_y, r0, root * root, smoothing),
-        lower=True, overwrite_ab=True, check_finite=False)
-    solved = cho_solve_banded((factor, True), right, check_finite=False)
-    # Eliminating alpha leaves the polynomial's own 6 equations.
-    schur = P.T @ targets[:, 1:] - right[:, 1:].T @ solved[:, 1:]
-    beta = np.linalg.solve(schur, P.T @ targets[:, 0] - right[:, 1:].T @ solved[:, 0])
-    alpha = (root * (solved[:, 0] - solved[:, 1:] @ beta)).reshape(len(nodes_y), len(nodes_x))
+    # At the solution the squared residuals follow from the sums at hand.
+    squares = (W * rest * rest).sum() - (found * right).sum() - smoothing * (found * found).sum()
+    return Surface(nodes_x, nodes_y, root * found, beta, center, scale, r0,
+                   noise=float(np.sqrt(max(squares, 0.0) / W.sum())))
 
-    fitted = np.einsum("ij,ij->i", ey @ alpha, ex) + P @ beta
-    noise = float(np.sqrt((W * (z - fitted) ** 2).sum() / W.sum()))
-    return Surface(nodes_x, nodes_y, alpha, beta, center, scale, r0, noise)
+
+@dataclass(frozen=True)
+class _Flat:
+    """The kernels' flat layout of a (height, breadth) grid: unused places all around it."""
+
+    height: int
+    breadth: int
+    reach: int
+
+    @property
+    def rows(self) -> int:
+        return self.height + 2 * self.reach
+
+    @property
+    def width(self) -> int:
+        return self.breadth + 2 * self.reach
+
+    @property
+    def first(self) -> int:
+        return self.reach * self.width + self.reach
+
+    @property
+    def size(self) -> int:
+        return (self.height - 1) * self.width + self.breadth
+
+    def pad(self, grids: NDArray[np.floating]) -> NDArray[np.float32]:
+        """(k, height, breadth) -> (k, rows width)."""
+        out = np.zeros((len(grids), self.rows, self.width), np.float32)
+        out[:, self.reach:-self.reach, self.reach:-self.reach] = grids
+        return out.reshape(len(grids), -1)
+
+    def unpad(self, flat: NDArray[np.float32]) -> NDArray[np.float64]:
+        """(rows width,) -> (height, breadth)."""
+        grid = flat.reshape(self.rows, self.width)
+        return grid[self.reach:-self.reach, self.reach:-self.reach].astype(np.float64)
+
+
+def _decay(q: float, reach: int) -> NDArray[np.float32]:
+    """c0 exp(-|t - t'|^2 / R0^2) by steps down and right, 0 where negligible."""
+    steps = np.arange(-reach, reach + 1)
+    decay = np.exp(-q * q * (steps[:, None] ** 2 + steps**2))
+    return np.where(decay > _NEGLIGIBLE, 4 * q * q / np.pi * decay, 0).astype(np.float32)
 
 
 def _checked(
@@ -195,9 +251,11 @@ def _checked(
     return checked, W
 
 
-def _nodes(values: NDArray[np.float64], step: float, margin: float) -> NDArray[np.float64]:
-    low, high = float(values.min()) - margin, float(values.max()) + margin
-    return low + step * np.arange(int(np.ceil((high - low) / step)) + 1, dtype=np.float64)
+def _nodes(values: NDArray[np.float64], step: float, margin: int) -> NDArray[np.float64]:
+    """Nodes from `margin` steps before the least value to as many behind the largest."""
+    low = float(values.min()) - (margin + 0.5) * step
+    count = int(np.ceil(float(np.ptp(values)) / step)) + 2 * margin + 2
+    return low + step * np.arange(count, dtype=np.float64)
 
 
 def _basis(
@@ -225,34 +283,3 @@ def _polynomial(
 ) -> NDArray[np.float64]:
     u, v = ((np.asarray(xy, np.float64) - center) / scale).T
     return np.column_stack([np.ones_like(u), u, v, u * u, u * v, v * v])
-
-
-def _gram(
-    xy: NDArray[np.float64],
-    W: NDArray[np.float64],
-    nodes_x: NDArray[np.float64],
-    nodes_y: NDArray[np.float64],
-    r0: float,
-    c0: float,
-    smoothing: float,
-) -> NDArray[np.float64]:
-    """A^T W A + lambda I in LAPACK's lower banded form, (bands, ny nx)."""
-    nx, ny = len(nodes_x), len(nodes_y)
-    step = nodes_x[1] - nodes_x[0]
-    half_x = nodes_x[0] + step / 2 * np.arange(2 * nx - 1)
-    half_y = nodes_y[0] + step / 2 * np.arange(2 * ny - 1)
-    density = _basis(xy[:, 1], half_y, r0, 4.0).T @ (_basis(xy[:, 0], half_x, r0, 4.0) * W[:, None])
-
-    reach = int(np.sqrt(-np.log(_NEGLIGIBLE)) * r0 / step)
-    banded = np.zeros((min(reach, ny - 1) * nx + min(reach, nx - 1) + 1, ny * nx))
-    for down in range(min(reach, ny - 1) + 1):
-        for right in range(-min(reach, nx - 1) if down else 0, min(reach, nx - 1) + 1):
-            decay = np.exp(-(down * down + right * right) * (step / r0) ** 2)
-            if decay < _NEGLIGIBLE:
-                continue
-            left, end = max(0, -right), nx - max(0, right)
-            column = banded[down * nx + right].reshape(ny, nx)
-            column[:ny - down, left:end] = c0 * decay * density[
-                down:2 * ny - 1 - down:2, 2 * left + right:2 * end + right:2]
-    banded[0] += smoothing
-    return banded

@@ -17,15 +17,18 @@ __all__ = ["Registration", "register"]
 _HIDDEN_MM = 15.0
 _HIDDEN_SHARE = 0.02
 
+_ALL = slice(None)
+
 _T = TypeVar("_T", bound=np.generic)
 
 
 @dataclass(frozen=True, eq=False)
 class Registration:
-    """The depth image as points, tied to the colour image; one entry for each depth pixel.
+    """A part of the depth image as points, tied to the colour image; an entry for each pixel.
 
     Attributes
     ----------
+    rows, columns : which rows and columns of the depth image these (H, W) are
     points : (H, W, 3) float32, mm, depth camera frame; zero where nothing was measured
     valid : (H, W) bool, a depth was measured
     pixels : (H, W, 2) float32, (u, v) in the colour image; NaN where not `valid`
@@ -34,6 +37,8 @@ class Registration:
     colors : (H, W, 3) uint8, RGB, bilinear; zero where not `visible`
     """
 
+    rows: slice
+    columns: slice
     points: NDArray[np.float32]
     valid: NDArray[np.bool_]
     pixels: NDArray[np.float32]
@@ -42,7 +47,12 @@ class Registration:
     colors: NDArray[np.uint8]
 
 
-def register(frame: RgbdFrame, depth_offset_mm: float = 0.0) -> Registration:
+def register(
+    frame: RgbdFrame,
+    depth_offset_mm: float = 0.0,
+    rows: slice = _ALL,
+    columns: slice = _ALL,
+) -> Registration:
     """Tie depth to colour through both cameras' intrinsics, distortion and relative pose.
 
     Points are back-projected by Eq. (1), moved to the colour camera and projected there; a
@@ -52,17 +62,20 @@ def register(frame: RgbdFrame, depth_offset_mm: float = 0.0) -> Registration:
     ----------
     frame : depth, mm, and colour with their calibration
     depth_offset_mm : added to each depth, mm
+    rows, columns : the part of the depth image to register, every pixel or every k-th
 
     Raises
     ------
     NoDepthError
         Where no pixel has a depth.
     """
-    valid = frame.depth > 0
+    depth = frame.depth[rows, columns]
+    valid = depth > 0
     if not valid.any():
         raise NoDepthError("the depth image is empty: every pixel is 0 (no reading)")
-    z = frame.depth[valid] + np.float64(depth_offset_mm)
-    points = np.concatenate([frame.depth_camera.rays()[valid] * z[:, None], z[:, None]], axis=1)
+    z = depth[valid] + np.float64(depth_offset_mm)
+    rays = frame.depth_camera.rays()[rows, columns][valid]
+    points = np.concatenate([rays * z[:, None], z[:, None]], axis=1)
     moved = frame.depth_to_color.apply(points)
     color_camera = frame.calibration.color
     in_front = moved[:, 2] > 0
@@ -71,7 +84,7 @@ def register(frame: RgbdFrame, depth_offset_mm: float = 0.0) -> Registration:
     inside = in_front & ((uv > -0.5) & (uv < (color_camera.width - 0.5,
                                               color_camera.height - 0.5))).all(axis=1)
     seen = inside.copy()
-    pitch = max(1.0, color_camera.fx / frame.depth_camera.fx)
+    pitch = max(1.0, color_camera.fx / frame.depth_camera.fx * (rows.step or 1))
     seen[inside] = _unhidden(uv[inside], moved[inside, 2], pitch,
                              (color_camera.height, color_camera.width))
 
@@ -82,6 +95,8 @@ def register(frame: RgbdFrame, depth_offset_mm: float = 0.0) -> Registration:
         borderMode=cv2.BORDER_REPLICATE), np.uint8)
     colors[~visible] = 0
     return Registration(
+        rows=rows,
+        columns=columns,
         points=_scatter(valid, points.astype(np.float32)),
         valid=valid,
         pixels=pixels,

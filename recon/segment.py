@@ -10,15 +10,18 @@ from itertools import pairwise
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_fill_holes
 
 from recon.colors import average_neighbors
 from recon.errors import FaceWithoutDepthError
+from recon.masks import fill_holes
 from recon.registration import Registration
 
-__all__ = ["CLUSTERS", "Seeds", "cluster_depths", "crop_to_box", "keep_face", "segment_face"]
+__all__ = ["CLUSTERS", "Seeds", "cluster_depths", "crop_to_box", "keep_face", "segment_face",
+           "window_of_box"]
 
 CLUSTERS = 3
+# About so many depths are enough to find the centres.
+_CLUSTERED = 2000
 """The paper's: face, body or hair, background."""
 
 # The cascades' box ends inside the forehead and near the chin, and sits aside of a turned face:
@@ -45,6 +48,8 @@ _BRIDGE_PX = 5
 _SPUR_MM = 30.0
 # A part of the area, cut off from the largest, that is smaller than this share of it.
 _ISLAND_SHARE = 0.15
+# Around the box, what may hide a part of it and what smooths its outline.
+_WINDOW_MARGIN_PX = 8
 _SEED = 1
 
 Box = tuple[int, int, int, int]
@@ -88,8 +93,34 @@ def segment_face(
         raise FaceWithoutDepthError(f"no depth was measured in the face's box {box}")
     cluster = cluster_depths(registered, crop, box)
     face = keep_face(registered, cluster, box, focal_px)
+    corner = (registered.rows.start or 0, registered.columns.start or 0)
     return Seeds(registered.points[face], _colors(registered, face),
-                 np.argwhere(face).astype(np.int32))
+                 (np.argwhere(face) + corner).astype(np.int32))
+
+
+def window_of_box(registered: Registration, box: Box) -> tuple[slice, slice]:
+    """Give the rows and columns of the depth image that hold all a face's box can show.
+
+    Parameters
+    ----------
+    registered : every k-th pixel of the whole depth image
+    box : x, y, width, height of the face; pixels of the colour image
+
+    Raises
+    ------
+    FaceWithoutDepthError
+        Where nothing was measured in the box.
+    """
+    crop = crop_to_box(registered, box)
+    if not crop.any():
+        raise FaceWithoutDepthError(f"no depth was measured in the face's box {box}")
+    window = []
+    for axis, part in ((1, registered.rows), (0, registered.columns)):
+        step = part.step or 1
+        inside = step * np.flatnonzero(crop.any(axis=axis))
+        window.append(slice(max(int(inside[0]) - step - _WINDOW_MARGIN_PX, 0),
+                            int(inside[-1]) + step + _WINDOW_MARGIN_PX + 1))
+    return window[0], window[1]
 
 
 def crop_to_box(registered: Registration, box: Box) -> NDArray[np.bool_]:
@@ -117,11 +148,13 @@ def cluster_depths(
     if len(z) < CLUSTERS:
         return crop
     cv2.setRNGSeed(_SEED)  # k-means++ draws its first centres: same frame, same clusters
-    _, labels, _ = cv2.kmeans(
-        z[:, None], CLUSTERS, np.empty(0, np.int32),
+    _, _, centers = cv2.kmeans(
+        z[::len(z) // _CLUSTERED + 1, None], CLUSTERS, np.empty(0, np.int32),
         (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 30, 0.5), 3, cv2.KMEANS_PP_CENTERS)
+    # In one dimension, the nearest centre is told by the middles between them.
+    ordered = np.sort(np.asarray(centers, np.float32).ravel())
+    labels = np.searchsorted((ordered[1:] + ordered[:-1]) / 2, z).astype(np.int32)
     label_image = np.full(crop.shape, -1, np.int32)
-    labels = np.asarray(labels, np.int32).ravel()
     label_image[crop] = labels
     middle = _nearest_pixel(registered, crop, box)
     kept = _joined(z, labels, int(label_image[middle]))
@@ -235,4 +268,4 @@ def _away_from_outline(face: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _solid(face: NDArray[np.bool_]) -> NDArray[np.uint8]:
     """The face's area, (H, W) uint8, 0 or 1, its holes filled."""
     closed = cv2.morphologyEx(face.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    return np.asarray(binary_fill_holes(closed), np.uint8)
+    return fill_holes(np.asarray(closed, np.uint8))

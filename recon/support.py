@@ -3,7 +3,8 @@
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_fill_holes
+
+from recon.masks import disc, fill_holes
 
 __all__ = ["support_on_grid"]
 
@@ -36,15 +37,12 @@ def support_on_grid(
     columns, rows = (int(n) for n in np.ceil((high - low) / step) + 1)
     xs, ys = low[0] + step * np.arange(columns), low[1] + step * np.arange(rows)
     place = np.rint((points[:, :2] - low) / step).astype(np.intp)
-    empty = np.ones((rows, columns), np.uint8)
-    empty[place[:, 1], place[:, 0]] = 0
-    closed = _distance(empty) * step <= _CLOSING * spacing
+    seeded = np.zeros((rows, columns), np.uint8)
+    seeded[place[:, 1], place[:, 0]] = 1
+    closed = fill_holes(
+        np.asarray(cv2.dilate(seeded, disc(_CLOSING * spacing / step)), np.uint8))
     # The sensor leaves an edge frayed: its outline is evened out, neither grown nor shrunk.
-    solid = cv2.GaussianBlur(binary_fill_holes(closed).astype(np.float32), (0, 0),
-                             _EVEN * spacing / step, borderType=cv2.BORDER_CONSTANT) > _HALF
-    return xs, ys, _distance(solid.astype(np.uint8)) * step > (_CLOSING - _RIM) * spacing
-
-
-def _distance(image: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Distance of each pixel to the nearest zero, pixels."""
-    return np.asarray(cv2.distanceTransform(image, cv2.DIST_L2, cv2.DIST_MASK_PRECISE), np.float32)
+    even = cv2.GaussianBlur(closed.astype(np.float32), (0, 0), _EVEN * spacing / step,
+                            borderType=cv2.BORDER_CONSTANT) > _HALF
+    support = cv2.erode(even.astype(np.uint8), disc((_CLOSING - _RIM) * spacing / step))
+    return xs, ys, support > 0
