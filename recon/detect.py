@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon.errors import FaceWithoutDepthError, NoFaceError
+from recon.errors import FaceWithoutDepthError, NoDepthError, NoFaceError
 from recon.face import FaceCandidate
 from recon.registration import Registration
 
@@ -66,6 +66,8 @@ def detect_face(
         Where no box was found, or none is a face's size at its depth.
     FaceWithoutDepthError
         Where faces were seen but nothing was measured on them.
+    NoDepthError
+        Where nothing measured lies before the colour camera.
     """
     scale = min(1.0, _WIDEST / color.shape[1])
     smallest, largest = _box_sizes(registered, focal_px)
@@ -121,6 +123,8 @@ def _grays(color: NDArray[np.uint8], scale: float) -> list[NDArray[np.uint8]]:
 def _box_sizes(registered: Registration, focal_px: float) -> tuple[float, float]:
     """Bound a face's width in pixels by the depths in the scene."""
     z = registered.color_depth[registered.color_depth > 0]
+    if not len(z):
+        raise NoDepthError("no depth lies before the colour camera: is the calibration right?")
     nearest, farthest = (float(value) for value in np.percentile(z, (1, 99)))
     farthest = min(farthest, _FARTHEST_MM)
     nearest = min(max(nearest, _NEAREST_MM), farthest)

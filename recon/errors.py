@@ -13,7 +13,7 @@ class NoFaceError(ReconstructionError):
 
 
 class NoDepthError(ReconstructionError):
-    """The whole depth image is empty."""
+    """The whole depth image is empty, or nothing in it lies before the colour camera."""
 
 
 class FaceWithoutDepthError(ReconstructionError):

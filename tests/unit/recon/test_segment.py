@@ -119,13 +119,27 @@ def test_neck_and_chest_behind_the_chin_are_cut():
     assert face[FACE & (down < 85)].mean() > 0.99
 
 
-def test_spurs_are_removed():
+@pytest.mark.parametrize("half_width", [3, 9])
+def test_spurs_are_removed(half_width):
     x, y = (axis * NEAR for axis in grid())
-    disc = np.hypot(x, y) < 65
-    spur = (np.abs(y) < 3) & (x > 70) & (x < 95)
-    face = kept(registration(np.where(disc | (np.abs(y) < 3) & (x > 0) & (x < 95), NEAR, np.inf)))
-    assert crop_to_box(registration(np.where(spur, NEAR, np.inf)), BOX).sum() > 15
-    assert not face[spur].any()
+    disc = np.hypot(x, y) < 60
+    tongue = (np.abs(y) < half_width) & (x > 0) & (x < 95)
+    registered = registration(np.where(disc | tongue, NEAR, np.inf))
+    assert crop_to_box(registered, BOX)[tongue & (x > 75)].sum() > 15
+    face = kept(registered)
+    assert not face[x > 70].any()
+    assert face[disc].mean() > 0.99
+
+
+def test_an_island_that_hangs_on_by_a_thread_is_removed():
+    x, y = (axis * NEAR for axis in grid())
+    disc = np.hypot(x, y) < 50
+    ear = np.hypot(x - 75, y) < 18
+    registered = registration(np.where(disc | ear | (np.abs(y) < 5) & (x > 0) & (x < 75),
+                                       NEAR, np.inf))
+    assert crop_to_box(registered, BOX)[ear].mean() > 0.95
+    face = kept(registered)
+    assert not face[ear].any()
     assert face[disc].mean() > 0.99
 
 
@@ -142,11 +156,22 @@ def test_colours_along_the_outline_come_from_inside():
     assert np.abs(seeds.colors.astype(int) - (200, 60, 40)).max() <= 2
 
 
+def test_colours_around_a_hole_inside_are_kept():
+    away = np.hypot(*(np.stack(grid()) * NEAR))
+    color = np.full((*HEAD.shape, 3), (200, 150, 120), np.uint8)
+    color[away < 20] = (60, 40, 30)  # an eye, of which the middle is not measured
+    registered = registration(np.where(away < 12, np.inf, HEAD), color)
+    seeds = segment_face(registered, BOX, FOCAL)
+    around = away[tuple(seeds.pixels.T)] < 17
+    assert around.sum() > 20
+    assert (seeds.colors[around] == (60, 40, 30)).all()
+
+
 def test_a_point_that_the_colour_camera_does_not_see_is_coloured_by_its_neighbours():
     nose = ellipsoid(front=NEAR - 60, axes=(14, 20, 70))
     color = np.full((*HEAD.shape, 3), (180, 120, 100), np.uint8)
     registered = registration(np.minimum(HEAD, nose), color, baseline_mm=60)
-    u, _, w, _ = BOX
+    u = BOX[0]
     moved = (u + round(60 * FOCAL / NEAR), *BOX[1:])
     seeds = segment_face(registered, moved, FOCAL)
     unseen = ~registered.visible[tuple(seeds.pixels.T)]

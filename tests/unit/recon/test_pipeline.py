@@ -1,0 +1,300 @@
+"""The whole method on simulated frames."""
+
+import json
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from capture.frame import Calibration, RgbdFrame
+from recon import (
+    FaceWithoutDepthError,
+    NoDepthError,
+    NoFaceError,
+    Preset,
+    ReconstructionError,
+    Report,
+    Settings,
+    TooLittleDepthError,
+    reconstruct,
+)
+from recon.registration import register
+from tests.simulator import Accuracy, Light, Person, Scene, measure, simulate
+
+STAGES = ["registration", "detection", "segmentation", "neighbors", "rbf", "propagation", "total"]
+
+
+def apart(a, b):
+    """Mean distance from the points of one cloud to the nearest of another, mm."""
+    return float(cKDTree(b).query(a)[0].mean())
+
+
+def resampled(frame: RgbdFrame, factor: int | float) -> RgbdFrame:
+    """The frame of a sensor with another resolution of both cameras."""
+    known = frame.calibration
+    if factor > 1:
+        depth = frame.depth.repeat(factor, axis=0).repeat(factor, axis=1)
+        camera = known.depth.scaled(factor)
+    else:
+        every = round(1 / factor)
+        depth = np.ascontiguousarray(frame.depth[::every, ::every])
+        camera = known.depth.scaled(factor).model_copy(update={
+            "cx": known.depth.cx * factor, "cy": known.depth.cy * factor})
+    color = cv2.resize(frame.color, None, fx=factor, fy=factor,
+                       interpolation=cv2.INTER_AREA if factor < 1 else cv2.INTER_LINEAR)
+    calib = Calibration(depth=camera, color=known.color.scaled(factor),
+                        depth_to_color=known.depth_to_color)
+    return replace(frame, depth=depth, color=color, calibration=calib)
+
+
+def registered(frame: RgbdFrame) -> RgbdFrame:
+    """The frame as a driver gives it that registers depth to colour itself."""
+    tied = register(frame)
+    depth = np.full(frame.color.shape[:2], 65535, np.uint16)
+    u, v = np.rint(tied.pixels[tied.visible]).astype(int).T
+    np.minimum.at(depth, (v, u), np.rint(tied.color_depth[tied.visible]).astype(np.uint16))
+    depth[depth == 65535] = 0
+    return replace(frame, depth=depth, registered=True)
+
+
+def shifted(frame: RgbdFrame, right: int, down: int) -> RgbdFrame:
+    """The same images moved by whole pixels, and with them the cameras' axes."""
+    def moved(camera):
+        return camera.model_copy(update={"cx": camera.cx + right, "cy": camera.cy + down})
+
+    known = frame.calibration
+    return RgbdFrame(
+        np.roll(frame.depth, (down, right), (0, 1)), np.roll(frame.color, (down, right), (0, 1)),
+        frame.depth_timestamp_us, frame.color_timestamp_us,
+        known.model_copy(update={"depth": moved(known.depth), "color": moved(known.color)}))
+
+
+def check_sound(face) -> None:
+    """What holds of every face."""
+    initial, dense = face.initial, face.dense
+    for array in (initial.points, dense.points, dense.normals):
+        assert array.dtype == np.float32
+        assert np.isfinite(array).all()
+    assert initial.colors.shape == initial.points.shape
+    assert dense.colors.shape == dense.points.shape
+    np.testing.assert_allclose(np.linalg.norm(dense.normals, axis=1), 1, atol=1e-5)
+    assert (dense.normals[:, 2] < 0).all()
+    flat = dense.cells[:, 0].astype(int) * dense.grid_shape[1] + dense.cells[:, 1]
+    assert (np.diff(flat) > 0).all()
+    assert 8 <= len(dense) / len(initial) <= 11
+    assert (face.report.initial_points, face.report.dense_points) == (len(initial), len(dense))
+
+
+def check_near(found: Accuracy) -> None:
+    assert found.mean_mm < found.raw_mean_mm
+    assert found.lost <= 0.02
+    assert found.elsewhere == 0
+    assert found.gross <= 0.003
+
+
+def test_a_face_is_sound_and_near_the_truth(face, shot):
+    check_sound(face)
+    found = measure(face, shot.truth, shot.frame)
+    check_near(found)
+    assert found.mean_mm < 0.7
+    assert found.covered > 0.95
+
+
+@pytest.mark.parametrize("preset", [Preset.PAPER, Preset.FAITHFUL])
+def test_the_papers_presets(preset, shot, face):
+    one = reconstruct(shot.frame, Settings(preset=preset))
+    check_sound(one)
+    found = measure(one, shot.truth, shot.frame)
+    check_near(found)
+    assert measure(face, shot.truth, shot.frame).mean_mm < found.mean_mm < 1.31
+    assert one.report.settings.preset is preset
+    assert one.report.r0_mm == pytest.approx(6 * one.report.mean_spacing_mm)
+
+
+def test_the_clouds_show_the_same_face(face):
+    assert apart(face.initial.points, face.dense.points) < 1.6
+    # Both are coloured as skin, brows, lips are: alike where they are near each other.
+    _, nearest = cKDTree(face.dense.points[:, :2]).query(face.initial.points[:, :2])
+    off = np.abs(face.dense.colors[nearest].astype(int) - face.initial.colors)
+    assert np.median(off) <= 4
+    assert np.quantile(off, 0.95) < 25
+
+
+def test_the_report_says_what_was_done(face, shot):
+    report = face.report
+    x, y, w, h = report.face_box
+    assert 0 < x < x + w < 640
+    assert 0 < y < y + h < 480
+    assert report.candidates[0].verdict == "chosen"
+    assert report.candidates[0].box == report.face_box
+    assert 1.0 < report.mean_spacing_mm < 1.5
+    assert report.r0_mm == pytest.approx(8 * report.mean_spacing_mm)
+    assert 0.5 < report.noise_mm < 2
+    assert list(report.timings_ms) == STAGES
+    assert all(value >= 0 for value in report.timings_ms.values())
+    laps = sum(value for name, value in report.timings_ms.items() if name != "total")
+    assert laps <= report.timings_ms["total"]
+    assert report.settings == Settings()
+    assert report.calibration == "simulated sensor default"
+    assert report.skew_us == shot.frame.skew_us == 11_700
+    assert report.version
+    assert report.warnings == ()
+    written = report.model_dump_json()
+    assert Report.model_validate_json(written) == report
+    assert {"capture_id", "face_box", "initial_points", "dense_points", "r0_mm",
+            "mean_spacing_mm", "timings_ms", "settings", "version", "warnings"} <= set(
+                json.loads(written))
+
+
+def test_the_same_frame_twice_is_the_same_face(face, shot):
+    again = reconstruct(shot.frame)
+    for cloud in ("initial", "dense"):
+        for name in ("points", "colors"):
+            np.testing.assert_array_equal(
+                getattr(getattr(face, cloud), name), getattr(getattr(again, cloud), name))
+    np.testing.assert_array_equal(face.dense.normals, again.dense.normals)
+    np.testing.assert_array_equal(face.dense.cells, again.dense.cells)
+    assert again.report.candidates == face.report.candidates
+    assert again.report.noise_mm == face.report.noise_mm
+
+
+def test_the_frame_stays_as_it_was(shot):
+    depth, color = shot.frame.depth.copy(), shot.frame.color.copy()
+    reconstruct(shot.frame)
+    np.testing.assert_array_equal(shot.frame.depth, depth)
+    np.testing.assert_array_equal(shot.frame.color, color)
+
+
+@pytest.mark.parametrize(("factor", "error_mm"), [(0.5, 1.0), (2, 0.7)])
+def test_other_resolutions(shot, factor, error_mm):
+    frame = resampled(shot.frame, factor)
+    assert frame.depth.shape == (480 * factor, 640 * factor)
+    one = reconstruct(frame)
+    check_sound(one)
+    found = measure(one, shot.truth, frame)
+    assert found.mean_mm < error_mm
+    assert found.elsewhere == 0
+    assert found.lost <= 0.03
+    assert one.report.mean_spacing_mm == pytest.approx(1.22 / factor, rel=0.15)
+
+
+def test_depth_that_is_registered_already(shot, face):
+    frame = registered(shot.frame)
+    one = reconstruct(frame)
+    check_sound(one)
+    # Its cloud is in the frame of the camera whose pixels it has: the colour camera's.
+    back = one.dense.points - np.float32(
+        frame.calibration.depth_to_color.translation_mm)
+    assert apart(back, face.dense.points) < 1.0
+    assert shot.truth.surface_distance(back).mean() < 0.8
+
+
+@pytest.mark.parametrize(("right", "down"), [(32, -24), (-45, 17)])
+def test_a_moved_frame_is_the_same_face(shot, face, right, down):
+    one = reconstruct(shifted(shot.frame, right, down))
+    check_sound(one)
+    # The cascades look at every other pixel: the box may differ by some.
+    box = np.array(one.report.face_box) - (right, down, 0, 0)
+    assert np.abs(box - face.report.face_box).max() <= 8
+    assert len(one.initial) == pytest.approx(len(face.initial), rel=0.03)
+    _, nearest = cKDTree(face.dense.points[:, :2]).query(one.dense.points[:, :2])
+    off = np.abs(one.dense.points[:, 2] - face.dense.points[nearest, 2])
+    assert np.median(off) < 0.2
+    assert np.quantile(off, 0.95) < 1.0
+
+
+def test_a_box_without_shoulders_and_wall_is_not_cut():
+    """K-means taken literally would cut this face in three."""
+    alone = simulate(Scene((Person(distance_mm=600, shoulders=False),), wall_mm=15_000), seed=6)[0]
+    one = reconstruct(alone.frame)
+    check_sound(one)
+    found = measure(one, alone.truth, alone.frame)
+    check_near(found)
+    assert found.covered > 0.94
+
+
+def test_a_close_wall_a_turned_head_and_a_lamp_from_the_side():
+    hard = simulate(Scene((Person(distance_mm=750, yaw=15),), wall_mm=950,
+                          light=Light((1.0, -0.2, -0.4), 0.9, 0.2)), seed=3)[0]
+    one = reconstruct(hard.frame)
+    check_sound(one)
+    check_near(measure(one, hard.truth, hard.frame))
+
+
+def test_many_holes_are_filled():
+    holed = simulate(Scene((Person(distance_mm=700),), holes=1.0), seed=4)[0]
+    one = reconstruct(holed.frame)
+    check_sound(one)
+    found = measure(one, holed.truth, holed.frame)
+    check_near(found)
+    assert found.covered > 0.9
+
+
+@pytest.mark.parametrize("missing", [0.5, 0.8])
+def test_readings_that_drop_out_at_random(shot, missing):
+    gone = np.random.default_rng(5).random(shot.frame.depth.shape) < missing
+    one = reconstruct(replace(shot.frame, depth=np.where(gone, 0, shot.frame.depth)))
+    check_sound(one)
+    assert shot.truth.surface_distance(one.dense.points).mean() < 0.8
+    assert any("seeds" in warning for warning in one.report.warnings) == (missing > 0.7)
+
+
+def test_frames_far_apart_in_time_are_warned_of(shot):
+    late = replace(shot.frame, depth_timestamp_us=shot.frame.color_timestamp_us - 70_000)
+    report = reconstruct(late).report
+    assert report.skew_us == -70_000
+    assert report.warnings == ("depth and colour were taken -70.0 ms apart",)
+
+
+def emptied(shot):
+    return replace(shot.frame, depth=np.zeros_like(shot.frame.depth))
+
+
+def faceless(shot):
+    return replace(shot.frame, color=np.full_like(shot.frame.color, 128))
+
+
+def unmeasured_face(shot):
+    depth = shot.frame.depth.copy()
+    depth[150:330, 220:420] = 0
+    return replace(shot.frame, depth=depth)
+
+
+def thin_lines(shot):
+    depth = np.zeros_like(shot.frame.depth)
+    depth[::6] = shot.frame.depth[::6]
+    return replace(shot.frame, depth=depth)
+
+
+def poster(shot):
+    depth = np.full_like(shot.frame.depth, 2000)
+    depth[:, :40] = 600
+    return replace(shot.frame, depth=depth)
+
+
+@pytest.mark.parametrize(("spoilt", "error", "message"), [
+    (emptied, NoDepthError, "the depth image is empty"),
+    (faceless, NoFaceError, "no face found in the colour image"),
+    (unmeasured_face, FaceWithoutDepthError, "no depth was measured on it"),
+    (thin_lines, TooLittleDepthError, r"\d+ depth readings on the face, a fit needs at least 50"),
+    (poster, NoFaceError, "mm wide at its depth"),
+])
+def test_what_cannot_be_a_face_is_named(shot, spoilt, error, message):
+    with pytest.raises(error, match=message) as caught:
+        reconstruct(spoilt(shot))
+    assert isinstance(caught.value, ReconstructionError)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_depth_without_sense_is_a_named_error_or_a_sound_face(shot, seed):
+    rng = np.random.default_rng(seed)
+    low, high = ((0, 65536), (600, 800), (690, 720))[seed]
+    depth = rng.integers(low, high, shot.frame.depth.shape).astype(np.uint16)
+    try:
+        one = reconstruct(replace(shot.frame, depth=depth))
+    except ReconstructionError:
+        return
+    check_sound(one)

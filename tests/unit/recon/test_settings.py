@@ -1,0 +1,95 @@
+"""Presets, what is given beside them, and what is refused."""
+
+import pytest
+from pydantic import ValidationError
+
+from recon.settings import Neighbors, Preset, Settings
+
+
+def test_best_is_the_default():
+    assert Settings() == Settings(preset=Preset.BEST) == Settings.of("best")
+    assert Settings().r0_factor == 8
+    assert Settings().coarse_r0_factor == 14
+    assert Settings().neighbors is Neighbors.LATTICE
+
+
+@pytest.mark.parametrize("preset", [Preset.PAPER, Preset.FAITHFUL])
+def test_the_papers_presets_have_its_r0_and_its_trees(preset):
+    settings = Settings.of(preset)
+    assert settings.preset is preset
+    assert settings.r0_factor == 6
+    assert settings.neighbors is Neighbors.RANDOMIZED
+    assert settings.coarse_r0_factor is None
+    assert settings.ratio == 10
+
+
+def test_presets_differ_in_smoothing():
+    assert Settings.of("paper").smoothing < Settings.of("faithful").smoothing
+    assert Settings.of("paper").depth_offset_mm == 0
+
+
+@pytest.mark.parametrize("preset", list(Preset))
+def test_every_setting_of_a_preset_is_in_range(preset):
+    settings = Settings.of(preset)
+    assert Settings.model_validate(settings.model_dump()) == settings
+    assert settings.r0_factor >= 2
+    assert settings.smoothing >= 0.05
+
+
+def test_what_is_given_wins():
+    settings = Settings.of("paper", r0_factor=9, ratio=5)
+    assert (settings.r0_factor, settings.ratio) == (9, 5)
+    assert settings.smoothing == Settings.of("paper").smoothing
+    assert Settings(coarse_r0_factor=None).coarse_r0_factor is None
+    assert Settings(preset="faithful", neighbors="exact").neighbors is Neighbors.EXACT
+
+
+@pytest.mark.parametrize("settings", [Settings(), Settings.of("paper", smoothing=2),
+                                      Settings(coarse_r0_factor=None)])
+def test_json_and_back(settings):
+    assert Settings.model_validate_json(settings.model_dump_json()) == settings
+
+
+def test_equal_settings_are_one_key():
+    assert hash(Settings()) == hash(Settings.of("best"))
+    assert len({Settings(), Settings.of("paper"), Settings(preset="paper")}) == 2
+
+
+def test_settings_do_not_change():
+    with pytest.raises(ValidationError, match="frozen"):
+        Settings().ratio = 3
+
+
+@pytest.mark.parametrize(("given", "name", "message"), [
+    ({"preset": "fastest"}, "preset", "'paper', 'faithful' or 'best'"),
+    ({"r0": 6}, "r0", "not permitted"),
+    ({"r0_factor": 1.9}, "r0_factor", "greater than or equal to 2"),
+    ({"r0_factor": 41}, "r0_factor", "less than or equal to 40"),
+    ({"r0_factor": float("nan")}, "r0_factor", "Input should be"),
+    ({"r0_factor": 0.0}, "r0_factor", "greater than or equal to 2"),
+    ({"smoothing": 0}, "smoothing", "0.05"),
+    ({"smoothing": float("inf")}, "smoothing", "1000"),
+    ({"coarse_r0_factor": 1}, "coarse_r0_factor", "2"),
+    ({"coarse_smoothing": -1}, "coarse_smoothing", "0.05"),
+    ({"neighbors": "guessed"}, "neighbors", "'randomized', 'exact' or 'lattice'"),
+    ({"depth_offset_mm": 11}, "depth_offset_mm", "10"),
+    ({"ratio": 0}, "ratio", "1"),
+    ({"ratio": 1000}, "ratio", "100"),
+    ({"ratio": "ten"}, "ratio", "valid number"),
+])
+def test_what_is_wrong_is_named(given, name, message):
+    with pytest.raises(ValidationError) as caught:
+        Settings(**given)
+    (error,) = caught.value.errors()
+    assert error["loc"] == (name,)
+    assert message in error["msg"]
+
+
+def test_a_list_is_no_settings():
+    with pytest.raises(ValidationError, match="dictionary"):
+        Settings.model_validate([1, 2])
+
+
+def test_an_unknown_preset_is_named():
+    with pytest.raises(ValueError, match="'fastest' is not a valid Preset"):
+        Settings.of("fastest")

@@ -1,0 +1,81 @@
+"""Where a surface is supported: over the seeds and the holes they enclose."""
+
+import cv2
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+from recon.support import support_on_grid
+from tests.unit.recon.shapes import disc_seeds
+
+
+def supported(points, spacing, step=None):
+    """The grid's points with support, (k, 2), those without, and their distance to a seed."""
+    xs, ys, support = support_on_grid(points, spacing, step or spacing / np.sqrt(10))
+    grid = np.stack(np.meshgrid(xs, ys), axis=-1)
+    return grid[support], grid[~support]
+
+
+def to_seed(grid, points):
+    return np.asarray(cKDTree(points[:, :2]).query(grid)[0])
+
+
+@settings(deadline=None, max_examples=25)
+@given(spacing=st.floats(0.8, 4), radius=st.floats(10, 25), hole=st.floats(0, 0.6),
+       x=st.floats(-300, 300), y=st.floats(-300, 300), seed=st.integers(0, 99))
+def test_covers_seeds_and_holes_but_no_rim(spacing, radius, hole, x, y, seed):
+    """Radius in spacings, hole as a share of it."""
+    radius, hole = radius * spacing, hole * radius * spacing
+    points = disc_seeds(spacing, radius, hole, seed=seed) + np.float32((x, y, 0))
+    inside, outside = supported(points, spacing)
+    middle = np.hypot(*(inside - (x, y)).T)
+    # Nothing past the rim: at most half a spacing beyond the outermost seeds.
+    assert middle.max() <= radius + 0.5 * spacing
+    assert to_seed(inside[middle > hole + spacing], points).max() <= 1.4 * spacing
+    # The hole is filled, and nothing else is left out but the rim itself.
+    assert np.hypot(*(outside - (x, y)).T).min() > radius - 1.5 * spacing
+
+
+def test_a_bay_open_to_the_outside_is_no_hole():
+    points = disc_seeds(1.0, 30)
+    bay = (points[:, 0] > 0) & (np.abs(points[:, 1]) < 6)
+    inside, _ = supported(points[~bay], 1.0)
+    assert not ((inside[:, 0] > 5) & (np.abs(inside[:, 1]) < 4.5)).any()
+
+
+def test_two_parts_are_not_joined():
+    parts = [disc_seeds(1.0, 12) + np.float32((x, 0, 0)) for x in (-15, 15)]
+    inside, _ = supported(np.concatenate(parts), 1.0)
+    assert not (np.abs(inside[:, 0]) < 2).any()
+    assert (inside[:, 0] < -3).sum() > 3000
+    assert (inside[:, 0] > 3).sum() > 3000
+
+
+def roundness(points):
+    """Perimeter squared over area, 1 for a circle."""
+    support = support_on_grid(points, 1.0, 0.3)[2].astype(np.uint8)
+    outlines, _ = cv2.findContours(support, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    perimeter = sum(cv2.arcLength(outline, True) for outline in outlines)
+    return perimeter**2 / (4 * np.pi * support.sum())
+
+
+def test_frayed_edges_are_evened_out():
+    points = disc_seeds(1.0, 25, jitter=0)
+    far, turn = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
+    frayed = points[(far < 22) | (np.sin(40 * turn) > 0)]
+    assert roundness(points) < 1.2
+    assert roundness(frayed) < 1.5
+    inside, _ = supported(frayed, 1.0)
+    assert to_seed(inside, frayed).max() < 2.2
+    assert np.hypot(*inside.T).max() <= 25.4
+
+
+def test_the_grid_is_regular_and_its_border_empty():
+    points = disc_seeds(1.5, 20)
+    xs, ys, support = support_on_grid(points, 1.5, 0.5)
+    np.testing.assert_allclose(np.diff(xs), 0.5)
+    np.testing.assert_allclose(np.diff(ys), 0.5)
+    assert support.shape == (len(ys), len(xs))
+    assert not support[[0, -1]].any()
+    assert not support[:, [0, -1]].any()
