@@ -71,9 +71,10 @@ class _Process:
 
     def start(self) -> None:
         environment = os.environ | self.spec.environment | {PARENT_VARIABLE: str(os.getpid())}
-        # In a group of its own: Ctrl-C reaches the supervisor alone, which stops all in order.
+        # -P: a folder `service` where the user stands is not ours. In a group of its own: Ctrl-C
+        # reaches the supervisor alone, which stops all in order.
         self.running = subprocess.Popen(
-            [sys.executable, "-m", "service", *self.spec.arguments],
+            [sys.executable, "-P", "-m", "service", *self.spec.arguments],
             env=environment, stdin=subprocess.DEVNULL, process_group=0)
 
     def ended(self) -> int | None:

@@ -30,9 +30,9 @@ def test_covers_seeds_and_holes_but_no_rim(spacing, radius, hole, x, y, seed):
     points = disc_seeds(spacing, radius, hole, seed=seed) + np.float32((x, y, 0))
     inside, outside = supported(points, spacing)
     middle = np.hypot(*(inside - (x, y)).T)
-    # Nothing past the rim: at most about a third of a spacing beyond the outermost seeds.
-    assert middle.max() <= radius + 0.4 * spacing
-    assert to_seed(inside[middle > hole + spacing], points).max() <= spacing
+    # Nothing past the rim: at most half a spacing beyond the outermost seeds.
+    assert middle.max() <= radius + 0.5 * spacing
+    assert to_seed(inside[middle > hole + spacing], points).max() <= 1.4 * spacing
     # The hole is filled, and nothing else is left out but the rim itself.
     assert np.hypot(*(outside - (x, y)).T).min() > radius - 1.5 * spacing
 

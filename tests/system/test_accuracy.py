@@ -1,0 +1,116 @@
+"""Faces of the recordings against the true surface; `python -m bench.accuracy` prints the figures.
+
+The bounds lie 5-8 % outside what is reached today, so that a step back shows. The goal is a mean
+error of at most 0.6 mm and 96 % of the visible face within 2 mm of a point at 0.7-0.8 m.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import pytest
+
+from capture.frame import RgbdFrame
+from recon import Face, NoFaceError, Preset, Settings, reconstruct
+from tests.simulator import Accuracy, Truth, measure
+from tests.virtual_sensor.fixtures import FOLDER
+from tests.virtual_sensor.process import play
+
+# Most mean error, mm, and least share of the face within 2 mm, of the `best` preset.
+BOUNDS = {
+    "dark_skin": (0.72, 0.915),
+    "face_fills_box": (0.57, 0.940),
+    "far_1000": (0.88, 0.860),
+    "frontal_700": (0.65, 0.930),
+    "many_holes": (0.71, 0.905),
+    "side_light": (0.63, 0.935),
+    "turned_18": (0.66, 0.935),
+    "two_people": (0.65, 0.930),
+    "wall_close": (0.65, 0.935),
+}
+# As reported for the method on real sensors.
+PAPER_MEAN_MM = 1.31
+
+
+@dataclass
+class Taken:
+    """The first frame of a recording, and its faces, each reconstructed once."""
+
+    name: str
+    frame: RgbdFrame
+    truth: Truth
+
+    @cached_property
+    def faces(self) -> dict[Preset, Face]:
+        return {preset: reconstruct(self.frame, Settings(preset=preset)) for preset in Preset}
+
+    @cached_property
+    def accuracy(self) -> dict[Preset, Accuracy]:
+        return {preset: measure(face, self.truth, self.frame)
+                for preset, face in self.faces.items()}
+
+    @property
+    def best(self) -> Accuracy:
+        return self.accuracy[Preset.BEST]
+
+
+def first_frame(name: str) -> RgbdFrame:
+    (frame,), _ = play(FOLDER / f"{name}.oni", most=1)
+    return frame
+
+
+@pytest.fixture(scope="module", params=list(BOUNDS))
+def taken(request):
+    return Taken(request.param, first_frame(request.param),
+                 Truth.load(FOLDER / f"{request.param}.truth.npz"))
+
+
+def test_every_recording_with_a_truth_is_measured():
+    assert sorted(BOUNDS) == sorted(
+        path.name.removesuffix(".truth.npz") for path in FOLDER.glob("*.truth.npz"))
+
+
+def test_the_mean_error_is_small_and_below_the_sensors_own(taken):
+    most, _ = BOUNDS[taken.name]
+    assert taken.best.mean_mm <= most
+    for found in taken.accuracy.values():
+        assert found.mean_mm < found.raw_mean_mm
+
+
+def test_the_face_is_covered(taken):
+    _, least = BOUNDS[taken.name]
+    assert taken.best.covered >= least
+
+
+def test_hardly_a_point_is_far_off(taken):
+    for found in taken.accuracy.values():
+        assert found.gross <= 0.003
+
+
+def test_nothing_of_the_face_is_cut_off_and_nothing_else_kept(taken):
+    for found in taken.accuracy.values():
+        assert found.lost <= 0.02
+        assert found.elsewhere == 0
+
+
+def test_about_ten_points_for_each_seed(taken):
+    for found in taken.accuracy.values():
+        assert 8 <= found.ratio <= 11
+
+
+def test_each_preset_is_better_than_the_one_before(taken):
+    paper, faithful, best = (taken.accuracy[preset].mean_mm for preset in Preset)
+    assert best < faithful < paper < PAPER_MEAN_MM
+
+
+@pytest.mark.parametrize("taken", ["two_people"], indirect=True)
+def test_the_nearer_of_two_people_is_chosen(taken):
+    chosen, *others = taken.faces[Preset.BEST].report.candidates
+    assert chosen.verdict == "chosen"
+    assert 700 < chosen.depth_mm < 850
+    assert [(c.verdict, c.depth_mm > 1100) for c in others] == [("farther", True)]
+    assert taken.faces[Preset.BEST].dense.points[:, 2].max() < 1000
+
+
+def test_nobody_is_found_in_an_empty_room():
+    with pytest.raises(NoFaceError, match="no face found"):
+        reconstruct(first_frame("empty_room"))
