@@ -23,7 +23,8 @@ from recon import (
 from recon.registration import register
 from tests.simulator import Accuracy, Light, Person, Scene, measure, simulate
 
-STAGES = ["registration", "detection", "segmentation", "neighbors", "rbf", "propagation", "total"]
+STAGES = ["overview", "detection", "registration", "segmentation", "neighbors", "rbf",
+          "propagation", "total"]
 
 
 def apart(a, b):
