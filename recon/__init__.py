@@ -14,6 +14,7 @@ from recon.settings import Neighbors, Preset, Settings
 
 if TYPE_CHECKING:
     from recon.pipeline import reconstruct
+    from recon.warmup import warm
 
 __all__ = [
     "DenseCloud",
@@ -29,6 +30,7 @@ __all__ = [
     "Settings",
     "TooLittleDepthError",
     "reconstruct",
+    "warm",
 ]
 
 
@@ -38,6 +40,10 @@ def __getattr__(name: str) -> object:
         from recon.pipeline import reconstruct
 
         return reconstruct
+    if name == "warm":
+        from recon.warmup import warm
+
+        return warm
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -62,6 +62,22 @@ class AdaptiveSurface:
         fine, coarse = self.fine.gradient_on_grid(xs, ys), self.coarse.gradient_on_grid(xs, ys)
         return (coarse[0] + gain * (fine[0] - coarse[0]), coarse[1] + gain * (fine[1] - coarse[1]))
 
+    def sampled(
+        self, xs: NDArray[np.float64], ys: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+        """Give f, df/dx, df/dy on an axis-aligned grid at once, in single precision.
+
+        As `Surface.sampled`: (k,), (m,) mm -> (m, k) each.
+        """
+        gain = self._gain(xs, ys)
+        found = []
+        for one, other in zip(self.fine.sampled(xs, ys), self.coarse.sampled(xs, ys), strict=True):
+            one -= other
+            one *= gain
+            one += other
+            found.append(one)
+        return found[0], found[1], found[2]
+
     def _gain(self, xs: NDArray[np.float64], ys: NDArray[np.float64]) -> NDArray[np.float32]:
         columns = np.tile((xs - self.origin[0]) / self.step, (len(ys), 1)).astype(np.float32)
         rows = np.tile((ys - self.origin[1]) / self.step, (len(xs), 1)).T.astype(np.float32)

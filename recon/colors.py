@@ -4,9 +4,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from recon._image_kernels import blur, divide
+
 __all__ = ["average_neighbors"]
 
 _LEAST_WEIGHT = 0.05
+# The blur's, in units of its radius.
+_REACH = 4
 _SMALLEST = 4
 
 
@@ -43,20 +47,18 @@ def average_neighbors(
     sums[places[:, 0], places[:, 1], :3] = colors
     sums[places[:, 0], places[:, 1], 3] = 1
     mean = _mean(sums, wanted, radius, _LEAST_WEIGHT / spacing**2)
-    return np.rint(mean).astype(np.uint8)
+    return np.asarray(cv2.convertScaleAbs(mean), np.uint8)  # rounds
 
 
 def _mean(
     sums: NDArray[np.float32], wanted: NDArray[np.bool_], radius: float, least: float
 ) -> NDArray[np.float32]:
     """Blur; where there is too little near, ask the same of the image at half its size."""
-    blurred = cv2.GaussianBlur(sums, (0, 0), radius, borderType=cv2.BORDER_CONSTANT)
-    count = blurred[..., 3]
+    reach = round(_REACH * radius)
+    taps = np.asarray(cv2.getGaussianKernel(2 * reach + 1, radius, cv2.CV_32F), np.float32)
+    blurred = blur(sums, taps.ravel())
     smallest = max(wanted.shape) <= _SMALLEST
-    known = wanted & (count > (0 if smallest else least))
-    mean = np.zeros((*wanted.shape, 3), np.float32)
-    mean[known] = blurred[known, :3] / count[known, None]
-    missing = wanted & ~known
+    mean, missing = divide(blurred, wanted, 0.0 if smallest else least)
     if missing.any() and not smallest:
         half = (-(-wanted.shape[1] // 2), -(-wanted.shape[0] // 2))
         below = cv2.resize(missing.astype(np.float32), half, interpolation=cv2.INTER_AREA)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from recon._image_kernels import collect
 from recon.adapt import AdaptiveSurface
 from recon.colors import average_neighbors
 from recon.face import DenseCloud
@@ -35,19 +36,16 @@ def densify(
     step = float(np.sqrt(area / (ratio * len(seeds.points))))
     xs, ys, support = support_on_grid(seeds.points, spacing, step)
 
-    cells = np.argwhere(support).astype(np.int32)
-    z = surface.on_grid(xs, ys)[support]
-    points = np.column_stack([xs[cells[:, 1]], ys[cells[:, 0]], z]).astype(np.float32)
+    heights, slopes_x, slopes_y = surface.sampled(xs, ys)
+    places = np.rint((seeds.points[:, 1::-1] - (ys[0], xs[0])) / step).astype(np.intp)
     colors = average_neighbors(
-        seeds.colors, np.rint((seeds.points[:, 1::-1] - (ys[0], xs[0])) / step).astype(np.intp),
-        support, _COLOR_RADIUS * spacing / step, spacing / step)
-    slope_x, slope_y = (g[support] for g in surface.gradient_on_grid(xs, ys))
-    normals = np.column_stack([slope_x, slope_y, -np.ones_like(slope_x)])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        seeds.colors, places, support, _COLOR_RADIUS * spacing / step, spacing / step)
+    points, normals, colors, cells = collect(
+        support, xs, ys, heights, slopes_x, slopes_y, colors)
     return DenseCloud(
         points=points,
-        colors=colors[support],
-        normals=normals.astype(np.float32),
+        colors=colors,
+        normals=normals,
         cells=cells,
         grid_shape=support.shape,
         grid_step_mm=step,

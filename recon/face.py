@@ -59,7 +59,9 @@ class DenseCloud(PointCloud):
         super().__post_init__()
         _check("normals", self.normals, np.float32, (len(self.points), 3))
         _check("cells", self.cells, np.int32, (len(self.points), 2))
-        if len(self.cells) and (self.cells.min() < 0 or (self.cells >= self.grid_shape).any()):
+        rows, columns = self.cells[:, 0], self.cells[:, 1]
+        if len(self.cells) and (self.cells.min() < 0 or rows.max() >= self.grid_shape[0]
+                                or columns.max() >= self.grid_shape[1]):
             raise ValueError(f"cells must lie on the {self.grid_shape} grid")
 
 

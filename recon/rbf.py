@@ -14,6 +14,7 @@ ones over a regular grid of nodes t with step q R0:
 so Phi = A A^T with A = sqrt(c0) g(x_i - t), and instead of one unknown for each seed there is one
 for each node: (A^T W A + lambda I) alpha = A^T W (z - p). The matrix is banded, and needs no
 loop over pairs:  g(x - t) g(x - t') = exp(-|t - t'|^2 / R0^2) exp(-4 |x - (t + t')/2|^2 / R0^2).
+The sums over seeds that are left are products of thin matrices too, see `recon._gridding`.
 """
 
 from dataclasses import dataclass
@@ -21,7 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._kernels import CHANNELS, conjugate_gradients, spread, spread_density
+from recon._gridding import Charges, gaussians
+from recon._kernels import conjugate_gradients
 from recon.errors import TooLittleDepthError
 
 __all__ = ["MIN_SEEDS", "Surface", "fit_surface"]
@@ -75,25 +77,57 @@ class Surface:
         -------
         (m, k) float64, mm
         """
-        ey, ex = _basis(ys, self.nodes_y, self.r0), _basis(xs, self.nodes_x, self.r0)
-        u, v = self._normalised(xs, ys)
-        b = self.beta
-        heights: NDArray[np.float64] = (ey @ self.alpha) @ ex.T
-        heights += b[0] + b[1] * u + b[3] * u * u
-        heights += (b[2] * v + b[5] * v * v)[:, None] + b[4] * np.outer(v, u)
+        (across, _), (down, _) = self._factors(xs, 0), self._factors(ys, 1)
+        heights: NDArray[np.float64] = (down @ self._weights()) @ across.T
         return heights
 
     def gradient_on_grid(
         self, xs: NDArray[np.float64], ys: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Differentiate the surface on an axis-aligned grid: (df/dx, df/dy), each (m, k)."""
-        ey, ex = _basis(ys, self.nodes_y, self.r0), _basis(xs, self.nodes_x, self.r0)
-        along_x = (ey @ self.alpha) @ _slope(ex, xs, self.nodes_x, self.r0).T
-        along_y = _slope(ey, ys, self.nodes_y, self.r0) @ (self.alpha @ ex.T)
-        u, v = self._normalised(xs, ys)
+        (across, slope_x), (down, slope_y) = self._factors(xs, 0), self._factors(ys, 1)
+        weights = self._weights()
+        return (down @ weights) @ slope_x.T, slope_y @ (weights @ across.T)
+
+    def sampled(
+        self, xs: NDArray[np.float64], ys: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+        """Give f, df/dx, df/dy on an axis-aligned grid at once, in single precision.
+
+        Parameters
+        ----------
+        xs, ys : (k,), (m,) float64, mm
+
+        Returns
+        -------
+        heights, slopes_x, slopes_y : (m, k) float32, mm and unitless
+        """
+        (across, slope_x), (down, slope_y) = self._factors(xs, 0), self._factors(ys, 1)
+        weights = self._weights()
+        lines = down @ weights
+        # Rounded after the products: BLAS rounds otherwise on more threads.
+        return ((lines @ across.T).astype(np.float32), (lines @ slope_x.T).astype(np.float32),
+                ((slope_y @ weights) @ across.T).astype(np.float32))
+
+    def _factors(
+        self, values: NDArray[np.float64], axis: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The nodes' Gaussians and 1, t, t^2 of the polynomial along one axis, and their slopes."""
+        nodes = self.nodes_y if axis else self.nodes_x
+        basis = _basis(values, nodes, self.r0)
+        t = (values - self.center[axis]) / self.scale
+        one = np.ones_like(t)
+        return (np.column_stack([basis, one, t, t * t]),
+                np.column_stack([_slope(basis, values, nodes, self.r0), 0 * t,
+                                 one / self.scale, 2 * t / self.scale]))
+
+    def _weights(self) -> NDArray[np.float64]:
+        """What stands between the factors of y and those of x."""
+        weights = np.zeros((len(self.nodes_y) + 3, len(self.nodes_x) + 3))
+        weights[:-3, :-3] = self.alpha
         b = self.beta
-        return (along_x + (b[1] + 2 * b[3] * u + b[4] * v[:, None]) / self.scale,
-                along_y + ((b[2] + 2 * b[5] * v)[:, None] + b[4] * u) / self.scale)
+        weights[-3:, -3:] = [[b[0], b[1], b[3]], [b[2], b[4], 0], [b[5], 0, 0]]
+        return weights
 
     def at(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
         """Evaluate at scattered points: (n, 2) mm -> (n,) mm."""
@@ -115,11 +149,6 @@ class Surface:
         dy = dy + (b[2] + 2 * b[5] * v + b[4] * u) / self.scale
         slope: NDArray[np.float64] = np.hypot(dx, dy)
         return slope
-
-    def _normalised(
-        self, xs: NDArray[np.float64], ys: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return (xs - self.center[0]) / self.scale, (ys - self.center[1]) / self.scale
 
 
 def fit_surface(
@@ -161,15 +190,20 @@ def fit_surface(
     Q = P.T @ PW
     trend = np.linalg.solve(Q, PW.T @ z)
     rest = z - P @ trend
-    root = 2 * q / np.sqrt(np.pi)  # sqrt(c0)
-    values = np.zeros((len(z), CHANNELS), np.float32)
-    values[:, :6], values[:, 6] = root * PW, root * W * rest
-    sums = spread(x, y, values, 2 * q * q, near, len(nodes_y), len(nodes_x))
-    C, right = sums[..., :6].reshape(-1, 6).astype(np.float64), sums[..., 6]
+    root = float(2 * q / np.sqrt(np.pi))  # sqrt(c0)
+    charges = Charges.of(x, y, np.column_stack([W, W * rest]))
+    sums, right = _node_sums(charges, len(nodes_x), len(nodes_y), 2 * q * q,
+                             (charges.x * q * r0 + nodes_x[0] - center[0]) / scale,
+                             (charges.y * q * r0 + nodes_y[0] - center[1]) / scale)
+    C, right = root * sums.reshape(6, -1).T, root * right
     flat = _Flat(len(nodes_y), len(nodes_x), far)
-    weight = W.astype(np.float32)
-    density = spread_density(2 * (x + far), 2 * (y + far), weight, q * q, far, flat.rows,
-                             flat.width).reshape(2, 2, -1)
+    half_x, half_y = (np.arange(2 * n) / 2 - far for n in (flat.width, flat.rows))
+    halves = (gaussians(half_y, charges.y, 4 * q * q) @ charges.shares[0]
+              ) @ gaussians(half_x, charges.x, 4 * q * q).T
+    # As four planes of every second point.
+    density = np.ascontiguousarray(
+        halves.reshape(flat.rows, 2, flat.width, 2).transpose(1, 3, 0, 2), np.float32
+    ).reshape(2, 2, -1)
     G = np.linalg.solve(np.linalg.cholesky(Q), C.T).reshape(6, len(nodes_y), len(nodes_x))
     alpha, _ = conjugate_gradients(
         density, _decay(q, far), smoothing, flat.pad(G), flat.pad(np.ones((1, *right.shape)))[0],
@@ -181,6 +215,23 @@ def fit_surface(
     squares = (W * rest * rest).sum() - (found * right).sum() - smoothing * (found * found).sum()
     return Surface(nodes_x, nodes_y, root * found, beta, center, scale, r0,
                    noise=float(np.sqrt(max(squares, 0.0) / W.sum())))
+
+
+def _node_sums(
+    charges: Charges, columns: int, rows: int, sharpness: float,
+    u: NDArray[np.float64], v: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Sum g(x_i - t) W_i times each term of the polynomial, (6, rows, columns), and W_i rest_i.
+
+    u, v : where the charges are, normalised
+    """
+    across = gaussians(np.arange(columns, dtype=np.float64), charges.x, sharpness)
+    down = gaussians(np.arange(rows, dtype=np.float64), charges.y, sharpness)
+    weight, rest = charges.shares
+    by_v = [(down * v**power) @ weight for power in range(3)]
+    by_u = [(across * u**power).T for power in range(3)]
+    terms = [by_v[b] @ by_u[a] for a, b in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))]
+    return np.stack(terms), (down @ rest) @ by_u[0]
 
 
 @dataclass(frozen=True)
@@ -245,8 +296,9 @@ def _checked(
         raise ValueError(f"weights must be ({len(points)},), positive and finite")
     if len(points) < MIN_SEEDS:
         raise TooLittleDepthError(f"{len(points)} seeds, a fit needs at least {MIN_SEEDS}")
-    extent = np.linalg.svd(checked[:, :2] - checked[:, :2].mean(axis=0), compute_uv=False)
-    if extent[1] <= _COLLINEAR * extent[0]:
+    centered = checked[:, :2] - checked[:, :2].mean(axis=0)
+    least, most = np.linalg.eigvalsh(centered.T @ centered)
+    if least <= _COLLINEAR**2 * most:
         raise TooLittleDepthError(f"the {len(points)} seeds lie on a line: no surface to fit")
     return checked, W
 

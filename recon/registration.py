@@ -1,7 +1,6 @@
 """Stage 1: every depth pixel as a 3D point, and where the colour camera sees it."""
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -18,8 +17,6 @@ _HIDDEN_MM = 15.0
 _HIDDEN_SHARE = 0.02
 
 _ALL = slice(None)
-
-_T = TypeVar("_T", bound=np.generic)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,58 +70,50 @@ def register(
     valid = depth > 0
     if not valid.any():
         raise NoDepthError("the depth image is empty: every pixel is 0 (no reading)")
-    z = depth[valid] + np.float64(depth_offset_mm)
-    rays = frame.depth_camera.rays()[rows, columns][valid]
-    points = np.concatenate([rays * z[:, None], z[:, None]], axis=1)
-    moved = frame.depth_to_color.apply(points)
+    z = np.where(valid, depth + np.float32(depth_offset_mm), np.float32(0))
+    points = np.empty((*depth.shape, 3), np.float32)
+    np.multiply(frame.depth_camera.rays()[rows, columns], z[..., None], out=points[..., :2])
+    points[..., 2] = z
+    moved = frame.depth_to_color.apply(points.reshape(-1, 3)).reshape(points.shape)
+    color_z = moved[..., 2]
+    color_z[~valid | (color_z <= 0)] = np.nan  # and so is all that follows from it
     color_camera = frame.calibration.color
-    in_front = moved[:, 2] > 0
-    uv = np.full((len(points), 2), np.nan)
-    uv[in_front] = color_camera.project(moved[in_front])
-    inside = in_front & ((uv > -0.5) & (uv < (color_camera.width - 0.5,
-                                              color_camera.height - 0.5))).all(axis=1)
-    seen = inside.copy()
+    pixels = color_camera.project(moved).astype(np.float32)
+    u, v = pixels[..., 0], pixels[..., 1]
+    inside = ((u > -0.5) & (u < color_camera.width - 0.5)
+              & (v > -0.5) & (v < color_camera.height - 0.5))
     pitch = max(1.0, color_camera.fx / frame.depth_camera.fx * (rows.step or 1))
-    seen[inside] = _unhidden(uv[inside], moved[inside, 2], pitch,
-                             (color_camera.height, color_camera.width))
-
-    visible = _scatter(valid, seen)
-    pixels = _scatter(valid, uv.astype(np.float32), fill=np.nan)
+    visible = inside
+    visible[inside] = _unhidden(u[inside], v[inside], color_z[inside].astype(np.float32), pitch,
+                                (color_camera.height, color_camera.width))
     colors = np.asarray(cv2.remap(
-        frame.color, pixels[..., 0], pixels[..., 1], cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE), np.uint8)
+        frame.color, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.uint8)
     colors[~visible] = 0
     return Registration(
         rows=rows,
         columns=columns,
-        points=_scatter(valid, points.astype(np.float32)),
+        points=points,
         valid=valid,
         pixels=pixels,
-        color_depth=_scatter(valid, np.where(in_front, moved[:, 2], 0).astype(np.float32)),
+        color_depth=np.nan_to_num(color_z.astype(np.float32)),
         visible=visible,
         colors=colors,
     )
 
 
 def _unhidden(
-    uv: NDArray[np.float64], z: NDArray[np.float64], pitch: float, shape: tuple[int, int]
+    u: NDArray[np.float32], v: NDArray[np.float32], z: NDArray[np.float32], pitch: float,
+    shape: tuple[int, int],
 ) -> NDArray[np.bool_]:
     """Say which points no nearer one hides, by a z-buffer with cells of one depth pixel's size."""
-    cells = np.floor((uv + 0.5) / pitch).astype(np.intp)
+    row, column = (((one + np.float32(0.5)) / np.float32(pitch)).astype(np.intp) for one in (v, u))
     rows, columns = (int(np.ceil(side / pitch)) + 1 for side in shape)
-    flat = cells[:, 1] * columns + cells[:, 0]
+    flat = row * columns + column
     nearest = np.full(rows * columns, np.inf, np.float32)
-    np.minimum.at(nearest, flat, z.astype(np.float32))
+    np.minimum.at(nearest, flat, z)
     # Each point covers about its cell and the next: without this, a far surface would shine
     # through between the samples of a near one.
     covered = cv2.erode(nearest.reshape(rows, columns), np.ones((3, 3), np.uint8)).ravel()
-    unhidden: NDArray[np.bool_] = z <= covered[flat] + np.maximum(_HIDDEN_MM, _HIDDEN_SHARE * z)
+    unhidden: NDArray[np.bool_] = z <= covered[flat] + np.maximum(
+        np.float32(_HIDDEN_MM), np.float32(_HIDDEN_SHARE) * z)
     return unhidden
-
-
-def _scatter(
-    valid: NDArray[np.bool_], values: NDArray[_T], fill: float = 0
-) -> NDArray[_T]:
-    image = np.full(valid.shape + values.shape[1:], fill, values.dtype)
-    image[valid] = values
-    return image

@@ -33,12 +33,10 @@ def support_on_grid(
     support : (rows, columns) bool
     """
     reach = (_CLOSING + _EVEN) * spacing
-    low, high = points[:, :2].min(axis=0) - reach, points[:, :2].max(axis=0) + reach
-    columns, rows = (int(n) for n in np.ceil((high - low) / step) + 1)
-    xs, ys = low[0] + step * np.arange(columns), low[1] + step * np.arange(rows)
-    place = np.rint((points[:, :2] - low) / step).astype(np.intp)
-    seeded = np.zeros((rows, columns), np.uint8)
-    seeded[place[:, 1], place[:, 0]] = 1
+    x, y = points[:, 0], points[:, 1]
+    xs, ys = _axis(x, reach, step), _axis(y, reach, step)
+    seeded = np.zeros((len(ys), len(xs)), np.uint8)
+    seeded[_nearest(y, ys[0], step), _nearest(x, xs[0], step)] = 1
     closed = fill_holes(
         np.asarray(cv2.dilate(seeded, disc(_CLOSING * spacing / step)), np.uint8))
     # The sensor leaves an edge frayed: its outline is evened out, neither grown nor shrunk.
@@ -46,3 +44,13 @@ def support_on_grid(
                             borderType=cv2.BORDER_CONSTANT) > _HALF
     support = cv2.erode(even.astype(np.uint8), disc((_CLOSING - _RIM) * spacing / step))
     return xs, ys, support > 0
+
+
+def _axis(values: NDArray[np.float32], reach: float, step: float) -> NDArray[np.float64]:
+    low, high = float(values.min()) - reach, float(values.max()) + reach
+    return low + step * np.arange(int(np.ceil((high - low) / step)) + 1, dtype=np.float64)
+
+
+def _nearest(values: NDArray[np.float32], low: float, step: float) -> NDArray[np.intp]:
+    places: NDArray[np.intp] = np.rint((values - low) / step).astype(np.intp)
+    return places

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import cv2
 import structlog
 
-from recon import ReconstructionError, reconstruct
+from recon import ReconstructionError, reconstruct, warm
 from recon.face import Face
 from service.background import Background
 from service.link import HubLink
@@ -23,11 +23,12 @@ __all__ = ["run"]
 def run(settings: ServiceSettings) -> int:
     """Work until SIGINT or SIGTERM, finish the job under way and give the exit status."""
     cv2.setNumThreads(1)  # one worker for each core; more threads would only fight
-    with (StopSignal() as stop, Background[Face]("recon") as compute,
-          HubLink(settings, "worker") as link):
-        worker = _Worker(settings, link, compute)
-        worker.serve(stop)
-        worker.finish()
+    with StopSignal() as stop:
+        warm()
+        with Background[Face]("recon") as compute, HubLink(settings, "worker") as link:
+            worker = _Worker(settings, link, compute)
+            worker.serve(stop)
+            worker.finish()
         return stop.exit_status
 
 

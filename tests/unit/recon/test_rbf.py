@@ -51,6 +51,10 @@ def test_grid_and_scattered_evaluation_agree():
     dx, dy = surface.gradient_on_grid(xs, ys)
     np.testing.assert_allclose(
         np.hypot(dx, dy).ravel(), surface.slope_at(xy.reshape(-1, 2)), atol=1e-8)
+    heights, along_x, along_y = surface.sampled(xs, ys)
+    assert heights.dtype == along_x.dtype == along_y.dtype == np.float32
+    np.testing.assert_allclose(heights, surface.on_grid(xs, ys), atol=1e-3)
+    np.testing.assert_allclose((along_x, along_y), (dx, dy), atol=1e-5)
 
 
 def test_gradient_is_the_derivative():
