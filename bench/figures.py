@@ -1,0 +1,85 @@
+"""The pictures of docs/benchmarks.md; needs matplotlib, which the dev tools bring along."""
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from bench.cases import GROSS_MM, Case
+from bench.tally import BINS, Tally
+
+mpl.use("Agg")
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+
+__all__ = ["error_histogram", "error_maps", "time_against_seeds"]
+
+_MAP_LARGEST_MM = 3.0
+_COLORS = 128
+
+
+def error_maps(case: Case, errors: dict[str, NDArray[np.float64]], path: Path) -> None:
+    """Draw a face coloured by error, once for each method: (m,) mm at the queries each."""
+    columns = 4
+    rows = -(-len(errors) // columns)
+    figure, axes = plt.subplots(rows, columns, figsize=(9, 3 * rows), layout="compressed")
+    cells = case.face.dense.cells
+    colors = mpl.colormaps["viridis"].with_extremes(bad="white", over="red")
+    shown = None
+    for axis in axes.flat:
+        axis.set_axis_off()
+    for axis, (name, values) in zip(axes.flat, errors.items(), strict=False):
+        image = np.full(case.face.dense.grid_shape, np.nan)
+        image[cells[:, 0], cells[:, 1]] = values
+        shown = axis.imshow(image, cmap=colors, vmin=0, vmax=_MAP_LARGEST_MM,
+                            interpolation="nearest")
+        axis.set_title(f"{_wrapped(name)}\n{np.nanmean(values):.2f} mm", fontsize=7)
+    if shown is not None:
+        figure.colorbar(shown, ax=axes, label="distance from the true surface, mm",
+                        extend="max", shrink=0.6)
+    _save(figure, path, 72)
+
+
+def error_histogram(tallies: list[Tally], path: Path) -> None:
+    """Draw the share of points by error, 0-5.5 mm, the range of the paper's Figure 9."""
+    figure, axis = plt.subplots(figsize=(8, 5), layout="constrained")
+    width = BINS[1] - BINS[0]
+    for tally in tallies:
+        ours = tally.name.startswith("ours")
+        axis.stairs(100 * tally.counts / tally.points / width, BINS, label=tally.name,
+                    linewidth=1.8 if ours else 0.9, linestyle="-" if ours else "--")
+    axis.set(xlim=(0, GROSS_MM), yscale="log", ylim=(0.02, 200),
+             xlabel="distance from the true surface, mm", ylabel="points, % per mm")
+    figure.legend(fontsize=6, loc="outside lower center", ncols=2)
+    _save(figure, path, 90)
+
+
+def time_against_seeds(
+    times: dict[str, list[tuple[int, float]]], path: Path
+) -> None:
+    """Draw time against number of seeds, both logarithmic: (seeds, ms) pairs of each method."""
+    figure, axis = plt.subplots(figsize=(6, 4.8), layout="constrained")
+    for name, pairs in times.items():
+        seeds, ms = zip(*pairs, strict=True)
+        ours = name.startswith("ours")
+        axis.loglog(seeds, ms, "o-" if ours else "s--", label=name, markersize=4,
+                    linewidth=1.8 if ours else 0.9)
+    axis.set(xlabel="seeds", ylabel="ms")
+    axis.grid(which="both", alpha=0.2)
+    figure.legend(fontsize=7, loc="outside lower center", ncols=2)
+    _save(figure, path, 90)
+
+
+def _wrapped(name: str) -> str:
+    return name.replace(", ", "\n", 1).replace(", our R0", "")
+
+
+def _save(figure: Figure, path: Path, dpi: int) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=dpi)
+    plt.close(figure)
+    # A palette keeps the picture small.
+    with Image.open(path) as picture:
+        picture.convert("RGB").quantize(_COLORS).save(path, optimize=True)

@@ -1,0 +1,186 @@
+"""How long a frame takes, stage by stage; the fit against others; growth; memory."""
+
+import argparse
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.cases import Case, recorded, with_preset
+from bench.dense_solve import dense_heights
+from bench.growth import growth
+from bench.machine import describe
+from bench.memory import extra_memory, resident_mb
+from bench.pcl_peer import Pcl, PclMissingError
+from bench.peer_methods import inpaint_points, rbf_points
+from bench.peers import ours_ms
+from recon import Preset, Settings, reconstruct
+from recon.rbf import MIN_SEEDS, fit_surface
+
+__all__: list[str] = []
+
+_OF = "frontal_700/0"
+_R0_FACTOR, _SMOOTHING = 6.0, 3.0
+_SIGMA_PX = 2.0
+_PCL_RADIUS_MM = 10.0
+_SLOW_RUNS = 3
+_FAST_RUNS = 15
+
+
+def _milliseconds(call: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    call()
+    return (time.perf_counter() - start) * 1e3
+
+
+def _frame_times(case: Case, runs: int) -> None:
+    """Whole frames and OpenCV's default detection by turns."""
+    gray = cv2.cvtColor(case.frame.color, cv2.COLOR_RGB2GRAY)
+    folder = Path(cv2.__file__).parent / "data"
+    cascade = cv2.CascadeClassifier(str(folder / "haarcascade_frontalface_default.xml"))
+    laps: dict[str, list[float]] = {}
+    haar: list[float] = []
+    for _ in range(5):
+        reconstruct(case.frame)
+    settled = resident_mb()
+    for _ in range(runs):
+        for name, ms in reconstruct(case.frame).report.timings_ms.items():
+            laps.setdefault(name, []).append(ms)
+        haar.append(_milliseconds(lambda: cascade.detectMultiScale(gray)))
+    print(f"\nWhole frame ({case.name}, preset `best`, {len(case.seeds):,} seeds, "
+          f"{len(case.queries):,} coloured points with normals), {runs} runs by turns with "
+          "OpenCV's default Haar pass on the same image:\n")
+    print("| stage | median, ms | p99, ms |\n| --- | --- | --- |")
+    for name, taken in laps.items():
+        print(f"| {name} | {statistics.median(taken):.1f} | {np.percentile(taken, 99):.1f} |")
+    print(f"| OpenCV `detectMultiScale`, defaults, {gray.shape[1]}x{gray.shape[0]} "
+          f"| {statistics.median(haar):.1f} | {np.percentile(haar, 99):.1f} |")
+    total = statistics.median(laps["total"])
+    print(f"\nRatio of the medians, frame to Haar: {total / statistics.median(haar):.2f} "
+          f"(goal 0.20); p99 to median: {np.percentile(laps['total'], 99) / total:.1f} "
+          f"(goal 1.5).")
+    held = resident_mb()
+    extra = extra_memory(lambda: reconstruct(case.frame))
+    print(f"\nExtra memory for one frame: {extra.arrays:.1f} MiB of arrays (tracemalloc), "
+          f"{extra.resident:.1f} MiB of the resident set (goal 32). Resident set {settled:.0f} MiB "
+          f"before these runs, {held:.0f} after.")
+
+
+def _grid(case: Case) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    low, high = case.queries.min(axis=0), case.queries.max(axis=0)
+    step = case.face.dense.grid_step_mm
+    return (np.arange(low[0], high[0] + step, step), np.arange(low[1], high[1] + step, step))
+
+
+def _fit_times(case: Case, pcl: Pcl | None) -> None:
+    """One fit and its evaluation, and the whole of ours, against others, by turns."""
+    xs, ys = _grid(case)
+    seeds, r0 = case.seeds, _R0_FACTOR * case.spacing
+    calls: dict[str, Callable[[], float]] = {
+        "ours: one fit (R0 = 6h, lambda = 3) and evaluation": lambda: _milliseconds(
+            lambda: fit_surface(seeds, r0, _SMOOTHING).on_grid(xs, ys)),
+        **{f"ours, `{preset.value}`, all after segmentation: spacing, fit, normals, colours":
+           partial(_all_of_ours, case, with_preset(preset))
+           for preset in (Preset.FAITHFUL, Preset.BEST)},
+        "OpenCV inpaint + Gaussian + bicubic": lambda: _milliseconds(
+            lambda: inpaint_points(case, _SIGMA_PX)),
+    }
+    if pcl is not None:
+        calls[f"PCL MovingLeastSquares, radius {_PCL_RADIUS_MM:g} mm"] = lambda: pcl.run(
+            seeds, case.spacing, _PCL_RADIUS_MM)[1]
+    slow = {"scipy RBFInterpolator, 50 neighbours": lambda: _milliseconds(
+        lambda: rbf_points(case, 50))}
+    taken: dict[str, list[float]] = {name: [] for name in (calls | slow)}
+    for run in range(_FAST_RUNS):
+        for name, call in calls.items():
+            taken[name].append(call())
+        if run < _SLOW_RUNS:
+            for name, call in slow.items():
+                taken[name].append(call())
+    print(f"\nFit and evaluation ({case.name}, {len(seeds):,} seeds, {len(case.queries):,} "
+          f"points), medians of {_FAST_RUNS} runs by turns ({_SLOW_RUNS} of scipy):\n")
+    medians = {name: statistics.median(ms) for name, ms in taken.items()}
+    fit, best = (medians[name] for name in list(medians)[:3:2])
+    print("| | ms | over one fit of ours | over all of `best` |\n| --- | --- | --- | --- |")
+    for name, ms in medians.items():
+        print(f"| {name} | {ms:,.1f} | {ms / fit:,.1f} | {ms / best:,.1f} |")
+
+
+def _all_of_ours(case: Case, settings: Settings) -> float:
+    return ours_ms(reconstruct(case.frame, settings).report.timings_ms)
+
+
+def _against_dense(case: Case, count: int) -> None:
+    """The same system with one unknown for each seed, for so many seeds as it can bear."""
+    away = np.linalg.norm(case.seeds[:, :2] - np.median(case.seeds[:, :2], axis=0), axis=1)
+    chosen = np.argsort(away)[:count]
+    seeds, r0 = case.seeds[chosen], _R0_FACTOR * case.spacing
+    low, high = seeds[:, :2].min(axis=0), seeds[:, :2].max(axis=0)
+    side = int(np.sqrt(10 * len(seeds)))
+    xs, ys = np.linspace(low[0], high[0], side), np.linspace(low[1], high[1], side)
+    queries = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
+    inside = np.linalg.norm(queries - np.median(case.seeds[:, :2], axis=0), axis=1) < (
+        away[chosen].max())
+    results: dict[str, Any] = {}
+
+    def fast() -> None:
+        results["fast"] = fit_surface(seeds, r0, _SMOOTHING).on_grid(xs, ys).ravel()
+
+    def dense() -> None:
+        results["dense"] = dense_heights(seeds, queries, r0, _SMOOTHING)
+
+    fast()
+    times: list[tuple[float, float]] = []
+    for _ in range(_SLOW_RUNS):
+        slow = _milliseconds(dense)
+        times.append((statistics.median(_milliseconds(fast) for _ in range(5)), slow))
+    ours, dense_ms = (statistics.median(column) for column in zip(*times, strict=True))
+    off = np.abs(results["fast"] - results["dense"])[inside]
+    print(f"\nThe same system (R0 = 6h, lambda = 3, quadratic polynomial) for the middle "
+          f"{len(seeds):,} seeds, {len(queries):,} points: dense solve {dense_ms:,.0f} ms, ours "
+          f"{ours:.1f} ms, {dense_ms / ours:,.0f} times faster (goal 1000, for all seeds); largest "
+          f"deviation {off.max():.4f} mm (goal 0.01).")
+
+
+def main() -> int:
+    """Print the tables; draw the growth where asked."""
+    parser = argparse.ArgumentParser(prog="script/bench speed", description=__doc__)
+    parser.add_argument("--runs", type=int, default=100, help="whole frames (100)")
+    parser.add_argument("--dense-seeds", type=int, default=3000, metavar="N",
+                        help="seeds for the dense solve, whose time grows with their cube (3000)")
+    parser.add_argument("--pcl", action="store_true",
+                        help="install Debian's libpcl-dev where it is missing (large)")
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="draw into this folder")
+    args = parser.parse_args()
+    if args.dense_seeds < MIN_SEEDS:
+        parser.error(f"--dense-seeds must be at least {MIN_SEEDS}, got {args.dense_seeds}")
+    if args.runs < 1:
+        parser.error(f"--runs must be at least 1, got {args.runs}")
+    if args.pictures and find_spec("matplotlib") is None:
+        parser.error("--pictures needs matplotlib, which is not installed")
+    cv2.setNumThreads(1)
+    try:
+        pcl = Pcl(install=args.pcl)
+    except PclMissingError as missing:
+        print(f"PCL is left out: {missing}", file=sys.stderr)
+        pcl = None
+    print(describe("script/bench speed " + " ".join(sys.argv[1:]),
+                   *([f"PCL {pcl.version}"] if pcl else [])))
+    case = next(case for case in recorded(1) if case.name == _OF)
+    _frame_times(case, args.runs)
+    _fit_times(case, pcl)
+    _against_dense(case, args.dense_seeds)
+    growth(pcl, args.pictures)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
