@@ -21,7 +21,7 @@ COPY --from=build /opt/denseface /opt/denseface
 ENV PATH=/opt/denseface/bin:$PATH \
     DENSEFACE_DATA=/data
 USER denseface
-WORKDIR /home/denseface
+WORKDIR /data
 VOLUME /data
 ENTRYPOINT ["denseface"]
 CMD ["up"]
