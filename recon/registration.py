@@ -26,6 +26,7 @@ class Registration:
     Attributes
     ----------
     rows, columns : which rows and columns of the depth image these (H, W) are
+    focal_px : focal length of the depth camera, in pixels of the depth image
     points : (H, W, 3) float32, mm, depth camera frame; zero where nothing was measured
     valid : (H, W) bool, a depth was measured
     pixels : (H, W, 2) float32, (u, v) in the colour image; NaN where not `valid`
@@ -36,6 +37,7 @@ class Registration:
 
     rows: slice
     columns: slice
+    focal_px: float
     points: NDArray[np.float32]
     valid: NDArray[np.bool_]
     pixels: NDArray[np.float32]
@@ -92,6 +94,7 @@ def register(
     return Registration(
         rows=rows,
         columns=columns,
+        focal_px=frame.depth_camera.fx,
         points=points,
         valid=valid,
         pixels=pixels,

@@ -20,9 +20,10 @@ __all__ = ["CLUSTERS", "Seeds", "cluster_depths", "crop_to_box", "keep_face", "s
            "window_of_box"]
 
 CLUSTERS = 3
+"""The paper's: face, body or hair, background."""
+
 # About so many depths are enough to find the centres.
 _CLUSTERED = 2000
-"""The paper's: face, body or hair, background."""
 
 # The cascades' box ends inside the forehead and near the chin, and sits aside of a turned face:
 # how far a face reaches from its centre, in widths of the box.
@@ -72,9 +73,7 @@ class Seeds:
     pixels: NDArray[np.int32]
 
 
-def segment_face(
-    registered: Registration, box: Box, focal_px: float
-) -> Seeds:
+def segment_face(registered: Registration, box: Box, focal_px: float) -> Seeds:
     """Cut the face's own points out of the depth image.
 
     Parameters
@@ -181,7 +180,7 @@ def keep_face(
     front = float(np.percentile(z[middle if middle.any() else face], 2))
     box_mm = box[2] * front / focal_px
     face &= z < front + box_mm * np.interp(down, _BELOW, _BEHIND)
-    return face & _smooth_outline(face, _SPUR_MM * focal_px / front)
+    return face & _smooth_outline(face, _SPUR_MM * registered.focal_px / front)
 
 
 def _in_box(

@@ -299,3 +299,14 @@ def test_depth_without_sense_is_a_named_error_or_a_sound_face(shot, seed):
     except ReconstructionError:
         return
     check_sound(one)
+
+
+def test_a_sharper_colour_camera_leaves_the_same_seeds(face, shot):
+    """What is measured in depth pixels must not be counted in the colour camera's."""
+    known = shot.frame.calibration
+    color = shot.frame.color.repeat(2, axis=0).repeat(2, axis=1)
+    sharp = reconstruct(replace(
+        shot.frame, color=color,
+        calibration=known.model_copy(update={"color": known.color.scaled(2)})))
+    assert len(sharp.initial) == pytest.approx(len(face.initial), rel=0.005)
+    assert apart(face.initial.points, sharp.initial.points) < 0.3
