@@ -24,6 +24,9 @@ _U32 = struct.Struct("<I")
 _NODE_ADDED = (0x02, 0x0C, 0x0D)
 _INT_PROPERTY = 0x03
 _PROPERTIES = (0x03, 0x04, 0x05, 0x06)
+_MODE = "xnMapOutputMode"
+_MODE_VALUE = struct.Struct("<III")
+"""Its size, then width and height."""
 _NEW_DATA = 0x0A
 _END = 0x0B
 _MAX_FIELDS = 1 << 20
@@ -39,6 +42,8 @@ class OniNode:
     """How many frame records the file holds."""
     properties: dict[str, int] = field(default_factory=dict)
     """The whole-number properties."""
+    sides: tuple[int, int] | None = None
+    """Width and height of the images, pixels; None where the file does not say."""
 
     @property
     def registered(self) -> bool:
@@ -118,6 +123,8 @@ def _walk(name: str, file: BinaryIO, size: int, nodes: dict[int, OniNode]) -> in
             key, value = _text(name, content)
             if kind == _INT_PROPERTY and node in nodes:
                 nodes[node].properties[key] = int.from_bytes(value[_U32.size:], "little")
+            elif key == _MODE and node in nodes and len(value) >= _MODE_VALUE.size:
+                nodes[node].sides = _MODE_VALUE.unpack_from(value)[1:]
         elif kind == _NEW_DATA and node in nodes:
             nodes[node].frames += 1
 

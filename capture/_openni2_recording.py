@@ -5,13 +5,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from capture._chosen import ChosenCalibration
-from capture._oni_file import DEPTH_NODE, IMAGE_NODE, check_oni
+from capture._oni_file import DEPTH_NODE, IMAGE_NODE, OniNode, check_oni
 from capture._openni2_base import OpenNI2Source
 from capture._openni2_library import load, open_sources, reason
 from capture._openni2_path import plain_name
 from capture._openni2_streams import COLOR, DEPTH, Streams
 from capture.errors import SensorError, UnreadableSourceError
-from capture.frame import RgbdFrame
+from capture.frame import MAX_SIDE, RgbdFrame
 
 __all__ = ["RecordingSource"]
 
@@ -37,12 +37,24 @@ class RecordingSource(OpenNI2Source):
         super().__init__(str(path), chosen)
         self._unread = True
         nodes, _ = check_oni(path)
+        depth, color = (self._node(nodes, kind, what)
+                        for kind, what in ((DEPTH_NODE, DEPTH), (IMAGE_NODE, COLOR)))
         self._open()
-        depth, color = (next(node for node in nodes if node.kind == kind)
-                        for kind in (DEPTH_NODE, IMAGE_NODE))
         self._registered = depth.registered
         self._expected = {DEPTH: depth.frames, COLOR: color.frames}
         self.frame_count = min(self._expected.values())
+
+    def _node(self, nodes: list[OniNode], kind: int, what: str) -> OniNode:
+        """Find a stream. One without a size, OpenNI2 makes up a size for, and crashes on it."""
+        node = next((node for node in nodes if node.kind == kind), None)
+        if node is None:
+            raise UnreadableSourceError(
+                f"{self.uri}: has no {what} stream; depth and color are needed")
+        if node.sides is None or not all(1 <= side <= MAX_SIDE for side in node.sides):
+            found = "no size" if node.sides is None else "{}x{}".format(*node.sides)
+            raise UnreadableSourceError(
+                f"{self.uri}: the {what} stream has {found}, expected sides of 1 to {MAX_SIDE}")
+        return node
 
     def __iter__(self) -> Iterator[RgbdFrame]:
         if not self._unread or self._streams is None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from capture._openni2_calibration import SensorProperties
 from capture._openni2_library import close_handle, reason
 from capture.errors import SensorError
+from capture.frame import MAX_SIDE
 
 __all__ = ["COLOR", "DEPTH", "Image", "Streams"]
 
@@ -21,7 +22,6 @@ Image = tuple[int, NDArray[Any]]
 _FOV, _MIRRORING = 1, 7
 _ZPD, _ZPPS, _DCRCDIS = 0x1080100C, 0x1080100D, 0x1080100F
 _LIVE_SIZE, _LIVE_FPS = (640, 480), 30
-_MOST = 16384
 _C = TypeVar("_C", bound="ctypes._SimpleCData[Any]")
 
 
@@ -149,9 +149,9 @@ class Streams:
             raise SensorError(
                 f"{self._name}: the {kind} stream is {_format_name(mode.pixelFormat)}, "
                 f"expected {' or '.join(accepted.values())}")
-        if not (0 < mode.resolutionX <= _MOST and 0 < mode.resolutionY <= _MOST):
+        if not (0 < mode.resolutionX <= MAX_SIDE and 0 < mode.resolutionY <= MAX_SIDE):
             raise SensorError(f"{self._name}: the {kind} stream is {mode.resolutionX}x"
-                              f"{mode.resolutionY}, expected sides of 1 to {_MOST}")
+                              f"{mode.resolutionY}, expected sides of 1 to {MAX_SIDE}")
         return _Stream(kind, handle, (int(mode.resolutionX), int(mode.resolutionY)),
                        int(mode.pixelFormat), self._mirrored(handle))
 

@@ -15,11 +15,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from capture.errors import CalibrationError, FrameError
 
-__all__ = ["Calibration", "CameraModel", "DepthToColor", "RgbdFrame"]
+__all__ = ["MAX_SIDE", "Calibration", "CameraModel", "DepthToColor", "RgbdFrame"]
+
+MAX_SIDE = 16384
+"""Pixels: no image may be wider or higher."""
 
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
-_Side = Annotated[int, Field(gt=0, le=16384)]
+_Side = Annotated[int, Field(gt=0, le=MAX_SIDE)]
 _Row = tuple[_Finite, _Finite, _Finite]
 
 _UNDISTORT_ITERATIONS = 20

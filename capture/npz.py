@@ -21,11 +21,10 @@ from numpy.typing import NDArray
 
 from capture._chosen import ChosenCalibration
 from capture.errors import FrameError, UnreadableSourceError
-from capture.frame import Calibration, RgbdFrame
+from capture.frame import MAX_SIDE, Calibration, RgbdFrame
 
 __all__ = ["NpzSource", "load_frame", "save_frame"]
 
-_MAX_SIDE = 16384
 _MAX_BYTES = 256 * 2**20
 _MAX_TEXT = 1 << 20
 _MAX_HEADER = 4096
@@ -180,9 +179,9 @@ def _read_array(name: str, file: IO[bytes], kind: _Kind) -> NDArray[Any]:
         raise FrameError(f"{name}: {expected}, {found}")
     limit = _MAX_TEXT if kind.dtype == "str" else _MAX_BYTES
     size = prod(shape) * dtype.itemsize
-    if (not all(0 < side <= _MAX_SIDE for side in shape) or size > limit
+    if (not all(0 < side <= MAX_SIDE for side in shape) or size > limit
             or (kind.ndim == 3 and shape[2] != 3)):
-        raise FrameError(f"{name}: {expected} with sides of 1 to {_MAX_SIDE} and at most "
+        raise FrameError(f"{name}: {expected} with sides of 1 to {MAX_SIDE} and at most "
                          f"{limit} bytes, {found}")
     data = file.read(size)
     # One byte more than announced is asked for: it reaches the archive's checksum.

@@ -1,6 +1,7 @@
 """Recordings through the real OpenNI2 library: made by its recorder, played by its player."""
 
 import os
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -182,6 +183,26 @@ def test_damaged_properties_end_cleanly(recorded, tmp_path, name, becomes):
     assert done.returncode in (0, 1), done.stderr
     if done.returncode:
         assert "capture.errors.UnreadableSourceError" in done.stderr
+
+
+@pytest.mark.parametrize("sides", [None, (0, 480), (640, 2**31)])
+def test_a_stream_without_a_size_is_named_before_openni2_sees_it(recorded, tmp_path, sides):
+    path = tmp_path / "bad.oni"
+    mode = b"xnMapOutputMode\0" + struct.pack("<I", 12)
+    whole = recorded.read_bytes()
+    assert mode in whole
+    if sides is None:
+        changed = whole.replace(mode, b"x" * 15 + mode[15:])
+    else:
+        at = whole.index(mode) + len(mode)
+        changed = whole[:at] + struct.pack("<II", *sides) + whole[at + 8:]
+    path.write_bytes(changed)
+    done = run_python(_OPEN, path, env=environment())
+    found = "no size" if sides is None else "{}x{}".format(*sides)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == (
+        f"capture.errors.UnreadableSourceError: {path}: the depth stream has {found}, expected "
+        "sides of 1 to 16384")
 
 
 @pytest.fixture(scope="module")
