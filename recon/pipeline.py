@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from capture.frame import RgbdFrame
+from recon._threads import one_blas_thread
 from recon.adapt import AdaptiveSurface, blend_surfaces
 from recon.densify import densify
 from recon.detect import detect_face
@@ -31,6 +32,7 @@ _SPARSE = 4
 _MUCH_SKEW_US = 33_000
 
 
+@one_blas_thread
 def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     """Turn one depth + colour frame into a dense, coloured face.
 
