@@ -51,23 +51,13 @@ class AdaptiveSurface:
         coarse = self.coarse.on_grid(xs, ys)
         return coarse + self._gain(xs, ys) * (self.fine.on_grid(xs, ys) - coarse)
 
-    def gradient_on_grid(
-        self, xs: NDArray[np.float64], ys: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Differentiate on an axis-aligned grid: (df/dx, df/dy), each (m, k).
-
-        The gain varies slowly beside the heights: its own slope is left out.
-        """
-        gain = self._gain(xs, ys)
-        fine, coarse = self.fine.gradient_on_grid(xs, ys), self.coarse.gradient_on_grid(xs, ys)
-        return (coarse[0] + gain * (fine[0] - coarse[0]), coarse[1] + gain * (fine[1] - coarse[1]))
-
     def sampled(
         self, xs: NDArray[np.float64], ys: NDArray[np.float64]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
         """Give f, df/dx, df/dy on an axis-aligned grid at once, in single precision.
 
-        As `Surface.sampled`: (k,), (m,) mm -> (m, k) each.
+        As `Surface.sampled`: (k,), (m,) mm -> (m, k) each. The gain varies slowly beside the
+        heights: its own slope is left out.
         """
         gain = self._gain(xs, ys)
         found = []

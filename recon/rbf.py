@@ -81,14 +81,6 @@ class Surface:
         heights: NDArray[np.float64] = (down @ self._weights()) @ across.T
         return heights
 
-    def gradient_on_grid(
-        self, xs: NDArray[np.float64], ys: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Differentiate the surface on an axis-aligned grid: (df/dx, df/dy), each (m, k)."""
-        (across, slope_x), (down, slope_y) = self._factors(xs, 0), self._factors(ys, 1)
-        weights = self._weights()
-        return (down @ weights) @ slope_x.T, slope_y @ (weights @ across.T)
-
     def sampled(
         self, xs: NDArray[np.float64], ys: NDArray[np.float64]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
@@ -135,20 +127,6 @@ class Surface:
         ey = _basis(xy[:, 1], self.nodes_y, self.r0)
         heights: NDArray[np.float64] = np.einsum("ij,ij->i", ey @ self.alpha, ex)
         return heights + _polynomial(xy, self.center, self.scale) @ self.beta
-
-    def slope_at(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Give the steepness |grad f| at scattered points: (n, 2) mm -> (n,), unitless."""
-        ex = _basis(xy[:, 0], self.nodes_x, self.r0)
-        ey = _basis(xy[:, 1], self.nodes_y, self.r0)
-        dx = np.einsum("ij,ij->i", ey @ self.alpha, _slope(ex, xy[:, 0], self.nodes_x, self.r0))
-        dy = np.einsum("ij,ij->i", _slope(ey, xy[:, 1], self.nodes_y, self.r0) @ self.alpha, ex)
-        u = (xy[:, 0] - self.center[0]) / self.scale
-        v = (xy[:, 1] - self.center[1]) / self.scale
-        b = self.beta
-        dx = dx + (b[1] + 2 * b[3] * u + b[4] * v) / self.scale
-        dy = dy + (b[2] + 2 * b[5] * v + b[4] * u) / self.scale
-        slope: NDArray[np.float64] = np.hypot(dx, dy)
-        return slope
 
 
 def fit_surface(
