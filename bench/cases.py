@@ -4,23 +4,19 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from bench.accuracy import RECORDINGS
 from capture import RgbdFrame, open_source
 from recon import Neighbors, Preset, ReconstructionError, Settings, reconstruct
 from recon.face import Face
 from tests.simulator import KINECT_CALIBRATED, Person, Scene, Truth, head_names, simulate
 
-__all__ = ["GROSS_MM", "HOLE_SPACINGS", "RECORDINGS", "Case", "recorded", "simulated",
-           "with_preset"]
+__all__ = ["HOLE_SPACINGS", "Case", "recorded", "simulated", "with_preset"]
 
-RECORDINGS = Path(__file__).resolve().parents[1] / "fixtures" / "recorded_oni"
-GROSS_MM = 5.5
-"""The paper's Figure 9 ends here."""
 HOLE_SPACINGS = 2.0
 """A point farther than this many mean spacings from every seed, over (X, Y), is inside a hole."""
 

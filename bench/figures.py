@@ -7,12 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from bench.cases import GROSS_MM, Case
+from bench.cases import Case
 from bench.tally import BINS, Tally
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
+
+from tests.simulator.accuracy import GROSS_MM
 
 __all__ = ["error_histogram", "error_maps", "time_against_seeds"]
 

@@ -6,17 +6,16 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from importlib.util import find_spec
-from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.cases import Case, recorded, simulated, with_preset
+from bench.flags import add_flags, check_flags, open_pcl
 from bench.literal import exact_interpolation
 from bench.machine import describe
-from bench.pcl_peer import Pcl, PclMissingError
+from bench.pcl_peer import Pcl
 from bench.peer_methods import griddata_points, inpaint_points, poisson_points, rbf_points
 from bench.tally import HEADINGS, Tally
 from recon import Preset, reconstruct
@@ -137,22 +136,15 @@ def main() -> int:
     parser.add_argument("--frames", type=int, default=3, help="of each recording (3)")
     parser.add_argument("--simulated", type=int, default=0, metavar="N",
                         help="N frames of heads with many holes besides (0)")
-    parser.add_argument("--pcl", action="store_true",
-                        help="install Debian's libpcl-dev where it is missing (large)")
     parser.add_argument("--more", action="store_true",
                         help="scipy with 20 and 100 neighbours as well (slow)")
-    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="draw into this folder")
+    add_flags(parser)
     args = parser.parse_args()
     if args.frames < 0 or args.simulated < 0 or args.frames + args.simulated == 0:
         parser.error("--frames and --simulated must not be negative, and not both 0")
-    if args.pictures and find_spec("matplotlib") is None:
-        parser.error("--pictures needs matplotlib, which is not installed")
+    check_flags(parser, args)
     cv2.setNumThreads(1)
-    try:
-        pcl = Pcl(install=args.pcl)
-    except PclMissingError as missing:
-        print(f"PCL is left out: {missing}", file=sys.stderr)
-        pcl = None
+    pcl = open_pcl(args)
     methods = list(_methods(pcl, more=args.more))
     print(describe("script/bench peers " + " ".join(sys.argv[1:]),
                    *([f"PCL {pcl.version}"] if pcl else [])))

@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Callable
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +15,11 @@ from numpy.typing import NDArray
 
 from bench.cases import Case, recorded, with_preset
 from bench.dense_solve import dense_heights
+from bench.flags import add_flags, check_flags, open_pcl
 from bench.growth import growth
 from bench.machine import describe
 from bench.memory import extra_memory, resident_mb
-from bench.pcl_peer import Pcl, PclMissingError
+from bench.pcl_peer import Pcl
 from bench.peer_methods import inpaint_points, rbf_points
 from bench.peers import ours_ms
 from recon import Preset, Settings, reconstruct
@@ -156,22 +156,15 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=100, help="whole frames (100)")
     parser.add_argument("--dense-seeds", type=int, default=3000, metavar="N",
                         help="seeds for the dense solve, whose time grows with their cube (3000)")
-    parser.add_argument("--pcl", action="store_true",
-                        help="install Debian's libpcl-dev where it is missing (large)")
-    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="draw into this folder")
+    add_flags(parser)
     args = parser.parse_args()
     if args.dense_seeds < MIN_SEEDS:
         parser.error(f"--dense-seeds must be at least {MIN_SEEDS}, got {args.dense_seeds}")
     if args.runs < 1:
         parser.error(f"--runs must be at least 1, got {args.runs}")
-    if args.pictures and find_spec("matplotlib") is None:
-        parser.error("--pictures needs matplotlib, which is not installed")
+    check_flags(parser, args)
     cv2.setNumThreads(1)
-    try:
-        pcl = Pcl(install=args.pcl)
-    except PclMissingError as missing:
-        print(f"PCL is left out: {missing}", file=sys.stderr)
-        pcl = None
+    pcl = open_pcl(args)
     print(describe("script/bench speed " + " ".join(sys.argv[1:]),
                    *([f"PCL {pcl.version}"] if pcl else [])))
     case = next(case for case in recorded(1) if case.name == _OF)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.cases import GROSS_MM
+from tests.simulator.accuracy import GROSS_MM
 
 __all__ = ["BINS", "HEADINGS", "Tally"]
 

@@ -11,13 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon.errors import FaceWithoutDepthError, NoDepthError, NoFaceError
-from recon.face import FaceCandidate
+from recon.face import Box, FaceCandidate
 from recon.registration import Registration
 
 __all__ = ["FACE_WIDTH_MM", "Detection", "detect_face", "find_boxes"]
-
-Box = tuple[int, int, int, int]
-"""x, y, width, height; pixels."""
 
 FACE_WIDTH_MM = (110.0, 210.0)
 """How wide a cascade's box around a face is, child to large adult, hair included."""

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 from recon.settings import Settings
 
-__all__ = ["DenseCloud", "Face", "FaceCandidate", "PointCloud", "Report"]
+__all__ = ["Box", "DenseCloud", "Face", "FaceCandidate", "PointCloud", "Report"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +69,14 @@ class _Model(BaseModel):
     model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 
 
+Box = tuple[int, int, int, int]
+"""x, y, width, height; pixels."""
+
+
 class FaceCandidate(_Model):
     """A detector's box and what the depth said of it."""
 
-    box: tuple[int, int, int, int]
+    box: Box
     """x, y, width, height; pixels of the colour image."""
     depth_mm: float | None
     """Median depth in the middle of the box; None where nothing was measured."""
@@ -86,7 +90,7 @@ class Report(_Model):
     """What was done to the frame, as written by `--report`."""
 
     capture_id: str = ""
-    face_box: tuple[int, int, int, int]
+    face_box: Box
     """x, y, width, height; pixels of the colour image."""
     candidates: tuple[FaceCandidate, ...]
     """Every box the detector gave, the chosen one first."""

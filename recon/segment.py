@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from recon.colors import average_neighbors
 from recon.errors import FaceWithoutDepthError
+from recon.face import Box
 from recon.masks import fill_holes
 from recon.registration import Registration
 
@@ -53,8 +54,6 @@ _ISLAND_SHARE = 0.15
 _WINDOW_MARGIN_PX = 8
 _SEED = 1
 
-Box = tuple[int, int, int, int]
-
 
 @dataclass(frozen=True, eq=False)
 class Seeds:
@@ -87,9 +86,7 @@ def segment_face(registered: Registration, box: Box, focal_px: float) -> Seeds:
     FaceWithoutDepthError
         Where nothing was measured around the middle of the box.
     """
-    crop = crop_to_box(registered, box)
-    if not crop.any():
-        raise FaceWithoutDepthError(f"no depth was measured in the face's box {box}")
+    crop = _measured_crop(registered, box)
     cluster = cluster_depths(registered, crop, box)
     face = keep_face(registered, cluster, box, focal_px)
     corner = (registered.rows.start or 0, registered.columns.start or 0)
@@ -110,9 +107,7 @@ def window_of_box(registered: Registration, box: Box) -> tuple[slice, slice]:
     FaceWithoutDepthError
         Where nothing was measured in the box.
     """
-    crop = crop_to_box(registered, box)
-    if not crop.any():
-        raise FaceWithoutDepthError(f"no depth was measured in the face's box {box}")
+    crop = _measured_crop(registered, box)
     window = []
     for axis, part in ((1, registered.rows), (0, registered.columns)):
         step = part.step or 1
@@ -120,6 +115,13 @@ def window_of_box(registered: Registration, box: Box) -> tuple[slice, slice]:
         window.append(slice(max(int(inside[0]) - step - _WINDOW_MARGIN_PX, 0),
                             int(inside[-1]) + step + _WINDOW_MARGIN_PX + 1))
     return window[0], window[1]
+
+
+def _measured_crop(registered: Registration, box: Box) -> NDArray[np.bool_]:
+    crop = crop_to_box(registered, box)
+    if not crop.any():
+        raise FaceWithoutDepthError(f"no depth was measured in the face's box {box}")
+    return crop
 
 
 def crop_to_box(registered: Registration, box: Box) -> NDArray[np.bool_]:

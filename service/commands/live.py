@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import os
 import shutil
 import sys
 import time
@@ -36,10 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do it."""
-    from service.supervisor import ONE_THREAD
-
-    for name, value in ONE_THREAD.items():  # read once, when NumPy is first imported
-        os.environ.setdefault(name, value)
+    options.use_one_thread()
     settings = options.recon_settings(args)
 
     import cv2

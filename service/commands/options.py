@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from service.settings import ServiceSettings
 
 __all__ = ["add_address", "add_daemon", "add_hub", "add_recon", "recon_arguments",
-           "recon_settings", "service_settings", "start_daemon"]
+           "recon_settings", "service_settings", "start_daemon", "use_one_thread"]
 
 
 def add_address(parser: argparse.ArgumentParser) -> None:
@@ -93,3 +93,14 @@ def start_daemon(args: argparse.Namespace, name: str) -> None:
 
     die_with_parent()
     configure(args.log, name)
+
+
+def use_one_thread() -> None:
+    """Keep the libraries of this process to one thread, unless the user says otherwise.
+
+    They read it once, when NumPy is first imported: to be called before.
+    """
+    from service.supervisor import ONE_THREAD
+
+    for name, value in ONE_THREAD.items():
+        os.environ.setdefault(name, value)

@@ -1,7 +1,6 @@
 """`denseface worker`."""
 
 import argparse
-import os
 
 from service.commands import options
 
@@ -16,10 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do it."""
-    from service.supervisor import ONE_THREAD
-
-    for name, value in ONE_THREAD.items():  # read once, when NumPy is first imported
-        os.environ.setdefault(name, value)
+    options.use_one_thread()
     options.start_daemon(args, "worker")
     from service import workerd
 

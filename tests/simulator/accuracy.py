@@ -11,7 +11,7 @@ from recon.face import Face
 from tests.simulator.labels import Label
 from tests.simulator.truth import Truth
 
-__all__ = ["Accuracy", "measure"]
+__all__ = ["GROSS_MM", "NEAR_MM", "Accuracy", "measure"]
 
 GROSS_MM = 5.5
 """The paper's Figure 9 ends here."""
