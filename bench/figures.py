@@ -1,5 +1,6 @@
 """The pictures of docs/benchmarks.md; needs matplotlib, which the dev tools bring along."""
 
+from math import erf
 from pathlib import Path
 
 import matplotlib as mpl
@@ -16,7 +17,7 @@ from matplotlib.figure import Figure
 
 from tests.simulator.accuracy import GROSS_MM
 
-__all__ = ["error_histogram", "error_maps", "time_against_seeds"]
+__all__ = ["error_histogram", "error_maps", "sigma_calibration", "time_against_seeds"]
 
 _MAP_LARGEST_MM = 3.0
 _COLORS = 128
@@ -56,6 +57,24 @@ def error_histogram(tallies: list[Tally], path: Path) -> None:
              xlabel="distance from the true surface, mm", ylabel="points, % per mm")
     figure.legend(fontsize=6, loc="outside lower center", ncols=2)
     _save(figure, path, 90)
+
+
+def sigma_calibration(ratios: dict[str, NDArray[np.float64]], path: Path) -> None:
+    """Draw the share of errors within k sigma against a normal distribution's: |error| / sigma."""
+    figure, axis = plt.subplots(figsize=(5, 5), layout="constrained")
+    k = np.linspace(0, 3, 121)
+    nominal = 100 * np.array([erf(one / np.sqrt(2)) for one in k])
+    axis.plot(nominal, nominal, color="gray", linewidth=0.9, label="nominal")
+    for name, values in ratios.items():
+        ordered = np.sort(values)
+        observed = 100 * np.searchsorted(ordered, k) / len(ordered)
+        axis.plot(nominal, observed, linewidth=1.5, label=name)
+    for sigmas in (1, 2):
+        axis.axvline(100 * erf(sigmas / np.sqrt(2)), color="gray", linewidth=0.6, linestyle=":")
+    axis.set(xlim=(0, 100), ylim=(0, 100), aspect="equal",
+             xlabel="errors that should be within k sigma, %", ylabel="errors that are, %")
+    axis.legend()
+    _save(figure, path, 80)
 
 
 def time_against_seeds(

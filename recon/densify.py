@@ -9,6 +9,7 @@ from recon.face import DenseCloud
 from recon.rbf import Surface
 from recon.segment import Seeds
 from recon.support import support_on_grid
+from recon.uncertainty import sources_of_error, standard_error
 
 __all__ = ["densify"]
 
@@ -19,7 +20,7 @@ _COARSE = 0.5
 
 
 def densify(
-    seeds: Seeds, surface: Surface | AdaptiveSurface, spacing: float, ratio: float
+    seeds: Seeds, surface: Surface | AdaptiveSurface, spacing: float, ratio: float, share: float,
 ) -> DenseCloud:
     """Sample the surface on a regular grid, `ratio` points for each seed.
 
@@ -29,6 +30,7 @@ def densify(
     surface : the fit over (X, Y)
     spacing : mean spacing of the seeds, mm
     ratio : dense points for each seed
+    share : of the residuals' variance, how much the surface keeps as error: `noise_share`
     """
     # Filled holes add to the support: a coarse try tells how much, and the step follows.
     _, _, support = support_on_grid(seeds.points, spacing, _COARSE * spacing)
@@ -42,10 +44,14 @@ def densify(
         seeds.colors, places, support, _COLOR_RADIUS * spacing / step, spacing / step)
     points, normals, colors, cells = collect(
         support, xs, ys, heights, slopes_x, slopes_y, colors)
+    sources = sources_of_error(
+        seeds.points, support, heights, (slopes_x, slopes_y), (float(xs[0]), float(ys[0])), step,
+        spacing)
     return DenseCloud(
         points=points,
         colors=colors,
         normals=normals,
+        sigma=standard_error(sources, cells, share),
         cells=cells,
         grid_shape=support.shape,
         grid_step_mm=step,

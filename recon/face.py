@@ -45,12 +45,14 @@ class DenseCloud(PointCloud):
     Attributes
     ----------
     normals : (n, 3) float32, unit length, toward the camera, from the fitted surface's gradient
+    sigma : (n,) float32, mm, positive: the standard error along the viewing ray
     cells : (n, 2) int32, (row, column) of each point on the grid, sorted by row, then column
     grid_shape : (rows, columns) of that grid
     grid_step_mm : distance of neighbouring grid points, mm
     """
 
     normals: NDArray[np.float32]
+    sigma: NDArray[np.float32]
     cells: NDArray[np.int32]
     grid_shape: tuple[int, int]
     grid_step_mm: float
@@ -58,6 +60,9 @@ class DenseCloud(PointCloud):
     def __post_init__(self) -> None:
         super().__post_init__()
         _check("normals", self.normals, np.float32, (len(self.points), 3))
+        _check("sigma", self.sigma, np.float32, (len(self.points),))
+        if (self.sigma <= 0).any():
+            raise ValueError("sigma must be positive")
         _check("cells", self.cells, np.int32, (len(self.points), 2))
         rows, columns = self.cells[:, 0], self.cells[:, 1]
         if len(self.cells) and (self.cells.min() < 0 or rows.max() >= self.grid_shape[0]

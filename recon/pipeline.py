@@ -22,6 +22,7 @@ from recon.rbf import MIN_SEEDS, Surface, fit_surface
 from recon.registration import register
 from recon.segment import segment_face, window_of_box
 from recon.settings import Settings
+from recon.uncertainty import noise_share
 
 __all__ = ["reconstruct"]
 
@@ -70,7 +71,7 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     clock.lap("neighbors")
     surface = _fit(seeds.points, spacing, settings)
     clock.lap("rbf")
-    dense = densify(seeds, surface, spacing, settings.ratio)
+    dense = densify(seeds, surface, spacing, settings.ratio, noise_share(settings))
     clock.lap("propagation")
     initial = PointCloud(seeds.points, seeds.colors)
     report = Report(

@@ -36,7 +36,7 @@ def warm() -> None:
     fine = fit_surface(seeds.points, settings.r0_factor * spacing, settings.smoothing)
     coarse = fit_surface(seeds.points, 2 * settings.r0_factor * spacing, settings.smoothing)
     surface = blend_surfaces(fine, coarse, seeds.points, spacing)
-    densify(seeds, surface, spacing, settings.ratio)
+    densify(seeds, surface, spacing, settings.ratio, share=1.0)
 
 
 def _ball() -> RgbdFrame:

@@ -3,7 +3,7 @@
 ======== =========================================================================================
 `.ply`   dense cloud, binary: x y z (float), nx ny nz (float), red green blue (uchar), millimetres
 `.pcd`   the same for PCL
-`.npz`   the whole face: both clouds, normals, grid, report
+`.npz`   the whole face: both clouds, normals, sigma, grid, report
 `.obj`   dense mesh with vertex colours and normals, millimetres, camera frame
 `.stl`   dense mesh without colours, millimetres, camera frame
 `.glb`   dense mesh, glTF 2.0: metres, y up, as that format demands
@@ -30,7 +30,7 @@ from service.spool import write_atomically
 __all__ = ["check_ending", "load_face", "save_face"]
 
 _ARRAYS = ("initial_points", "initial_colors", "dense_points", "dense_colors", "dense_normals",
-           "dense_cells", "grid_shape", "grid_step_mm", "report")
+           "dense_sigma", "dense_cells", "grid_shape", "grid_step_mm", "report")
 
 
 def save_face(face: Face, path: str | Path) -> None:
@@ -79,7 +79,7 @@ def load_face(path: str | Path) -> Face:
         return Face(
             PointCloud(of["initial_points"], of["initial_colors"]),
             DenseCloud(of["dense_points"], of["dense_colors"], of["dense_normals"],
-                       of["dense_cells"], (rows, columns), float(of["grid_step_mm"])),
+                       of["dense_sigma"], of["dense_cells"], (rows, columns), float(of["grid_step_mm"])),
             Report.model_validate_json(str(of["report"])))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
@@ -94,7 +94,7 @@ def _npz(face: Face, path: Path) -> None:
     np.savez_compressed(
         buffer, initial_points=initial.points, initial_colors=initial.colors,
         dense_points=dense.points, dense_colors=dense.colors, dense_normals=dense.normals,
-        dense_cells=dense.cells, grid_shape=np.array(dense.grid_shape, np.int64),
+        dense_sigma=dense.sigma, dense_cells=dense.cells, grid_shape=np.array(dense.grid_shape, np.int64),
         grid_step_mm=np.float64(dense.grid_step_mm), report=face.report.model_dump_json())
     write_atomically(path, [buffer.getvalue()], durable=False)
 
@@ -107,6 +107,7 @@ def _cloud(face: Face, path: Path) -> None:
     cloud = o3d.t.geometry.PointCloud(tensor(_own(dense.points)))
     cloud.point.normals = tensor(_own(dense.normals))
     cloud.point.colors = tensor(_own(dense.colors))
+    cloud.point.sigma = tensor(_own(dense.sigma[:, None]))
     _through(path, lambda name: o3d.t.io.write_point_cloud(name, cloud))
 
 

@@ -128,7 +128,8 @@ class FaceHeader(_PayloadHeader):
         n, m = self.initial_points, self.dense_points
         return (_info("initial_points", "<f4", n, 3), _info("initial_colors", "|u1", n, 3),
                 _info("dense_points", "<f4", m, 3), _info("dense_colors", "|u1", m, 3),
-                _info("dense_normals", "<f4", m, 3), _info("dense_cells", "<i4", m, 2))
+                _info("dense_normals", "<f4", m, 3), _info("dense_sigma", "<f4", m),
+                _info("dense_cells", "<i4", m, 2))
 
     @classmethod
     def of(cls, face: Face) -> tuple[Self, Arrays]:
@@ -141,7 +142,8 @@ class FaceHeader(_PayloadHeader):
         return header, {
             "initial_points": initial.points, "initial_colors": initial.colors,
             "dense_points": dense.points, "dense_colors": dense.colors,
-            "dense_normals": dense.normals, "dense_cells": dense.cells}
+            "dense_normals": dense.normals, "dense_sigma": dense.sigma,
+            "dense_cells": dense.cells}
 
     def join(self, arrays: Arrays) -> Face:
         """Put the face together again.
@@ -156,7 +158,7 @@ class FaceHeader(_PayloadHeader):
                 PointCloud(arrays["initial_points"], arrays["initial_colors"]),
                 DenseCloud(
                     arrays["dense_points"], arrays["dense_colors"], arrays["dense_normals"],
-                    arrays["dense_cells"], self.grid_shape, self.grid_step_mm),
+                    arrays["dense_sigma"], arrays["dense_cells"], self.grid_shape, self.grid_step_mm),
                 self.report)
         except (ValueError, KeyError) as error:
             raise RemoteProtocolError(f"face: {error}") from error

@@ -12,7 +12,7 @@ from capture import open_source
 from recon import reconstruct
 with open_source(sys.argv[1]) as source:
     dense = reconstruct(next(iter(source))).dense
-for part in (dense.points, dense.colors, dense.normals, dense.cells):
+for part in (dense.points, dense.colors, dense.normals, dense.sigma, dense.cells):
     print(hashlib.sha256(part.tobytes()).hexdigest())
 """
 
@@ -25,5 +25,5 @@ def test_one_and_two_threads_give_the_same_face():
         said.append(subprocess.run(
             [sys.executable, "-c", _HASH, str(RECORDINGS / "frontal_700.oni")], cwd=REPOSITORY,
             env=os.environ | counts, capture_output=True, text=True, check=True).stdout)
-    assert len(said[0].split()) == 4
+    assert len(said[0].split()) == 5
     assert said[0] == said[1]

@@ -37,12 +37,24 @@ def test_a_bad_cloud_is_refused(change, message):
 
 @pytest.mark.parametrize(("change", "message"), [
     ({"normals": np.zeros((2, 3), np.float32)}, "normals must be float32"),
+    ({"sigma": np.ones(2, np.float32)}, "sigma must be float32"),
     ({"cells": np.zeros((2, 2), np.int32)}, "cells must be int32"),
     ({"grid_shape": (3, 3)}, "cells must lie on the"),
 ])
 def test_a_bad_dense_cloud_is_refused(change, message):
     with pytest.raises(ValueError, match=message):
         replace(small_face().dense, **change)
+
+
+@pytest.mark.parametrize(("wrong", "message"), [
+    (np.nan, "sigma must be finite"), (np.inf, "sigma must be finite"),
+    (0.0, "sigma must be positive"), (-0.5, "sigma must be positive")])
+def test_a_standard_error_that_says_nothing_is_refused(wrong, message):
+    dense = small_face().dense
+    sigma = dense.sigma.copy()
+    sigma[3] = wrong
+    with pytest.raises(ValueError, match=message):
+        replace(dense, sigma=sigma)
 
 
 def test_cells_before_the_grid_are_refused():

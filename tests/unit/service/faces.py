@@ -34,5 +34,6 @@ def small_face(rows: int = 12, columns: int = 9, step: float = 2.0) -> Face:
     return Face(
         PointCloud(points[::4].copy(), colors[::4].copy()),
         DenseCloud(points, colors, normals.astype(np.float32),
+                   (0.5 + 0.1 * np.hypot(x, y)).astype(np.float32),
                    np.stack([v, u], axis=1).astype(np.int32), (rows, columns), step),
         report)

@@ -3,6 +3,7 @@
 import json
 import re
 import struct
+from dataclasses import replace
 
 import numpy as np
 import open3d as o3d
@@ -22,7 +23,7 @@ def test_ply_has_exactly_the_properties_that_are_promised(tmp_path):
     assert "format binary_little_endian 1.0" in header
     assert re.findall(r"property (.*)", header) == [
         "float x", "float y", "float z", "float nx", "float ny", "float nz",
-        "uchar red", "uchar green", "uchar blue"]
+        "uchar red", "uchar green", "uchar blue", "float sigma"]
 
 
 @pytest.mark.parametrize("ending", [".ply", ".pcd", ".PLY"])
@@ -33,6 +34,7 @@ def test_clouds_come_back(tmp_path, ending):
     np.testing.assert_array_equal(back.point.positions.numpy(), face.dense.points)
     np.testing.assert_array_equal(back.point.colors.numpy(), face.dense.colors)
     np.testing.assert_array_equal(back.point.normals.numpy(), face.dense.normals)
+    np.testing.assert_array_equal(back.point.sigma.numpy()[:, 0], face.dense.sigma)
     assert len(list(tmp_path.iterdir())) == 1
 
 
@@ -93,8 +95,7 @@ def test_triangles_cover_the_grid_once_and_no_step():
     assert len(triangulate(dense)) == 2 * 11 * 8 - 2 * 4
     torn = dense.points.copy()
     torn[dense.cells[:, 1] >= 5, 2] += 100
-    triangles = triangulate(type(dense)(
-        torn, dense.colors, dense.normals, dense.cells, dense.grid_shape, dense.grid_step_mm))
+    triangles = triangulate(replace(dense, points=torn))
     left = dense.cells[triangles, 1] < 5
     assert (left.all(axis=1) | ~left.any(axis=1)).all()
     assert len(triangles) > 100
@@ -106,7 +107,7 @@ def test_npz_gives_the_whole_face_back(tmp_path):
     back = load_face(tmp_path / "face.npz")
     for name in ("points", "colors"):
         np.testing.assert_array_equal(getattr(back.initial, name), getattr(face.initial, name))
-    for name in ("points", "colors", "normals", "cells"):
+    for name in ("points", "colors", "normals", "sigma", "cells"):
         np.testing.assert_array_equal(getattr(back.dense, name), getattr(face.dense, name))
     assert (back.dense.grid_shape, back.dense.grid_step_mm) == (
         face.dense.grid_shape, face.dense.grid_step_mm)

@@ -1,0 +1,132 @@
+"""Errors of dense points on simulated frames, and what their `sigma` is made of."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.cases import Case, with_preset
+from capture import RgbdFrame
+from recon import Preset, ReconstructionError, reconstruct
+from recon.face import Face
+from recon.uncertainty import Sources, sources_of_error
+from tests.simulator import KINECT_CALIBRATED, Person, Scene, Truth, head_names, simulate
+
+__all__ = ["CHOOSING", "REPORTING", "Samples", "frames", "sample"]
+
+CHOOSING = ("ict_id1", "ict_id2", "mh_asian_f")
+"""Heads that settings are chosen and coefficients fitted on."""
+REPORTING = ("lps", "ict_neutral", "mh_afr_f", "mh_cauc_m")
+"""Heads that figures are of."""
+
+_DISTANCES_MM = (600.0, 1100.0)
+_YAW = 20.0
+_HOLES = (0.25, 1.0)
+_RIM_SPACINGS = 3.0
+_POINTS = 8000
+_HOLE_POINTS = 2000
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Dense points of some frames.
+
+    Attributes
+    ----------
+    error : (m,) mm along the viewing ray, signed
+    distance : (m,) mm from the true surface; NaN where it was not asked for
+    sigma, z : (m,) mm
+    sources : (m, 4) mm^2, `Sources`' noise, hole, slope and rim
+    hole, rim : (m,) bool
+    everywhere : (m,) bool, drawn from all points; the others were added to have enough in holes
+    """
+
+    error: Floats
+    distance: Floats
+    sigma: Floats
+    z: Floats
+    sources: Floats
+    hole: NDArray[np.bool_]
+    rim: NDArray[np.bool_]
+    everywhere: NDArray[np.bool_]
+
+    @classmethod
+    def joined(cls, parts: list["Samples"]) -> "Samples":
+        """Put frames together."""
+        return cls(**{name: np.concatenate([getattr(part, name) for part in parts])
+                      for name in cls.__annotations__})
+
+
+def frames(heads: tuple[str, ...], count: int, seed: int) -> Iterator[tuple[RgbdFrame, Truth]]:
+    """Simulate heads by turns, few and many holes by turns, at random distances and yaws.
+
+    The procedural head stands in for those that are not at hand.
+    """
+    known = [name for name in heads if name in head_names()] or ["procedural"]
+    for index in range(count):
+        rng = np.random.default_rng([seed, index])
+        distance, yaw = rng.uniform(*_DISTANCES_MM), rng.uniform(-_YAW, _YAW)
+        scene = Scene((Person(known[index % len(known)], distance, yaw=yaw),),
+                      holes=_HOLES[(index // len(known)) % 2], decor=index)
+        shot, = simulate(scene, KINECT_CALIBRATED, seed=1000 + index)
+        yield shot.frame, shot.truth
+
+
+def sample(frame: RgbdFrame, truth: Truth, preset: Preset, *, distance: bool) -> Samples | None:
+    """Reconstruct a frame and draw some of its points; None where it gives no face."""
+    try:
+        case = Case("", frame, truth, reconstruct(frame, with_preset(preset)))
+    except ReconstructionError:
+        return None
+    dense = case.face.dense
+    drawn = np.random.default_rng(0).permutation(len(dense))
+    everywhere = np.zeros(len(dense), bool)
+    everywhere[drawn[:_POINTS]] = True
+    chosen = everywhere.copy()
+    chosen[drawn[case.hole[drawn]][:_HOLE_POINTS]] = True
+    error = truth.depth_error(dense.points)
+    chosen &= np.isfinite(error)
+    cells = dense.cells[chosen]
+    sources = _sources(case.face)
+    return Samples(
+        error=error[chosen],
+        distance=(truth.surface_distance(dense.points[chosen]) if distance
+                  else np.full(len(cells), np.nan)),
+        sigma=dense.sigma[chosen].astype(np.float64),
+        z=dense.points[chosen, 2].astype(np.float64),
+        sources=np.column_stack([sources.at(plane, cells) for plane in (
+            sources.noise, sources.hole, sources.slope, sources.rim)]).astype(np.float64),
+        hole=case.hole[chosen],
+        rim=_rim(case.face)[chosen],
+        everywhere=everywhere[chosen],
+    )
+
+
+def _sources(face: Face) -> Sources:
+    """Find what went into a face's sigma from the face alone."""
+    dense = face.dense
+    at = dense.cells[:, 0], dense.cells[:, 1]
+    support = np.zeros(dense.grid_shape, bool)
+    support[at] = True
+    planes = np.zeros((3, *dense.grid_shape), np.float32)
+    normals = dense.normals
+    for plane, values in zip(planes, (dense.points[:, 2], -normals[:, 0] / normals[:, 2],
+                                      -normals[:, 1] / normals[:, 2]), strict=True):
+        plane[at] = values
+    x, y = dense.points[0, :2] - dense.grid_step_mm * dense.cells[0, ::-1]
+    return sources_of_error(face.initial.points, support, planes[0], (planes[1], planes[2]),
+                            (float(x), float(y)), dense.grid_step_mm, face.report.mean_spacing_mm)
+
+
+def _rim(face: Face) -> NDArray[np.bool_]:
+    """Say which points are near the border of the face."""
+    dense = face.dense
+    inside = np.zeros((dense.grid_shape[0] + 2, dense.grid_shape[1] + 2), np.uint8)
+    row, column = dense.cells[:, 0] + 1, dense.cells[:, 1] + 1
+    inside[row, column] = 1
+    away = cv2.distanceTransform(inside, cv2.DIST_L2, 5)[row, column] * dense.grid_step_mm
+    return np.asarray(away < _RIM_SPACINGS * face.report.mean_spacing_mm)

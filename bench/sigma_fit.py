@@ -1,0 +1,79 @@
+"""The coefficients of `recon.uncertainty`, by maximum likelihood.
+
+Errors have heavier tails than a normal distribution, so the likelihood is Student's t with five
+degrees of freedom, whose scale a few large errors do not set; then all is scaled so that 68 %
+within one sigma and 95 % within two are missed by the same amount, upward and downward.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize
+
+from bench.calibration_samples import Samples
+from recon import Preset, Settings
+from recon.uncertainty import cutoff
+
+__all__ = ["fitted"]
+
+_FREEDOM = 5.0
+# The rim is a small part of the points; it shall be right too.
+_RIM_WEIGHT = 3.0
+_WITHIN = (0.6827, 0.9545)
+
+Floats = NDArray[np.float64]
+
+
+def fitted(samples: dict[Preset, Samples]) -> dict[str, float]:
+    """Fit all coefficients: slope, rim and hole on `best`, the share of noise on all presets."""
+    best = samples[Preset.BEST]
+    share, hole, slope, rim = _most_likely(best.sources, best)
+    found = {"_HOLE": hole / share, "_SLOPE": slope, "_RIM": rim}
+    scale = math.sqrt(math.prod(_scale(preset, samples[preset], found)
+                                for preset in (Preset.FAITHFUL, Preset.PAPER)))
+    settings = Settings.of(Preset.BEST)
+    fine = scale * cutoff(settings.r0_factor, settings.smoothing) ** 2
+    coarse = scale * cutoff(settings.coarse_r0_factor or settings.r0_factor,
+                            settings.coarse_smoothing) ** 2
+    return found | {"_SHARE": scale, "_FINE_PART": (share - coarse) / (fine - coarse)}
+
+
+def _most_likely(sources: Floats, of: Samples) -> Floats:
+    """Give the nonnegative coefficients of the sources, (k,)."""
+    size = sources.mean(axis=0)
+    parts, squares = sources / size, of.error**2
+    weights = np.where(of.rim, _RIM_WEIGHT, 1.0)
+    weights /= weights.sum()
+
+    def cost(logs: Floats) -> tuple[float, Floats]:
+        factors = np.exp(logs)
+        variance = parts @ factors + 1e-9
+        odds = squares / variance
+        value = weights @ (np.log(variance) + (_FREEDOM + 1) * np.log1p(odds / _FREEDOM)) / 2
+        slope = weights / variance * (1 - (_FREEDOM + 1) * odds / (_FREEDOM + odds)) / 2
+        return float(value), (slope @ parts) * factors
+
+    start = np.full(parts.shape[1], -math.log(parts.shape[1]))
+    found = np.exp(minimize(cost, start, jac=True, method="L-BFGS-B",
+                            bounds=[(-14, 6)] * len(start)).x) / size
+    return np.asarray(found * _balanced(sources @ found, of) ** 2)
+
+
+def _scale(preset: Preset, of: Samples, known: dict[str, float]) -> float:
+    """Give what balances a preset of one fit, where all else is known: its share by (h / L)^2."""
+    noise = of.sources[:, 0] + known["_HOLE"] * of.sources[:, 1]
+    rest = of.sources[:, 2:] @ [known["_SLOPE"], known["_RIM"]]
+    settings = Settings.of(preset)
+    share = brentq(lambda share: _imbalance(np.sqrt(share * noise + rest), of), 0.01, 20)
+    return float(share) / cutoff(settings.r0_factor, settings.smoothing) ** 2
+
+
+def _balanced(variance: Floats, of: Samples) -> float:
+    sigma = np.sqrt(variance)
+    return float(brentq(lambda scale: _imbalance(scale * sigma, of), 0.2, 5))
+
+
+def _imbalance(sigma: Floats, of: Samples) -> float:
+    share = np.abs(of.error / sigma)[of.everywhere]
+    return sum(float((share < k).mean()) - nominal for k, nominal in enumerate(_WITHIN, 1))

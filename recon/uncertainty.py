@@ -1,0 +1,146 @@
+"""Stage 6: how far off each dense point may be, along its viewing ray.
+
+    sigma^2 = k r^2 (1 + H d) + S (h g^2)^2 + E (h g e)^2
+
+r, mm : what the seeds around the point are off the surface, root mean square: the sensor's noise
+    and detail that smoothing took away, k of it left in the surface (`noise_share`)
+d, spacings : how far into a hole: distance from the nearest seed, less one
+h, mm : mean spacing of the seeds, which grows with the distance from the camera
+g : slope of the surface: where it is steep, a reading's sideways jitter, as large as h, is depth
+e, 0-1 : how near the rim, where seeds lie on one side alone
+
+A Gaussian process has its own posterior variance, but only where noise is independent from seed
+to seed and the fit has no bias: a Kinect's is correlated over several pixels, and lips, lids and
+nostrils are bias. So the form is made of what an error can come from, and the coefficients are
+fitted by maximum likelihood to simulated frames with known truth (`python -m bench.calibration
+--fit`, on the heads that settings are chosen on; docs/decisions/0007-sigma.md).
+"""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from recon._uncertainty_kernels import coarsen, interpolate
+from recon.settings import Settings
+
+__all__ = ["Sources", "cutoff", "noise_share", "sources_of_error", "standard_error"]
+
+# From bench/calibration.py: H, S, E above, and those of `noise_share`.
+_HOLE = 0.26
+_SLOPE = 0.0656
+_RIM = 2.68
+_SHARE = 95.0
+_FINE_PART = 0.67
+
+# Over what radius (standard deviation) residuals and slopes count as local, spacings.
+_WINDOW = 2.5
+# As much as so many seeds for each spacing squared, the whole face's residuals count too.
+_PRIOR = 0.03
+# What averaging tens of readings in whole millimetres leaves of their 0.29 mm.
+_LEAST_MM = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """The parts of sigma^2 before their coefficients, on every so many points of the dense grid.
+
+    Attributes
+    ----------
+    noise : r^2; hole : r^2 d; slope : (h g^2)^2; rim : (h g e)^2; each (rows, columns) float32, mm^2
+    every : grid points from node to node
+    """
+
+    noise: NDArray[np.float32]
+    hole: NDArray[np.float32]
+    slope: NDArray[np.float32]
+    rim: NDArray[np.float32]
+    every: int
+
+    def at(self, plane: NDArray[np.float32], cells: NDArray[np.int32]) -> NDArray[np.float32]:
+        """Interpolate a plane on these nodes at cells of the dense grid, (n, 2) to (n,)."""
+        return interpolate(plane, self.every, cells)
+
+
+def noise_share(settings: Settings) -> float:
+    """Give k: how much of the residuals' variance is the error left in the surface.
+
+    A fit lets pass what is longer than L = pi R0 / sqrt(ln(pi (R0/h)^2 / lambda)), where signal
+    and smoothing weigh the same: of noise, a share in proportion to (h / L)^2. Two fits that are
+    blended have the mean of their shares, weighted by what the blend takes of each.
+    """
+    fine = _share(settings.r0_factor, settings.smoothing)
+    if settings.coarse_r0_factor is None:
+        return fine
+    coarse = _share(settings.coarse_r0_factor, settings.coarse_smoothing)
+    return _FINE_PART * fine + (1 - _FINE_PART) * coarse
+
+
+def cutoff(r0_factor: float, smoothing: float) -> float:
+    """Give h / L of a fit, see `noise_share`."""
+    weight = max(math.pi * r0_factor**2 / smoothing, math.e)
+    return math.sqrt(math.log(weight)) / (math.pi * r0_factor)
+
+
+def _share(r0_factor: float, smoothing: float) -> float:
+    return _SHARE * cutoff(r0_factor, smoothing) ** 2
+
+
+def sources_of_error(
+    points: NDArray[np.float32],
+    support: NDArray[np.bool_],
+    heights: NDArray[np.float32],
+    slopes: tuple[NDArray[np.float32], NDArray[np.float32]],
+    origin: tuple[float, float],
+    step: float,
+    spacing: float,
+) -> Sources:
+    """Find what an error can come from, place by place.
+
+    Parameters
+    ----------
+    points : (n, 3) float32, mm, the seeds, depth camera frame
+    support : (rows, columns) bool, where the dense grid has points
+    heights, slopes : (rows, columns) float32, mm, and dz/dx, dz/dy; used on the support alone
+    origin : (x, y) of the grid's first point, mm
+    step : distance of its points, mm
+    spacing : h, mean spacing of the seeds, mm
+    """
+    every = max(1, round(spacing / step))
+    node = every * step / spacing
+    planes = coarsen(points, support, heights, *slopes, origin, step, every)
+    far = cv2.distanceTransform((planes[..., 2] == 0).astype(np.uint8), cv2.DIST_L2, 5)
+    seeds, squares = planes[..., 2].sum(dtype=np.float64), planes[..., 3].sum(dtype=np.float64)
+    local = cv2.GaussianBlur(planes, (0, 0), _WINDOW / node, borderType=cv2.BORDER_CONSTANT)
+    prior = np.float32(_PRIOR * node**2)
+    noise = (local[..., 3] + prior * np.float32(squares / max(seeds, 1.0))) / (local[..., 2] + prior)
+    steep = np.float32(spacing**2) * local[..., 1] / np.maximum(local[..., 0], np.float32(1e-3))
+    return Sources(
+        noise=noise,
+        hole=noise * np.maximum(np.float32(node) * far - 1, np.float32(0)),
+        slope=steep * steep / np.float32(spacing**2),
+        rim=steep * np.clip(2 - 2 * local[..., 0], np.float32(0), np.float32(1)),
+        every=every,
+    )
+
+
+def standard_error(
+    sources: Sources, cells: NDArray[np.int32], share: float
+) -> NDArray[np.float32]:
+    """Give sigma at cells of the dense grid.
+
+    Parameters
+    ----------
+    sources : of this face
+    cells : (n, 2) int32, row and column
+    share : k, of the settings that the surface was fitted with
+
+    Returns
+    -------
+    (n,) float32, mm: 68 % of the errors along the viewing ray are within it, 95 % within twice
+    """
+    variance = (share * (sources.noise + _HOLE * sources.hole)
+                + _SLOPE * sources.slope + _RIM * sources.rim)
+    return sources.at(np.maximum(np.sqrt(variance), np.float32(_LEAST_MM)), cells)
