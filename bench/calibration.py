@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.calibration_samples import CHOOSING, REPORTING, Floats, Samples, frames, sample
 from bench.machine import describe
@@ -18,7 +19,7 @@ from recon import Preset
 
 __all__: list[str] = []
 
-_FRAMES = 28
+_FRAMES = 42
 _CHOOSING_SEED, _REPORTING_SEED = 11, 13
 _BANDS_MM = ((0, 800), (800, 950), (950, 2000))
 _PARTS = 10
@@ -35,8 +36,9 @@ def _taken(heads: tuple[str, ...], count: int, seed: int, *, distance: bool) -> 
     return {preset: Samples.joined(parts) for preset, parts in drawn.items()}
 
 
-def _groups(of: Samples) -> dict[str, np.ndarray]:
-    groups = {"everywhere": of.everywhere, "in holes": of.hole, "at the rim": of.rim & of.everywhere}
+def _groups(of: Samples) -> dict[str, NDArray[np.bool_]]:
+    groups = {"everywhere": of.everywhere, "in holes": of.hole,
+              "at the rim": of.rim & of.everywhere}
     for low, high in _BANDS_MM:
         groups[f"{max(low, 600) / 1000:g}-{min(high, 1100) / 1000:g} m"] = (
             of.everywhere & (of.z > low) & (of.z <= high))
@@ -47,7 +49,7 @@ def _groups(of: Samples) -> dict[str, np.ndarray]:
     return groups
 
 
-def _row(name: str, of: Samples, chosen: np.ndarray) -> str:
+def _row(name: str, of: Samples, chosen: NDArray[np.bool_]) -> str:
     sigma = of.sigma[chosen]
 
     def within(errors: Floats) -> str:

@@ -58,13 +58,18 @@ def interpolate(
     plane : (rows / every, columns / every), rounded up
     cells : (n, 2), row and column; gives (n,)
     """
+    rows, columns = plane.shape
+    flat = plane.ravel()
     out = np.empty(len(cells), np.float32)
+    steps = np.float32(1) / np.float32(every)
     for k in range(len(cells)):
-        i, j = cells[k, 0] // every, cells[k, 1] // every
-        below, right = min(i + 1, plane.shape[0] - 1), min(j + 1, plane.shape[1] - 1)
-        down = np.float32(cells[k, 0] - i * every) / np.float32(every)
-        across = np.float32(cells[k, 1] - j * every) / np.float32(every)
-        upper = plane[i, j] + across * (plane[i, right] - plane[i, j])
-        lower = plane[below, j] + across * (plane[below, right] - plane[below, j])
+        y, x = np.float32(cells[k, 0]) * steps, np.float32(cells[k, 1]) * steps
+        i, j = np.uint32(y), np.uint32(x)
+        down, across = y - np.float32(i), x - np.float32(j)
+        here = i * columns + j
+        right = np.uint32(1) if j + 1 < columns else np.uint32(0)
+        below = here + (columns if i + 1 < rows else 0)
+        upper = flat[here] + across * (flat[here + right] - flat[here])
+        lower = flat[below] + across * (flat[below + right] - flat[below])
         out[k] = upper + down * (lower - upper)
     return out

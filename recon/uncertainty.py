@@ -1,13 +1,13 @@
 """Stage 6: how far off each dense point may be, along its viewing ray.
 
-    sigma^2 = k r^2 (1 + H d) + S (h g^2)^2 + E (h g e)^2
+    sigma^2 = k r^2 (1 + H d) + S (h g^2)^2 + E e (h g)^2
 
 r, mm : what the seeds around the point are off the surface, root mean square: the sensor's noise
     and detail that smoothing took away, k of it left in the surface (`noise_share`)
 d, spacings : how far into a hole: distance from the nearest seed, less one
 h, mm : mean spacing of the seeds, which grows with the distance from the camera
 g : slope of the surface: where it is steep, a reading's sideways jitter, as large as h, is depth
-e, 0-1 : how near the rim, where seeds lie on one side alone
+e, 0-1 : how near the rim, where seeds lie on one side alone; 1 on it
 
 A Gaussian process has its own posterior variance, but only where noise is independent from seed
 to seed and the fit has no bias: a Kinect's is correlated over several pixels, and lips, lids and
@@ -29,10 +29,10 @@ from recon.settings import Settings
 __all__ = ["Sources", "cutoff", "noise_share", "sources_of_error", "standard_error"]
 
 # From bench/calibration.py: H, S, E above, and those of `noise_share`.
-_HOLE = 0.26
-_SLOPE = 0.0656
-_RIM = 2.68
-_SHARE = 95.0
+_HOLE = 0.51
+_SLOPE = 0.07
+_RIM = 2.6
+_SHARE = 93.0
 _FINE_PART = 0.67
 
 # Over what radius (standard deviation) residuals and slopes count as local, spacings.
@@ -49,7 +49,7 @@ class Sources:
 
     Attributes
     ----------
-    noise : r^2; hole : r^2 d; slope : (h g^2)^2; rim : (h g e)^2; each (rows, columns) float32, mm^2
+    noise, hole, slope, rim : r^2, r^2 d, (h g^2)^2, e (h g)^2, (rows, columns) float32, mm^2
     every : grid points from node to node
     """
 
@@ -113,17 +113,17 @@ def sources_of_error(
     planes = coarsen(points, support, heights, *slopes, origin, step, every)
     far = cv2.distanceTransform((planes[..., 2] == 0).astype(np.uint8), cv2.DIST_L2, 5)
     seeds, squares = planes[..., 2].sum(dtype=np.float64), planes[..., 3].sum(dtype=np.float64)
-    local = cv2.GaussianBlur(planes, (0, 0), _WINDOW / node, borderType=cv2.BORDER_CONSTANT)
+    covered, slope, count, square = cv2.split(
+        cv2.GaussianBlur(planes, (0, 0), _WINDOW / node, borderType=cv2.BORDER_CONSTANT))
     prior = np.float32(_PRIOR * node**2)
-    noise = (local[..., 3] + prior * np.float32(squares / max(seeds, 1.0))) / (local[..., 2] + prior)
-    steep = np.float32(spacing**2) * local[..., 1] / np.maximum(local[..., 0], np.float32(1e-3))
-    return Sources(
-        noise=noise,
-        hole=noise * np.maximum(np.float32(node) * far - 1, np.float32(0)),
-        slope=steep * steep / np.float32(spacing**2),
-        rim=steep * np.clip(2 - 2 * local[..., 0], np.float32(0), np.float32(1)),
-        every=every,
-    )
+    noise = (square + prior * np.float32(squares / max(seeds, 1.0))) / (count + prior)
+    hole = noise * np.maximum(np.float32(node) * far - 1, np.float32(0))
+    slope /= np.maximum(covered, np.float32(1e-3))
+    across = np.float32(spacing**2)
+    edge = np.clip(2 - 2 * covered, np.float32(0), np.float32(1))
+    return Sources(noise=np.asarray(noise, np.float32), hole=np.asarray(hole, np.float32),
+                   slope=np.asarray(across * slope * slope, np.float32),
+                   rim=np.asarray(across * slope * edge, np.float32), every=every)
 
 
 def standard_error(

@@ -1,7 +1,8 @@
 """Faces to files, the ending picks the format; `.npz` is read back.
 
 ======== =========================================================================================
-`.ply`   dense cloud, binary: x y z (float), nx ny nz (float), red green blue (uchar), millimetres
+`.ply`   dense cloud, binary: x y z (float), nx ny nz (float), red green blue (uchar), sigma (float:
+         the standard error along the viewing ray), millimetres
 `.pcd`   the same for PCL
 `.npz`   the whole face: both clouds, normals, sigma, grid, report
 `.obj`   dense mesh with vertex colours and normals, millimetres, camera frame
@@ -79,7 +80,8 @@ def load_face(path: str | Path) -> Face:
         return Face(
             PointCloud(of["initial_points"], of["initial_colors"]),
             DenseCloud(of["dense_points"], of["dense_colors"], of["dense_normals"],
-                       of["dense_sigma"], of["dense_cells"], (rows, columns), float(of["grid_step_mm"])),
+                       of["dense_sigma"], of["dense_cells"], (rows, columns),
+                       float(of["grid_step_mm"])),
             Report.model_validate_json(str(of["report"])))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
@@ -94,7 +96,8 @@ def _npz(face: Face, path: Path) -> None:
     np.savez_compressed(
         buffer, initial_points=initial.points, initial_colors=initial.colors,
         dense_points=dense.points, dense_colors=dense.colors, dense_normals=dense.normals,
-        dense_sigma=dense.sigma, dense_cells=dense.cells, grid_shape=np.array(dense.grid_shape, np.int64),
+        dense_sigma=dense.sigma, dense_cells=dense.cells,
+        grid_shape=np.array(dense.grid_shape, np.int64),
         grid_step_mm=np.float64(dense.grid_step_mm), report=face.report.model_dump_json())
     write_atomically(path, [buffer.getvalue()], durable=False)
 

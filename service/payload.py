@@ -158,7 +158,8 @@ class FaceHeader(_PayloadHeader):
                 PointCloud(arrays["initial_points"], arrays["initial_colors"]),
                 DenseCloud(
                     arrays["dense_points"], arrays["dense_colors"], arrays["dense_normals"],
-                    arrays["dense_sigma"], arrays["dense_cells"], self.grid_shape, self.grid_step_mm),
+                    arrays["dense_sigma"], arrays["dense_cells"], self.grid_shape,
+                    self.grid_step_mm),
                 self.report)
         except (ValueError, KeyError) as error:
             raise RemoteProtocolError(f"face: {error}") from error

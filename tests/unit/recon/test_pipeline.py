@@ -156,6 +156,7 @@ def test_the_same_frame_twice_is_the_same_face(face, shot):
             np.testing.assert_array_equal(
                 getattr(getattr(face, cloud), name), getattr(getattr(again, cloud), name))
     np.testing.assert_array_equal(face.dense.normals, again.dense.normals)
+    np.testing.assert_array_equal(face.dense.sigma, again.dense.sigma)
     np.testing.assert_array_equal(face.dense.cells, again.dense.cells)
     assert again.report.candidates == face.report.candidates
     assert again.report.noise_mm == face.report.noise_mm

@@ -132,7 +132,8 @@ def test_a_face_of_wrong_shapes_is_named(tmp_path):
     with np.load(path) as file:
         arrays = dict(file)
     for name, wrong in (("dense_points", arrays["dense_points"][:5]), ("report", np.array("{}")),
-                        ("grid_shape", np.array(3)), ("dense_cells", arrays["dense_cells"] + 99)):
+                        ("grid_shape", np.array(3)), ("dense_sigma", -arrays["dense_sigma"]),
+                        ("dense_cells", arrays["dense_cells"] + 99)):
         np.savez(path, **arrays | {name: wrong})
         with pytest.raises(FormatError, match=r"face\.npz: "):
             load_face(path)

@@ -208,6 +208,11 @@ def test_a_face_with_a_coordinate_that_is_no_number_is_a_protocol_error():
         FACE.join(FACE_ARRAYS | {"dense_points": points})
 
 
+def test_a_face_with_a_standard_error_of_nothing_is_a_protocol_error():
+    with pytest.raises(RemoteProtocolError, match="face: sigma must be positive"):
+        FACE.join(FACE_ARRAYS | {"dense_sigma": 0 * FACE_ARRAYS["dense_sigma"]})
+
+
 def test_every_kind_stands_in_the_documentation():
     text = (Path(__file__).parents[3] / "docs" / "wire.md").read_text()
     for kind in (*messages.ToHub.__args__, *messages.FromHub.__args__):

@@ -1,0 +1,62 @@
+"""What `sigma` says of the errors on the recordings; `script/bench calibration` has many frames.
+
+A frame has a handful of holes, so holes are bounded over all recordings together, and less
+tightly than the 68 +- 7 % and 95 +- 4 % that hold everywhere.
+"""
+
+import numpy as np
+import pytest
+
+from bench.calibration_samples import Samples, sample
+from recon import Preset
+from tests.simulator import Truth
+from tests.system.test_accuracy import BOUNDS, first_frame
+from tests.virtual_sensor.fixtures import FOLDER
+
+
+@pytest.fixture(scope="module")
+def shots():
+    """The first frame of each recording, and its truth."""
+    return {name: (first_frame(name), Truth.load(FOLDER / f"{name}.truth.npz"))
+            for name in BOUNDS}
+
+
+@pytest.fixture(scope="module", params=list(Preset))
+def taken(request, shots):
+    """Points of each recording, by one preset."""
+    return {name: sample(*shot, request.param, distance=False) for name, shot in shots.items()}
+
+
+def within(of: Samples, chosen):
+    ratio = np.abs(of.error[chosen]) / of.sigma[chosen]
+    return float((ratio < 1).mean()), float((ratio < 2).mean())
+
+
+def test_sigma_is_honest_on_every_recording(taken):
+    for name, of in taken.items():
+        once, twice = within(of, of.everywhere)
+        assert 0.60 <= once <= 0.76, name
+        assert 0.91 <= twice <= 0.99, name
+
+
+def test_sigma_is_honest_at_the_rim(taken):
+    of = Samples.joined(list(taken.values()))
+    once, twice = within(of, of.rim & of.everywhere)
+    assert 0.61 <= once <= 0.75
+    assert 0.91 <= twice <= 0.99
+
+
+def test_sigma_is_not_far_off_in_holes(taken):
+    of = Samples.joined(list(taken.values()))
+    once, twice = within(of, of.hole)
+    assert 0.54 <= once <= 0.80
+    assert 0.84 <= twice <= 0.99
+
+
+def test_sigma_tells_good_points_from_bad(taken):
+    """Of the points whose sigma is in the upper fifth, errors are three times as large."""
+    of = Samples.joined(list(taken.values()))
+    low, high = np.quantile(of.sigma[of.everywhere], (0.2, 0.8))
+    surest, least = (np.median(np.abs(of.error[of.everywhere & chosen]))
+                     for chosen in (of.sigma < low, of.sigma > high))
+    assert least > 3 * surest

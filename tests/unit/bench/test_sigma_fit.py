@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+
+from bench.calibration_samples import Samples
+from bench.sigma_fit import fitted
+from recon import Preset, Settings
+from recon.uncertainty import cutoff, noise_share
+
+COUNT = 60_000
+HOLE, SLOPE, RIM, SHARE, FINE_PART = 0.8, 0.1, 2.0, 50.0, 0.6
+
+
+def made_up(preset: Preset, seed: int) -> Samples:
+    """Errors drawn from a normal distribution of the very form that is fitted."""
+    rng = np.random.default_rng(seed)
+    sources = rng.gamma(1.0, [1.0, 0.5, 3.0, 0.2], (COUNT, 4))
+    settings = Settings.of(preset)
+    share = SHARE * cutoff(settings.r0_factor, settings.smoothing) ** 2
+    if settings.coarse_r0_factor is not None:
+        coarse = SHARE * cutoff(settings.coarse_r0_factor, settings.coarse_smoothing) ** 2
+        share = FINE_PART * share + (1 - FINE_PART) * coarse
+    sigma = np.sqrt(sources @ [share, share * HOLE, SLOPE, RIM])
+    everything = np.ones(COUNT, bool)
+    return Samples(error=rng.normal(0, sigma), distance=np.full(COUNT, np.nan), sigma=sigma,
+                   z=np.full(COUNT, 700.0), sources=sources, hole=~everything,
+                   rim=rng.random(COUNT) < 0.1, everywhere=everything)
+
+
+def test_the_coefficients_that_made_the_errors_are_found():
+    found = fitted({preset: made_up(preset, seed) for seed, preset in enumerate(Preset)})
+    expected = {"_HOLE": HOLE, "_SLOPE": SLOPE, "_RIM": RIM, "_SHARE": SHARE,
+                "_FINE_PART": FINE_PART}
+    assert found.keys() == expected.keys()
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value, rel=0.12), name
+
+
+def test_the_share_is_computed_as_it_is_fitted():
+    """One fit: in proportion to the squared cut-off."""
+    paper, faithful = Settings.of("paper"), Settings.of("faithful")
+    squares = [cutoff(one.r0_factor, one.smoothing) ** 2 for one in (paper, faithful)]
+    assert noise_share(paper) / noise_share(faithful) == pytest.approx(squares[0] / squares[1])
