@@ -9,7 +9,8 @@ import math
 import os
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from datetime import datetime
 from types import TracebackType
 from typing import Self, TypeVar
 
@@ -34,7 +35,7 @@ from service.settings import ServiceSettings
 from service.sockets import connect, send_parts
 from service.wire import Packet, decode_from_hub, encode
 
-__all__ = ["Client", "Published", "PublishedFace", "PublishedFailure"]
+__all__ = ["Client", "Published", "PublishedFace", "PublishedFailure", "expect"]
 
 _T = TypeVar("_T")
 
@@ -106,7 +107,7 @@ class Client:
         answer = self._ask(message, timeout).message
         if isinstance(answer, messages.PressRefused):
             raise PressRefusedError(f"press refused: {answer.message}")
-        _expect(answer, messages.PressAccepted)
+        expect(answer, messages.PressAccepted)
         return chosen
 
     def get(self, capture_id: str, *, timeout: float = 60.0) -> Face:
@@ -140,29 +141,42 @@ class Client:
                         raise outcome.error
                     return outcome.face
 
-    def faces(self, *, after: int | None = None, timeout: float | None = None) -> Iterator[Face]:
+    def faces(
+        self, *, after: int | None = None, last: int | None = None, since: datetime | None = None,
+        timeout: float | None = None,
+    ) -> Iterator[Face]:
         """Follow the faces as they are published; failures are left out. See `published`."""
-        for outcome in self.published(after=after, timeout=timeout):
+        for outcome in self.published(after=after, last=last, since=since, timeout=timeout):
             if isinstance(outcome, PublishedFace):
                 yield outcome.face
 
     def published(
-        self, *, after: int | None = None, timeout: float | None = None
+        self, *, after: int | None = None, last: int | None = None, since: datetime | None = None,
+        timeout: float | None = None,
     ) -> Iterator[Published]:
-        """Follow all outcomes in order and without gaps, over restarts of the hub too.
+        """Follow all outcomes that are kept, in order, over restarts of the hub too.
+
+        A number that is left out was removed at the hub. An id that comes again under a higher
+        number was made again: the last one stands.
 
         Parameters
         ----------
-        after : sequence number to start after; where None, only what comes from now on
+        after : sequence number to start after
+        last : start with so many of those that are kept
+        since : start with what ended at this time, with a zone, or later; of these three at most
+            one, and where there is none, only what comes from now on
         timeout : longest wait for the next one, seconds; where None, for ever
 
         Raises
         ------
         ClientTimeoutError
             Nothing came in `timeout` seconds.
+        LocalProtocolError
+            More than one start is given, `last` is not positive or `since` has no zone.
         """
+        find = self._finder(after, last, since)
         with Subscriber(self._context, self._publications, self._ask_next, self.status) as follow:
-            follow.start(after, timeout)
+            follow.start(after, timeout, find)
             while True:
                 yield follow.next(timeout)
 
@@ -175,7 +189,22 @@ class Client:
             The hub did not answer.
         """
         answer = self._ask(messages.GetStatus(request=next(self._requests)), timeout).message
-        return _expect(answer, Status)
+        return expect(answer, Status)
+
+    def _finder(
+        self, after: int | None, last: int | None, since: datetime | None
+    ) -> Callable[[float], messages.StartAt] | None:
+        if (after is not None) + (last is not None) + (since is not None) > 1:
+            raise LocalProtocolError("expected at most one of after, last and since")
+        if last is None and since is None:
+            return None
+        try:
+            message = messages.FindStart(request=next(self._requests), last=last, since=since)
+        except ValidationError as error:
+            raise LocalProtocolError(
+                f"expected a positive last, found {last}, or a since with a zone, found {since}"
+            ) from error
+        return lambda timeout: expect(self._ask(message, timeout).message, messages.StartAt)
 
     def _ask_next(self, after: int, timeout: float) -> Packet:
         return self._ask(messages.GetNext(request=next(self._requests), after=after), timeout)
@@ -210,7 +239,8 @@ class Client:
                 return packet
 
 
-def _expect(answer: object, kind: type[_T]) -> _T:
+def expect(answer: object, kind: type[_T]) -> _T:
+    """Give an answer that is of the kind expected; else RemoteProtocolError."""
     if not isinstance(answer, kind):
         raise RemoteProtocolError(
             f"the hub answered with {type(answer).__name__}, {kind.__name__} expected")

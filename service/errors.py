@@ -8,6 +8,9 @@ __all__ = [
     "CaptureFailedError",
     "ClientTimeoutError",
     "CorruptFileError",
+    "DamagedDatabaseError",
+    "DamagedFaceError",
+    "DiskFullError",
     "FormatError",
     "HubRunningError",
     "LocalProtocolError",
@@ -76,8 +79,29 @@ class StoreError(ServiceError, OSError):
     """The data folder cannot be read or written."""
 
 
+class DiskFullError(StoreError):
+    """There is no room for what was to be kept."""
+
+
 class CorruptFileError(StoreError):
     """A file of the data folder does not have the contents that its checksum states."""
+
+
+class DamagedFaceError(CorruptFileError):
+    """A face that was kept cannot be read any more: it is to be made again.
+
+    Attributes
+    ----------
+    capture_id : the capture
+    """
+
+    def __init__(self, capture_id: str, reason: str) -> None:
+        super().__init__(reason)
+        self.capture_id = capture_id
+
+
+class DamagedDatabaseError(ServiceError, OSError):
+    """The database is malformed: the hub has to end, the next one rebuilds it from the files."""
 
 
 class SettingsError(ServiceError, ValueError):

@@ -13,15 +13,16 @@ import structlog
 
 from recon.settings import Settings
 from service import messages
-from service.errors import ServiceError
+from service.errors import DamagedDatabaseError, DamagedFaceError, ServiceError
 from service.intake import Intake
 from service.jobs import Jobs
+from service.keeper import Keeper
 from service.outcomes import Outcomes
 from service.outputs import Output, Publish, Topic, send
 from service.roster import Roster
 from service.settings import ServiceSettings
 from service.states import CaptureState
-from service.store import Store
+from service.stored import Store
 from service.wire import Packet
 
 __all__ = ["Hub", "settings_hash"]
@@ -46,9 +47,10 @@ class Hub:
         self._store = store
         self._settings = settings
         self._roster = Roster()
-        self._outcomes = Outcomes(store)
+        self._outcomes = Outcomes(store, self._remake)
         self._intake = Intake(store, self._roster, settings, recon, settings_hash(recon))
         self._jobs = Jobs(store, self._roster, settings.attempts, self._outcomes.concluded)
+        self._keeper = Keeper(store, settings, self._intake, self._jobs, self._outcomes)
         self._status_due = 0.0
         self._log = structlog.get_logger("hub")
 
@@ -59,11 +61,18 @@ class Hub:
         ----------
         now : seconds, of a clock that only goes forward
         peer : the sender's routing id
+
+        Raises
+        ------
+        DamagedDatabaseError
+            The hub has to end: the next one mends the database.
         """
         outputs: list[Output] = []
         try:
             outputs.extend(self._receive(now, peer, packet))
             outputs.extend(self._jobs.dispatch(now))
+        except DamagedDatabaseError:
+            raise
         except ServiceError as error:
             self._log.error("message failed", kind=packet.message.kind, reason=str(error))
             request = getattr(packet.message, "request", None)
@@ -73,7 +82,10 @@ class Hub:
         return outputs
 
     def tick(self, now: float) -> list[Output]:
-        """Do what is due: time-outs, silent peers, status. To be called a few times a second."""
+        """Do what is due: time-outs, silent peers, removals, status.
+
+        To be called a few times a second; raises as `receive`.
+        """
         outputs: list[Output] = []
         try:
             outputs.extend(self._intake.tick(now))
@@ -81,9 +93,12 @@ class Hub:
             for peer in self._roster.silent(now - self._settings.silence_s):
                 outputs.extend(self._gone(peer, "silent"))
             outputs.extend(self._jobs.dispatch(now))
+            self._keeper.tick(now)
             if now >= self._status_due:
                 self._status_due = now + self._settings.heartbeat_s
                 outputs.append(Publish(Topic.STATUS, Packet(self._status())))
+        except DamagedDatabaseError:
+            raise
         except ServiceError as error:
             self._log.error("tick failed", reason=str(error))
         return outputs
@@ -100,6 +115,11 @@ class Hub:
                 yield from self._outcomes.get_face(now, peer, message)
             case messages.GetNext() as message:
                 yield from self._outcomes.get_next(peer, message)
+            case messages.FindStart() as message:
+                yield from self._outcomes.find_start(peer, message)
+            case messages.ListDead() | messages.RetryDead() | messages.DropDead() | \
+                    messages.Purge() as message:
+                yield from self._keeper.receive(peer, message)
             case messages.GetStatus(request=request):
                 yield send(peer, self._status(request))
             case messages.SensorReady(name=name, source=source):
@@ -117,7 +137,7 @@ class Hub:
             case messages.FrameFailed(capture_id=capture_id, message=reason):
                 yield from self._intake.refuse(capture_id, reason)
             case messages.Result() as message:
-                yield from self._jobs.result(peer, message, packet)
+                yield from self._jobs.result(now, peer, message, packet)
             case messages.JobFailed() as message:
                 yield from self._jobs.failed(peer, message)
 
@@ -126,6 +146,10 @@ class Hub:
         yield from self._intake.frame(peer, message, packet)
         if before is None and self._store.find(message.capture_id):
             self._jobs.add(message.capture_id)
+
+    def _remake(self, error: DamagedFaceError, kept_before: bool) -> None:
+        # One that is damaged as soon as it is written has used up an attempt.
+        self._jobs.remake(error.capture_id, str(error), attempts_left=kept_before)
 
     def _worker_ready(self, now: float, peer: bytes, name: str, credit: int) -> None:
         known = self._roster.workers.get(peer)

@@ -12,10 +12,12 @@ from service.outputs import Output, send
 from service.roster import Roster
 from service.settings import ServiceSettings
 from service.states import CaptureEvent, CaptureState, advance
-from service.store import Store
+from service.stored import Store
 from service.wire import Packet
 
 __all__ = ["Intake"]
+
+_MIB = 2**20
 
 
 @dataclass
@@ -59,9 +61,9 @@ class Intake:
             yield send(peer, messages.PressAccepted(request=request, capture_id=capture_id))
             return
         sensor = self._roster.sensor()
-        if sensor is None or queued + len(self) >= self._settings.queue:
-            reason = ("no sensor is connected" if sensor is None
-                      else f"{self._settings.queue} frames wait for a worker already")
+        reason = self._obstacle(queued)
+        if sensor is None or reason:
+            reason = reason or "no sensor is connected"
             self._log.warning("press refused", capture_id=capture_id, reason=reason)
             yield send(peer, messages.PressRefused(
                 request=request, capture_id=capture_id, message=reason))
@@ -70,6 +72,18 @@ class Intake:
         deadline = now + self._settings.take_timeout_s
         self._presses[capture_id] = _Press(sensor.peer, deadline, {peer: request})
         yield send(sensor.peer, messages.Take(capture_id=capture_id))
+
+    def _obstacle(self, queued: int) -> str | None:
+        if queued + len(self) >= self._settings.queue:
+            return f"{self._settings.queue} frames wait for a worker already"
+        try:
+            free = self._store.free_bytes() // _MIB
+        except StoreError as error:
+            return str(error)
+        if free < self._settings.reserve_mib:
+            return (f"no room on the disk ({free} MiB free, {self._settings.reserve_mib} MiB are "
+                    "to stay free for the faces of what was accepted)")
+        return None
 
     def frame(self, peer: bytes, message: messages.Frame, packet: Packet) -> Iterator[Output]:
         """Keep a frame, then say so: to the sensor and to all who pressed."""
@@ -97,6 +111,11 @@ class Intake:
             for presser, request in press.pressers.items():
                 yield send(presser, messages.PressRefused(
                     request=request, capture_id=capture_id, message=reason))
+
+    def purge(self, capture_id: str | None) -> Iterator[Output]:
+        """Refuse one press, or all where None, whose frame is no longer wanted."""
+        for waiting in [capture_id] if capture_id else list(self._presses):
+            yield from self.refuse(waiting, "purged by an operator")
 
     def sensor_gone(self, peer: bytes, reason: str) -> Iterator[Output]:
         """Refuse what a sensor that went away was asked for."""

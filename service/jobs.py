@@ -1,7 +1,7 @@
 """The hub's second half: a kept frame becomes an outcome, whatever happens to the workers."""
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 
 import structlog
 from pydantic import ValidationError
@@ -12,12 +12,15 @@ from service.errors import CorruptFileError, ProtocolError, StoreError
 from service.outputs import Output, send
 from service.roster import Roster, Worker
 from service.states import CaptureEvent, CaptureState, advance
-from service.store import Store, Stored
+from service.stored import Store, Stored
 from service.wire import Packet
 
 __all__ = ["Jobs"]
 
 _LOST = ("WorkerLost", "the worker that held it went away")
+_MOST_UNKEPT = 16
+_PAUSE_S = 1.0
+"""Time until what the disk refused is tried again, seconds."""
 
 
 class Jobs:
@@ -34,6 +37,9 @@ class Jobs:
         self._concluded = concluded
         self._queue = deque(store.unfinished())
         self._reasons: dict[str, tuple[str, str]] = {}
+        self._unkept: deque[tuple[messages.Result, Packet]] = deque()
+        """Results that the disk refused; workers get nothing new meanwhile."""
+        self._paused_until = 0.0
         self._log = structlog.get_logger("hub")
         if self._queue:
             self._log.info("resumed", accepted=len(self._queue))
@@ -50,10 +56,54 @@ class Jobs:
 
     def add(self, capture_id: str) -> None:
         """Queue a frame that was just kept."""
-        self._queue.append(capture_id)
+        if capture_id not in self._queue:
+            self._queue.append(capture_id)
+
+    def forget(self, capture_ids: Collection[str]) -> None:
+        """Drop captures that were removed, from workers' hands too."""
+        self._queue = deque(one for one in self._queue if one not in capture_ids)
+        for capture_id in capture_ids:
+            self._reasons.pop(capture_id, None)
+        for worker in self._roster.workers.values():
+            if worker.job in capture_ids:
+                worker.job = None
+
+    def remake(self, capture_id: str, reason: str, *, attempts_left: bool = True) -> None:
+        """Take up a capture again whose face turned out to be damaged."""
+        self._store.reopen(capture_id, attempts_left=attempts_left)
+        self._reasons[capture_id] = "CorruptFileError", reason
+        self.add(capture_id)
+        self._log.warning("face to be made again", capture_id=capture_id, reason=reason)
 
     def dispatch(self, now: float) -> Iterator[Output]:
-        """Give frames to free workers, oldest first; give up what has no attempt left."""
+        """Give frames to free workers, oldest first; give up what has no attempt left.
+
+        While the disk refuses what is to be kept, nothing new is begun.
+        """
+        if now < self._paused_until:
+            return
+        try:
+            yield from self._keep_refused()
+            yield from self._dispatch(now)
+        except StoreError as error:
+            self._pause(now, str(error))
+
+    def _keep_refused(self) -> Iterator[Output]:
+        while self._unkept:
+            message, packet = self._unkept[0]
+            useful = self._of_use(message, CaptureEvent.RESULT)
+            if useful:
+                self._store.finish(packet)
+            self._unkept.popleft()
+            if useful:
+                self._log.info("done", capture_id=message.capture_id)
+                yield from self._concluded(message.capture_id)
+
+    def _pause(self, now: float, reason: str) -> None:
+        self._paused_until = now + _PAUSE_S
+        self._log.error("the disk refuses, work waits", reason=reason, unkept=len(self._unkept))
+
+    def _dispatch(self, now: float) -> Iterator[Output]:
         while self._queue:
             capture_id = self._queue[0]
             stored = self._store.find(capture_id)
@@ -67,17 +117,23 @@ class Jobs:
                 return
 
     def result(
-        self, peer: bytes, message: messages.Result, packet: Packet
+        self, now: float, peer: bytes, message: messages.Result, packet: Packet
     ) -> Iterator[Output]:
         """Keep and announce a face, unless this capture has its outcome."""
         capture_id = message.capture_id
-        if not self._expected(peer, capture_id, message.settings_hash, CaptureEvent.RESULT):
+        if not self._expected(peer, message, CaptureEvent.RESULT):
             return
         try:
             message.face.join(packet.arrays)
             self._store.finish(packet)
-        except (ProtocolError, StoreError) as error:
+        except ProtocolError as error:
             self._retry(capture_id, type(error).__name__, str(error))
+        except StoreError as error:
+            self._pause(now, str(error))
+            if len(self._unkept) < _MOST_UNKEPT:
+                self._unkept.append((message, packet))
+            else:
+                self._retry(capture_id, type(error).__name__, str(error))
         else:
             self._log.info("done", capture_id=capture_id)
             yield from self._concluded(capture_id)
@@ -85,14 +141,19 @@ class Jobs:
     def failed(self, peer: bytes, message: messages.JobFailed) -> Iterator[Output]:
         """Announce "no face", or try again."""
         event = CaptureEvent.REJECTED if message.final else CaptureEvent.LOST
-        if not self._expected(peer, message.capture_id, message.settings_hash, event):
+        if not self._expected(peer, message, event):
             return
-        if message.final:
-            self._store.fail(message.capture_id, message.error, message.message, dead=False)
-            self._log.info("failed", capture_id=message.capture_id, error=message.error)
-            yield from self._concluded(message.capture_id)
+        capture_id = message.capture_id
+        if not message.final:
+            self._retry(capture_id, message.error, message.message)
+            return
+        try:
+            self._store.fail(capture_id, message.error, message.message, dead=False)
+        except StoreError as error:
+            self._retry(capture_id, type(error).__name__, str(error))
         else:
-            self._retry(message.capture_id, message.error, message.message)
+            self._log.info("failed", capture_id=capture_id, error=message.error)
+            yield from self._concluded(capture_id)
 
     def lost(self, worker: Worker) -> None:
         """Take back what a worker held that went away or came back without an answer."""
@@ -104,9 +165,9 @@ class Jobs:
         self, now: float, capture_id: str, stored: Stored, worker: Worker
     ) -> Iterator[Output]:
         try:
-            header, arrays = self._store.frame(capture_id)
-            settings = Settings.model_validate_json(stored.settings_json)
-        except (CorruptFileError, ProtocolError, ValidationError) as error:
+            kept = self._store.frame(capture_id)
+            settings = Settings.model_validate_json(kept.about.settings)
+        except (CorruptFileError, ValidationError) as error:
             yield from self._give_up(capture_id, type(error).__name__, str(error))
             return
         attempt = self._store.start_attempt(capture_id)
@@ -115,7 +176,8 @@ class Jobs:
         self._log.info("dispatched", capture_id=capture_id, worker=worker.name, attempt=attempt)
         yield send(worker.peer, messages.Job(
             capture_id=capture_id, attempt=attempt, settings=settings,
-            settings_hash=stored.settings_hash, frame=header), arrays)
+            settings_hash=stored.settings_hash, frame_sha256=stored.frame_sha256,
+            frame=kept.message.frame), kept.arrays)
 
     def _give_up(self, capture_id: str, error: str, reason: str) -> Iterator[Output]:
         self._store.fail(capture_id, error, reason, dead=True)
@@ -131,17 +193,28 @@ class Jobs:
             self._reasons[capture_id] = error, reason
             self._queue.appendleft(capture_id)
 
-    def _expected(self, peer: bytes, capture_id: str, hashed: str, event: CaptureEvent) -> bool:
+    def _expected(
+        self, peer: bytes, answer: messages.Result | messages.JobFailed, event: CaptureEvent
+    ) -> bool:
         """Say whether an answer is of use; whoever held the job holds it no more."""
-        state = self._state(capture_id)
+        capture_id = answer.capture_id
+        useful = self._of_use(answer, event)
         worker = self._roster.workers.get(peer)
         if worker and worker.job == capture_id:
             worker.job = None
-        stored = self._store.find(capture_id)
-        if stored and stored.settings_hash == hashed and advance(state, event):
-            return True
-        self._log.info("answer dropped", capture_id=capture_id, answer=str(event))
-        return False
+            if not useful and self._state(capture_id) is CaptureState.ACCEPTED:
+                self._retry(capture_id, "RemoteProtocolError", "the answer was to another job")
+        if not useful:
+            self._log.info("answer dropped", capture_id=capture_id, answer=str(event))
+        return useful
+
+    def _of_use(
+        self, answer: messages.Result | messages.JobFailed, event: CaptureEvent
+    ) -> bool:
+        stored = self._store.find(answer.capture_id)
+        asked = stored and (stored.settings_hash, stored.frame_sha256)
+        return (asked == (answer.settings_hash, answer.frame_sha256)
+                and advance(self._state(answer.capture_id), event) is not None)
 
     def _state(self, capture_id: str) -> CaptureState | None:
         stored = self._store.find(capture_id)

@@ -3,19 +3,20 @@
 Each class is the JSON header of one kind of message; how it is written is in `service.wire`.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validator
 
 from recon.settings import Settings
 from service.payload import FaceHeader, FrameHeader, Payload
 
 __all__ = [
-    "Announce", "CaptureFailed", "CaptureId", "CapturePending", "CaptureUnknown", "FaceDone",
-    "Frame", "FrameAccepted", "FrameFailed", "FrameRefused", "FromHub", "GetFace", "GetNext",
-    "GetStatus", "Goodbye", "Heartbeat", "Job", "JobFailed", "Message", "NothingNewer", "Press",
-    "PressAccepted", "PressRefused", "Request", "RequestFailed", "Result", "SensorReady", "Status",
-    "Take", "ToHub", "WorkerReady",
+    "Announce", "CaptureFailed", "CaptureId", "CapturePending", "CaptureUnknown", "DeadLetter",
+    "DeadLetters", "DropDead", "FaceDone", "FindStart", "Frame", "FrameAccepted", "FrameFailed",
+    "FrameRefused", "FromHub", "GetFace", "GetNext", "GetStatus", "Goodbye", "Heartbeat", "Job",
+    "JobFailed", "ListDead", "Message", "NothingNewer", "Press", "PressAccepted", "PressRefused",
+    "Purge", "Removed", "Request", "RequestFailed", "Result", "RetryDead", "SensorReady",
+    "StartAt", "Status", "Take", "ToHub", "WorkerReady",
 ]
 
 CaptureId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
@@ -24,6 +25,7 @@ CaptureId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
 _Name = Annotated[str, Field(max_length=200)]
 _Text = Annotated[str, Field(max_length=4000)]
 _Token = Annotated[str, Field(pattern=r"^[0-9a-f]{1,64}$")]
+_Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 _Number = Annotated[int, Field(ge=0, lt=2**63)]
 _Seconds = Annotated[float, Field(ge=0, le=3600)]
 
@@ -89,10 +91,64 @@ class GetNext(_Request):
     after: _Number
 
 
+class FindStart(_Request):
+    """Say after which number to start, to be given what is asked for here."""
+
+    kind: Literal["find_start"] = "find_start"
+    last: Annotated[int, Field(ge=1, lt=2**31)] | None = None
+    """The last so many outcomes that are kept."""
+    since: AwareDatetime | None = None
+    """Outcomes of this time or later."""
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if (self.last is None) == (self.since is None):
+            raise ValueError("expected either last or since")
+        return self
+
+
 class GetStatus(_Request):
     """Say who is there and what was done."""
 
     kind: Literal["get_status"] = "get_status"
+
+
+class ListDead(_Request):
+    """Operator: give the next captures that were given up, by sequence number."""
+
+    kind: Literal["list_dead"] = "list_dead"
+    after: _Number = 0
+
+
+class RetryDead(_Request):
+    """Operator: try a capture again that was given up, with all its attempts."""
+
+    kind: Literal["retry_dead"] = "retry_dead"
+    capture_id: CaptureId
+
+
+class DropDead(_Request):
+    """Operator: remove a capture that was given up."""
+
+    kind: Literal["drop_dead"] = "drop_dead"
+    capture_id: CaptureId
+
+
+class Purge(_Request):
+    """Operator: remove captures, whatever became of them; repeat while some are left."""
+
+    kind: Literal["purge"] = "purge"
+    capture_id: CaptureId | None = None
+    before: AwareDatetime | None = None
+    """What was accepted before this time."""
+    everything: bool = False
+    """Also all that is in quarantine."""
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if (self.capture_id is not None) + (self.before is not None) + self.everything != 1:
+            raise ValueError("expected one of capture_id, before and everything")
+        return self
 
 
 # --- hub to client
@@ -141,11 +197,54 @@ class NothingNewer(_Answer):
     sequence: _Number
 
 
+class StartAt(_Answer):
+    """The answer to `FindStart`."""
+
+    kind: Literal["start_at"] = "start_at"
+    epoch: _Token
+    sequence: _Number
+    """What is asked for comes after this number."""
+
+
+class DeadLetter(BaseModel):
+    """A capture that was given up; its frame is kept."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    sequence: _Number
+    capture_id: CaptureId
+    error: _Name
+    message: Annotated[str, Field(max_length=300)]
+    """The beginning of it."""
+    attempts: _Number
+    accepted_at: _Name
+    """UTC, ISO 8601."""
+    finished_at: _Name
+
+
+class DeadLetters(_Answer):
+    """The answer to `ListDead`."""
+
+    kind: Literal["dead_letters"] = "dead_letters"
+    letters: Annotated[tuple[DeadLetter, ...], Field(max_length=50)]
+    """None where there are no more."""
+
+
+class Removed(_Answer):
+    """The answer to `DropDead` and `Purge`."""
+
+    kind: Literal["removed"] = "removed"
+    removed: _Number
+    """Captures removed now."""
+    left: bool
+    """There are more that were asked for."""
+
+
 class _Outcome(_Answer):
     epoch: _Token
     """The store that counts `sequence`; another one after the data folder was replaced."""
     sequence: _Number
-    """Number of this outcome; without gaps."""
+    """Number of this outcome; one that is missing was removed or withdrawn."""
     capture_id: CaptureId
 
 
@@ -243,6 +342,8 @@ class Result(_WithFace):
     kind: Literal["result"] = "result"
     capture_id: CaptureId
     settings_hash: _Token
+    frame_sha256: _Digest
+    """As in the job: another frame may have come under this id meanwhile."""
 
 
 class JobFailed(_Message):
@@ -251,6 +352,8 @@ class JobFailed(_Message):
     kind: Literal["job_failed"] = "job_failed"
     capture_id: CaptureId
     settings_hash: _Token
+    frame_sha256: _Digest
+    """As in the job: another frame may have come under this id meanwhile."""
     error: _Name
     message: _Text
     final: bool
@@ -295,12 +398,16 @@ class Job(_WithFrame):
     attempt: _Number
     settings: Settings
     settings_hash: _Token
+    frame_sha256: _Digest
+    """Of the frame as the hub keeps it."""
 
 
-Request = Press | GetFace | GetNext | GetStatus
-ToHub = (Press | GetFace | GetNext | GetStatus | SensorReady | WorkerReady | Heartbeat | Goodbye
-         | Frame | FrameFailed | Result | JobFailed)
+Request = (Press | GetFace | GetNext | FindStart | GetStatus | ListDead | RetryDead | DropDead
+           | Purge)
+ToHub = (Press | GetFace | GetNext | FindStart | GetStatus | ListDead | RetryDead | DropDead
+         | Purge | SensorReady | WorkerReady | Heartbeat | Goodbye | Frame | FrameFailed | Result
+         | JobFailed)
 FromHub = (PressAccepted | PressRefused | CapturePending | CaptureUnknown | RequestFailed
-           | NothingNewer | FaceDone | CaptureFailed | Status | Announce | Take | FrameAccepted
-           | FrameRefused | Job)
+           | NothingNewer | StartAt | DeadLetters | Removed | FaceDone | CaptureFailed | Status
+           | Announce | Take | FrameAccepted | FrameRefused | Job)
 Message = ToHub | FromHub

@@ -1,11 +1,12 @@
 """The hub's last part: outcomes are published, and given to whoever asks."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 
 from service import messages
+from service.errors import DamagedFaceError
 from service.outputs import Output, Publish, Send, Topic, send
-from service.store import Store
+from service.stored import Store
 from service.wire import Packet
 
 __all__ = ["Outcomes"]
@@ -23,24 +24,47 @@ class _Waiter:
 class Outcomes:
     """What ended, and who waits for what has not."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Store, remake: Callable[[DamagedFaceError, bool], None]) -> None:
+        """Publish and give; `remake` takes up a damaged face, True where it was kept before."""
         self._store = store
+        self._remake = remake
         self._waiters: dict[bytes, _Waiter] = {}
         """A client waits for one capture at a time."""
 
     def concluded(self, capture_id: str) -> Iterator[Output]:
         """Publish the outcome of a capture and answer those who wait for it."""
-        if packet := self._store.outcome(capture_id):
+        try:
+            packet = self._store.outcome(capture_id)
+        except DamagedFaceError as error:
+            self._remake(error, False)
+            return
+        if packet:
             yield Publish(Topic.FACES, packet)
-            waiting = [peer for peer, waiter in self._waiters.items()
-                       if waiter.capture_id == capture_id]
-            for peer in waiting:
-                yield _answer(peer, self._waiters.pop(peer).request, packet)
+            for peer, waiter in self._take_waiters([capture_id]):
+                yield _answer(peer, waiter.request, packet)
+
+    def removed(self, capture_ids: Collection[str]) -> Iterator[Output]:
+        """Answer those who wait for captures that are gone."""
+        for peer, waiter in self._take_waiters(capture_ids):
+            yield send(peer, messages.CaptureUnknown(
+                request=waiter.request, capture_id=waiter.capture_id))
+
+    def _take_waiters(self, capture_ids: Collection[str]) -> list[tuple[bytes, _Waiter]]:
+        waiting = [(peer, waiter) for peer, waiter in self._waiters.items()
+                   if waiter.capture_id in capture_ids]
+        for peer, _ in waiting:
+            del self._waiters[peer]
+        return waiting
 
     def get_face(self, now: float, peer: bytes, message: messages.GetFace) -> Iterator[Output]:
         """Give an outcome, or note that someone waits for it."""
         capture_id, request = message.capture_id, message.request
-        if packet := self._store.outcome(capture_id):
+        try:
+            packet = self._store.outcome(capture_id)
+        except DamagedFaceError as error:
+            self._remake(error, True)
+            packet = None
+        if packet:
             yield _answer(peer, request, packet)
         elif self._store.find(capture_id) is None:
             yield send(peer, messages.CaptureUnknown(request=request, capture_id=capture_id))
@@ -50,13 +74,29 @@ class Outcomes:
             yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
 
     def get_next(self, peer: bytes, message: messages.GetNext) -> Iterator[Output]:
-        """Give the first outcome after a sequence number."""
-        if packet := self._store.outcome_after(message.after):
+        """Give the first outcome after a sequence number that is whole."""
+        if packet := self._next(message.after):
             yield _answer(peer, message.request, packet)
         else:
             yield send(peer, messages.NothingNewer(
                 request=message.request, epoch=self._store.epoch,
                 sequence=self._store.last_sequence()))
+
+    def _next(self, after: int) -> Packet | None:
+        while True:
+            try:
+                return self._store.outcome_after(after)
+            except DamagedFaceError as error:
+                self._remake(error, True)
+
+    def find_start(self, peer: bytes, message: messages.FindStart) -> Iterator[Output]:
+        """Give the number after which the outcomes come that are asked for."""
+        if message.since is not None:
+            sequence = self._store.before_time(message.since)
+        else:
+            sequence = self._store.before_last(message.last or 1)
+        yield send(peer, messages.StartAt(
+            request=message.request, epoch=self._store.epoch, sequence=sequence))
 
     def tick(self, now: float) -> Iterator[Output]:
         """Answer those who waited long enough."""

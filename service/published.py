@@ -16,7 +16,7 @@ from service.errors import (
     ProtocolError,
     RemoteProtocolError,
 )
-from service.messages import CaptureFailed, FaceDone, NothingNewer, Status
+from service.messages import CaptureFailed, FaceDone, NothingNewer, StartAt, Status
 from service.outputs import Topic
 from service.sockets import connect
 from service.wire import Packet, decode_from_hub
@@ -107,11 +107,19 @@ class Subscriber:
     ) -> None:
         self._socket.close(linger=0)
 
-    def start(self, after: int | None, timeout: float | None) -> None:
-        """Start after a number, or at what comes from now on."""
-        status = self._patiently(lambda wait: self._ask_status(timeout=wait), _deadline(timeout))
-        self._epoch = status.epoch
-        self._last = status.sequence if after is None else after
+    def start(
+        self, after: int | None, timeout: float | None,
+        find: Callable[[float], StartAt] | None = None,
+    ) -> None:
+        """Start after a number, where `find` says, or at what comes from now on."""
+        deadline = _deadline(timeout)
+        found: Status | StartAt
+        if find is not None:
+            found = self._patiently(find, deadline)
+        else:
+            found = self._patiently(lambda wait: self._ask_status(timeout=wait), deadline)
+        self._epoch = found.epoch
+        self._last = found.sequence if after is None else after
 
     def next(self, timeout: float | None) -> Published:
         """Wait for the next one."""
@@ -131,6 +139,8 @@ class Subscriber:
         if self._new_epoch(message.epoch):
             return None
         if isinstance(message, NothingNewer):
+            # Numbers up to this one that did not come were removed.
+            self._last = max(self._last, message.sequence)
             self._behind = False
             return None
         return packet

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import platformdirs
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from service.errors import SettingsError
+from service.times import retention_of
 
 __all__ = ["ServiceSettings", "default_address", "private_folder", "runtime_folder"]
 
@@ -55,6 +56,10 @@ class ServiceSettings(BaseModel):
     """Longest reconstruction; a worker that takes longer ends itself, seconds."""
     queue: Annotated[int, Field(ge=1, le=100_000)] = 1000
     """Frames that may wait for a worker; beyond it a press is refused."""
+    retention: Annotated[float | None, BeforeValidator(retention_of)] = 86400.0
+    """Time after its outcome when a capture is removed, seconds; None for never."""
+    reserve_mib: Annotated[int, Field(ge=0, le=2**30)] = 256
+    """Room that is to stay free on the disk, MiB; with less a press is refused."""
     resend_s: _Seconds = 2.0
     """Time after which an unanswered request or frame is sent again, seconds."""
 

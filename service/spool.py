@@ -4,17 +4,19 @@ Layout: the magic line, SHA-256 of all that follows it (32 bytes), the number of
 the length of each (uint64), little-endian, then the parts.
 """
 
+import errno
 import hashlib
 import os
 import struct
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
-from service.errors import CorruptFileError, StoreError
+from service.errors import CorruptFileError, DiskFullError, StoreError
 
-__all__ = ["read_parts", "write_atomically", "write_parts"]
+__all__ = ["read_parts", "store_error", "sync_folder", "write_atomically", "write_parts"]
 
-_MAGIC = b"denseface spool 1\n"
+_MAGIC = b"denseface spool 2\n"
 _DIGEST_BYTES = hashlib.sha256().digest_size
 
 
@@ -26,7 +28,7 @@ def write_atomically(path: Path, chunks: Sequence[bytes], *, durable: bool = Tru
     Raises
     ------
     OSError
-        As from the system; nothing half-written stays.
+        As from the system; nothing half-written stays, though all of it may.
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
@@ -38,10 +40,11 @@ def write_atomically(path: Path, chunks: Sequence[bytes], *, durable: bool = Tru
                 os.fsync(file.fileno())
         temporary.replace(path)
     except BaseException:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
         raise
     if durable:
-        _sync_folder(path.parent)
+        sync_folder(path.parent)
 
 
 def write_parts(path: Path, parts: Sequence[bytes]) -> str:
@@ -49,8 +52,10 @@ def write_parts(path: Path, parts: Sequence[bytes]) -> str:
 
     Raises
     ------
+    DiskFullError
+        Where there is no room.
     StoreError
-        Where the disk is full or the file cannot be written.
+        Where the file cannot be written for another reason.
     """
     index = struct.pack(f"<I{len(parts)}Q", len(parts), *map(len, parts))
     digest = hashlib.sha256(index)
@@ -59,35 +64,57 @@ def write_parts(path: Path, parts: Sequence[bytes]) -> str:
     try:
         write_atomically(path, [_MAGIC, digest.digest(), index, *parts])
     except OSError as error:
-        raise StoreError(f"{path}: {error.strerror or error}") from error
+        raise store_error(path, error) from error
     return digest.hexdigest()
 
 
-def read_parts(path: Path, checksum: str) -> list[bytes]:
-    """Read what `write_parts` wrote.
+def read_parts(path: Path, checksum: str | None = None) -> tuple[list[bytes], str]:
+    """Read what `write_parts` wrote and give it with its checksum.
+
+    Parameters
+    ----------
+    checksum : that it must have; where None, the one that the file itself states
 
     Raises
     ------
     CorruptFileError
-        Where the file is missing or is not what had `checksum`.
+        Where the file is missing, cannot be read from the disk or is not what had the checksum.
+    StoreError
+        Where this process may not read it, or has no means to.
     """
     try:
         data = memoryview(path.read_bytes())
     except OSError as error:
-        raise CorruptFileError(f"{path}: {error.strerror or error}") from error
+        lost = error.errno in (errno.ENOENT, errno.EIO, errno.EISDIR)
+        raise (CorruptFileError if lost else StoreError)(
+            f"{path}: {error.strerror or error}") from error
     start = len(_MAGIC) + _DIGEST_BYTES
-    if data[:len(_MAGIC)] != _MAGIC or hashlib.sha256(data[start:]).hexdigest() != checksum:
-        raise CorruptFileError(f"{path}: contents do not have the checksum {checksum[:12]}...")
+    found = hashlib.sha256(data[start:]).hexdigest()
+    stated = bytes(data[len(_MAGIC):start]).hex()
+    if data[:len(_MAGIC)] != _MAGIC or found != stated or found != (checksum or found):
+        raise CorruptFileError(
+            f"{path}: contents do not have the checksum {(checksum or stated)[:12]}...")
     (count,) = struct.unpack_from("<I", data, start)
     lengths = struct.unpack_from(f"<{count}Q", data, start + 4)
     parts, start = [], start + 4 + 8 * count
     for length in lengths:
         parts.append(bytes(data[start:start + length]))
         start += length
-    return parts
+    return parts, found
 
 
-def _sync_folder(folder: Path) -> None:
+def store_error(path: Path, error: OSError) -> StoreError:
+    """Say in one line why a file could not be written."""
+    reason = f"{path}: {error.strerror or error}"
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return DiskFullError(f"no room on the disk ({reason})")
+    if error.errno == errno.EIO:
+        return StoreError(f"the disk fails ({reason})")
+    return StoreError(reason)
+
+
+def sync_folder(folder: Path) -> None:
+    """Put the names in a folder on the disk; OSError where that fails."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(descriptor)

@@ -22,6 +22,9 @@ class CaptureState(StrEnum):
     """Published as "no face in this frame"."""
     DEAD = "dead"
     """Given up after repeated attempts; the frame is kept."""
+    REMOVED = "removed"
+    """By an operator or after the retention: unknown to all, the id may be pressed again. The row
+    stays until the files are gone."""
 
 
 class CaptureEvent(StrEnum):
@@ -39,6 +42,14 @@ class CaptureEvent(StrEnum):
     RESULT = "result"
     REJECTED = "rejected"
     """A worker says that no attempt would find a face."""
+    DAMAGED = "damaged"
+    """The stored face cannot be read: it is made again from its frame."""
+    RETRIED = "retried"
+    """An operator wants all attempts made again."""
+    EXPIRED = "expired"
+    """The retention has passed since the outcome."""
+    PURGED = "purged"
+    """An operator wants it gone."""
 
 
 _S, _E = CaptureState, CaptureEvent
@@ -55,6 +66,20 @@ TRANSITIONS: dict[tuple[CaptureState, CaptureEvent], CaptureState] = {
     (_S.WORKING, _E.REJECTED): _S.FAILED,
     (_S.WORKING, _E.LOST): _S.ACCEPTED,
     (_S.WORKING, _E.EXHAUSTED): _S.DEAD,
+    # The outcome is withdrawn, its sequence number used up; the next one gets a new number. So
+    # exactly one outcome stands for an id, the one with the highest number seen.
+    (_S.DONE, _E.DAMAGED): _S.ACCEPTED,
+    (_S.DEAD, _E.RETRIED): _S.ACCEPTED,
+    # What has no outcome never expires.
+    (_S.DONE, _E.EXPIRED): _S.REMOVED,
+    (_S.FAILED, _E.EXPIRED): _S.REMOVED,
+    (_S.DEAD, _E.EXPIRED): _S.REMOVED,
+    (_S.PRESSED, _E.PURGED): _S.REFUSED,
+    (_S.ACCEPTED, _E.PURGED): _S.REMOVED,
+    (_S.WORKING, _E.PURGED): _S.REMOVED,
+    (_S.DONE, _E.PURGED): _S.REMOVED,
+    (_S.FAILED, _E.PURGED): _S.REMOVED,
+    (_S.DEAD, _E.PURGED): _S.REMOVED,
 }
 """What is not here does not happen: the event is noted and dropped."""
 

@@ -1,140 +1,70 @@
 """The data folder: frames and faces as files, what became of them in SQLite.
 
-A file is written and synced before the row that names it, so a row never names what is not there.
-Every call is durable when it returns.
+A file is written and synced before the row that names it, so a row never names what was not there.
 """
 
 import fcntl
 import os
-import secrets
-import sqlite3
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from datetime import UTC, datetime
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from datetime import datetime
 from pathlib import Path
-from typing import Protocol, Self
+from typing import Self
 
 from recon.settings import Settings
-from service.errors import CorruptFileError, HubRunningError, StoreError
-from service.messages import CaptureFailed, FaceDone, Frame, Result
-from service.payload import Arrays, FrameHeader
+from service.ages import Clock, SystemClock, stamp
+from service.errors import (
+    CorruptFileError,
+    DamagedDatabaseError,
+    DamagedFaceError,
+    HubRunningError,
+    StoreError,
+)
+from service.kept import FaceAbout, FrameAbout, KeptFrame, read_face, read_frame, write_kept
+from service.layout import Layout
+from service.messages import CaptureFailed, DeadLetter, FaceDone, Frame, Result
+from service.recovery import recover
 from service.settings import private_folder
-from service.spool import read_parts, write_parts
+from service.spool import store_error, sync_folder
 from service.states import CaptureState
-from service.wire import Packet, decode_to_hub, encode
+from service.stored import Stored
+from service.wire import Packet
 
-__all__ = ["FolderStore", "Store", "Stored"]
+__all__ = ["FolderStore"]
 
-_SCHEMA = """
-CREATE TABLE IF NOT EXISTS meta (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
-CREATE TABLE IF NOT EXISTS captures (
-    position INTEGER PRIMARY KEY AUTOINCREMENT,
-    capture_id TEXT NOT NULL UNIQUE,
-    state TEXT NOT NULL,
-    settings TEXT NOT NULL,
-    settings_hash TEXT NOT NULL,
-    attempts INTEGER NOT NULL DEFAULT 0,
-    frame_sha256 TEXT NOT NULL,
-    accepted_at TEXT NOT NULL
-) STRICT;
-CREATE TABLE IF NOT EXISTS outcomes (
-    sequence INTEGER PRIMARY KEY AUTOINCREMENT,
-    capture_id TEXT NOT NULL REFERENCES captures (capture_id),
-    settings_hash TEXT NOT NULL,
-    face_sha256 TEXT,
-    error TEXT,
-    message TEXT,
-    dead INTEGER NOT NULL DEFAULT 0,
-    finished_at TEXT NOT NULL,
-    UNIQUE (capture_id, settings_hash)
-) STRICT;
-"""
-
-
-@dataclass(frozen=True)
-class Stored:
-    """A capture's row."""
-
-    state: CaptureState
-    settings_json: str
-    settings_hash: str
-    attempts: int
-
-
-class Store(Protocol):
-    """What the hub needs of a store; each call is durable when it returns, or raises StoreError."""
-
-    @property
-    def epoch(self) -> str:
-        """Name of this store, as long as it lives."""
-
-    def accept(self, frame: Packet, settings: Settings, settings_hash: str) -> None:
-        """Keep a `Frame`."""
-
-    def find(self, capture_id: str) -> Stored | None:
-        """Give a capture's row."""
-
-    def unfinished(self) -> list[str]:
-        """Give the ids of what was accepted and has no outcome, oldest first."""
-
-    def start_attempt(self, capture_id: str) -> int:
-        """Count an attempt before it is made and give its number, from 1."""
-
-    def frame(self, capture_id: str) -> tuple[FrameHeader, Arrays]:
-        """Give the frame back; CorruptFileError where it is damaged."""
-
-    def finish(self, result: Packet) -> None:
-        """Keep a `Result` as the capture's outcome; a second one changes nothing."""
-
-    def fail(self, capture_id: str, error: str, message: str, *, dead: bool) -> None:
-        """Keep a failure as the capture's outcome."""
-
-    def outcome(self, capture_id: str) -> Packet | None:
-        """Give the outcome as `FaceDone` or `CaptureFailed`."""
-
-    def outcome_after(self, sequence: int) -> Packet | None:
-        """Give the first outcome after a sequence number."""
-
-    def last_sequence(self) -> int:
-        """Give the number of the last outcome, 0 where there is none."""
-
-    def counts(self) -> dict[CaptureState, int]:
-        """Give the number of captures in each state."""
+_SHOWN = 300
+"""Characters of an error that a list shows."""
 
 
 class FolderStore:
-    """A `Store` in a folder: `frames/`, `faces/`, `captures.sqlite3`."""
+    """A `Store` in a folder, mended where it is damaged.
 
-    def __init__(self, folder: Path) -> None:
-        """Open or create.
+    Parameters
+    ----------
+    folder : `frames/`, `faces/`, `quarantine/`, `captures.sqlite3`, `lock`; created where missing
+    clock : tells how old things are
 
-        Raises
-        ------
-        HubRunningError
-            Where another hub has this folder open.
-        StoreError
-            Where it cannot be read or written.
-        """
-        self._frames = private_folder(folder) / "frames"
-        self._faces = folder / "faces"
-        self._lock = _lock(folder / "lock")
+    Raises
+    ------
+    HubRunningError
+        Where another hub has this folder open.
+    StoreError
+        Where it cannot be read or written.
+    """
+
+    def __init__(self, folder: Path, clock: Clock | None = None) -> None:
+        self._layout = Layout(private_folder(folder))
+        self._lock = _lock(self._layout.lock)
         try:
-            for sub in (self._frames, self._faces):
-                for abandoned in private_folder(sub).glob(".*.tmp"):
-                    abandoned.unlink()
-            self._database = sqlite3.connect(folder / "captures.sqlite3", isolation_level=None)
-            self._database.row_factory = sqlite3.Row
-            self._database.executescript(
-                "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON;"
-                + _SCHEMA)
-            self._database.execute(
-                "INSERT OR IGNORE INTO meta VALUES ('epoch', ?)", (secrets.token_hex(8),))
-            row = self._database.execute("SELECT value FROM meta WHERE name = 'epoch'").fetchone()
-        except (sqlite3.Error, OSError) as error:
+            self._database, self._account, self._quarantine = recover(
+                self._layout, clock or SystemClock())
+            self._epoch = self._database.meta("epoch") or ""
+        except OSError as error:
             os.close(self._lock)
+            if isinstance(error, StoreError):
+                raise
             raise StoreError(f"{folder}: {error}") from error
-        self._epoch = str(row["value"])
 
     @property
     def epoch(self) -> str:
@@ -145,145 +75,266 @@ class FolderStore:
         return self
 
     def __exit__(self, *_: object) -> None:
+        with suppress(StoreError, DamagedDatabaseError):
+            self._database.set_meta("clock", self._account.save())
         self._database.close()
         os.close(self._lock)
+
+    def free_bytes(self) -> int:
+        """Give the room that is left on the disk."""
+        try:
+            return shutil.disk_usage(self._layout.frames).free
+        except OSError as error:
+            raise store_error(self._layout.frames, error) from error
 
     def accept(self, frame: Packet, settings: Settings, settings_hash: str) -> None:
         """Keep a `Frame`."""
         message = frame.message
         if not isinstance(message, Frame):
             raise TypeError(f"a Frame is accepted, found {message.kind}")
-        checksum = write_parts(self._frame_path(message.capture_id), encode(frame))
-        with self._transaction() as database:
-            database.execute(
-                "INSERT INTO captures (capture_id, state, settings, settings_hash, frame_sha256,"
-                " accepted_at) VALUES (?, ?, ?, ?, ?, ?)",
-                (message.capture_id, CaptureState.ACCEPTED, settings.model_dump_json(),
-                 settings_hash, checksum, _now()))
+        capture_id = message.capture_id
+        self._finish_removal(self._removed(capture_id))
+        clock = self._account.save()
+        about = FrameAbout(
+            accepted_at=stamp(self._account.wall()), clock=clock,
+            settings=settings.model_dump_json(), settings_hash=settings_hash)
+        path = self._layout.frame(capture_id)
+        try:
+            checksum = write_kept(path, about, frame)
+            self._database.all(
+                "INSERT INTO captures (capture_id, state, settings_hash, frame_sha256,"
+                " accepted_at) VALUES (?, ?, ?, ?, ?)",
+                capture_id, CaptureState.ACCEPTED, settings_hash, checksum, about.accepted_at)
+        except StoreError:
+            with suppress(OSError):  # at worst it is taken in at the next start
+                path.unlink(missing_ok=True)
+            raise
 
     def find(self, capture_id: str) -> Stored | None:
         """Give a capture's row."""
-        row = self._one("SELECT * FROM captures WHERE capture_id = ?", capture_id)
+        row = self._database.one(
+            "SELECT * FROM captures WHERE capture_id = ? AND state != ?",
+            capture_id, CaptureState.REMOVED)
         if row is None:
             return None
-        return Stored(
-            CaptureState(row["state"]), row["settings"], row["settings_hash"], row["attempts"])
+        return Stored(CaptureState(row["state"]), row["settings_hash"], row["frame_sha256"],
+                      row["attempts"])
 
     def unfinished(self) -> list[str]:
         """Give the ids of what was accepted and has no outcome, oldest first."""
-        with self._transaction() as database:
-            rows = database.execute(
-                "SELECT capture_id FROM captures WHERE state = ? ORDER BY position",
-                (CaptureState.ACCEPTED,)).fetchall()
-        return [row["capture_id"] for row in rows]
+        return self._ids("state = ? ORDER BY position", CaptureState.ACCEPTED)
 
     def start_attempt(self, capture_id: str) -> int:
         """Count an attempt before it is made and give its number, from 1."""
-        row = self._one(
+        rows = self._database.all(
             "UPDATE captures SET attempts = attempts + 1 WHERE capture_id = ? RETURNING attempts",
             capture_id)
-        if row is None:
+        if not rows:
             raise StoreError(f"capture {capture_id} is not in the store")
-        return int(row["attempts"])
+        return int(rows[0]["attempts"])
 
-    def frame(self, capture_id: str) -> tuple[FrameHeader, Arrays]:
-        """Give the frame back; CorruptFileError where it is damaged."""
-        row = self._one("SELECT frame_sha256 FROM captures WHERE capture_id = ?", capture_id)
-        if row is None:
+    def frame(self, capture_id: str) -> KeptFrame:
+        """Give the frame back; CorruptFileError where it is damaged, which quarantines it."""
+        stored = self.find(capture_id)
+        if stored is None:
             raise StoreError(f"capture {capture_id} is not in the store")
-        path = self._frame_path(capture_id)
-        stored = decode_to_hub(read_parts(path, row["frame_sha256"]))
-        if not isinstance(stored.message, Frame):
-            raise CorruptFileError(f"{path}: holds a {stored.message.kind}, a frame expected")
-        return stored.message.frame, stored.arrays
+        path = self._layout.frame(capture_id)
+        try:
+            return read_frame(path, stored.frame_sha256)
+        except CorruptFileError as error:
+            self._quarantine.take(path, str(error), capture_id)
+            raise
 
     def finish(self, result: Packet) -> None:
         """Keep a `Result` as the capture's outcome; a second one changes nothing."""
         message = result.message
         if not isinstance(message, Result):
             raise TypeError(f"a Result finishes a capture, found {message.kind}")
-        checksum = write_parts(
-            self._face_path(message.capture_id, message.settings_hash), encode(result))
-        self._conclude(message.capture_id, CaptureState.DONE, face_sha256=checksum)
+        row = self._database.one(
+            "SELECT accepted_at FROM captures WHERE capture_id = ? AND state = ?",
+            message.capture_id, CaptureState.ACCEPTED)
+        if row is None:
+            return
+        now = stamp(self._account.wall())
+        about = FaceAbout(
+            accepted_at=row["accepted_at"], finished_at=now, clock=self._account.save())
+        checksum = write_kept(
+            self._layout.face(message.capture_id, message.settings_hash), about, result)
+        self._conclude(message.capture_id, CaptureState.DONE, now, face_sha256=checksum)
 
     def fail(self, capture_id: str, error: str, message: str, *, dead: bool) -> None:
         """Keep a failure as the capture's outcome."""
-        state = CaptureState.DEAD if dead else CaptureState.FAILED
-        self._conclude(capture_id, state, error=error, message=message)
+        self._conclude(capture_id, CaptureState.DEAD if dead else CaptureState.FAILED,
+                       stamp(self._account.wall()), error=error, message=message)
+
+    def reopen(self, capture_id: str, *, attempts_left: bool) -> None:
+        """Withdraw an outcome: the capture is accepted again, its number is used up."""
+        with self._database.transaction() as database:
+            database.execute("DELETE FROM outcomes WHERE capture_id = ?", (capture_id,))
+            database.execute(
+                "UPDATE captures SET state = ?, attempts = iif(?, 0, attempts)"
+                " WHERE capture_id = ? AND state IN (?, ?)",
+                (CaptureState.ACCEPTED, attempts_left, capture_id, CaptureState.DONE,
+                 CaptureState.DEAD))
 
     def outcome(self, capture_id: str) -> Packet | None:
         """Give the outcome as `FaceDone` or `CaptureFailed`."""
-        return self._outcome(self._one(
-            "SELECT * FROM outcomes WHERE capture_id = ? ORDER BY sequence DESC", capture_id))
+        return self._outcome("capture_id = ?", capture_id)
 
     def outcome_after(self, sequence: int) -> Packet | None:
         """Give the first outcome after a sequence number."""
-        return self._outcome(self._one(
-            "SELECT * FROM outcomes WHERE sequence > ? ORDER BY sequence", sequence))
+        return self._outcome("sequence > ? ORDER BY sequence", sequence)
 
     def last_sequence(self) -> int:
-        """Give the number of the last outcome, 0 where there is none."""
-        row = self._one("SELECT coalesce(max(sequence), 0) AS last FROM outcomes")
-        return int(row["last"]) if row else 0
+        """Give the number of the last outcome there was, kept or not; 0 where there was none."""
+        row = self._database.one("SELECT seq FROM sqlite_sequence WHERE name = 'outcomes'")
+        return int(row["seq"]) if row else 0
+
+    def before_last(self, count: int) -> int:
+        """Give the number after which the last `count` outcomes come that are kept."""
+        row = self._database.one(
+            "SELECT coalesce(min(sequence) - 1, ?) AS number FROM"
+            " (SELECT sequence FROM outcomes ORDER BY sequence DESC LIMIT ?)",
+            self.last_sequence(), count)
+        return int(row["number"]) if row else 0
+
+    def before_time(self, since: datetime) -> int:
+        """Give the number after which the outcomes come that are as old as `since`, or newer."""
+        row = self._database.one(
+            "SELECT coalesce(min(sequence) - 1, ?) AS number FROM outcomes WHERE finished_at >= ?",
+            self.last_sequence(), stamp(since))
+        return int(row["number"]) if row else 0
+
+    def dead_letters(self, after: int, most: int) -> list[DeadLetter]:
+        """List what was given up, by sequence number."""
+        return [DeadLetter(
+            sequence=row["sequence"], capture_id=row["capture_id"], error=row["error"],
+            message=row["message"][:_SHOWN], attempts=row["attempts"],
+            accepted_at=row["accepted_at"], finished_at=row["finished_at"],
+        ) for row in self._database.all(
+            "SELECT * FROM outcomes JOIN captures USING (capture_id) WHERE dead AND sequence > ?"
+            " ORDER BY sequence LIMIT ?", after, most)]
 
     def counts(self) -> dict[CaptureState, int]:
-        """Give the number of captures in each state."""
-        with self._transaction() as database:
-            rows = database.execute("SELECT state, count(*) FROM captures GROUP BY state")
-            return {CaptureState(state): count for state, count in rows.fetchall()}
+        """Give the number of captures that are kept in each state."""
+        rows = self._database.all(
+            "SELECT state, count(*) AS count FROM captures WHERE state != ? GROUP BY state",
+            CaptureState.REMOVED)
+        return {CaptureState(row["state"]): row["count"] for row in rows}
+
+    def expired(self, retention_s: float, most: int) -> list[str]:
+        """Give ids of what was finished longer ago than the retention, oldest first."""
+        if not self._account.settled(retention_s):
+            return []
+        # By the store's own count of seconds and by the wall clock both, unless that was set back
+        # behind what it said then: a clock that is wrong for a while removes nothing.
+        now = self._account.wall()
+        return [row["capture_id"] for row in self._database.all(
+            "SELECT capture_id FROM outcomes WHERE finished_age_s <= ?"
+            " AND (julianday(?) - julianday(finished_at) >= ? OR finished_at > ?)"
+            " ORDER BY sequence LIMIT ?",
+            self._account.now() - retention_s, stamp(now), retention_s / 86400, stamp(now), most)]
+
+    def accepted_before(self, moment: datetime | None, most: int) -> list[str]:
+        """Give ids of what was accepted before a time, oldest first; all where it is None."""
+        limit = stamp(moment) if moment else "a"  # later than any number
+        return self._ids("state != ? AND accepted_at < ? ORDER BY position LIMIT ?",
+                         CaptureState.REMOVED, limit, most)
+
+    def remove(self, capture_ids: Sequence[str]) -> None:
+        """Remove frames, faces, reports and rows, so that nothing of them can be read again."""
+        with self._database.transaction() as database:
+            for capture_id in capture_ids:
+                database.execute("DELETE FROM outcomes WHERE capture_id = ?", (capture_id,))
+                database.execute("UPDATE captures SET state = ? WHERE capture_id = ?",
+                                 (CaptureState.REMOVED, capture_id))
+        self._finish_removal(capture_ids)
+
+    def sweep(self, retention_s: float | None) -> None:
+        """Finish what `remove` began; remove what is in quarantine for longer than that."""
+        self._finish_removal(self._ids("state = ?", CaptureState.REMOVED))
+        self._database.set_meta("clock", self._account.save())
+        if retention_s is not None and self._account.settled(retention_s):
+            with _naming(self._layout.quarantine):
+                self._quarantine.remove_older(retention_s)
+
+    def clear_quarantine(self) -> None:
+        """Remove all that is in quarantine."""
+        with _naming(self._layout.quarantine):
+            self._quarantine.clear()
+
+    def _removed(self, capture_id: str) -> list[str]:
+        return self._ids("state = ? AND capture_id = ?", CaptureState.REMOVED, capture_id)
+
+    def _finish_removal(self, capture_ids: Sequence[str]) -> None:
+        """Remove the files, then the rows: a row of a file that is gone says so in its state."""
+        if not capture_ids:
+            return
+        for capture_id in capture_ids:
+            row = self._database.one(
+                "SELECT settings_hash FROM captures WHERE capture_id = ?", capture_id)
+            paths = [self._layout.frame(capture_id)]
+            if row:
+                paths.append(self._layout.face(capture_id, row["settings_hash"]))
+            for path in paths:
+                with _naming(path):
+                    path.unlink(missing_ok=True)
+        for folder in (self._layout.frames, self._layout.faces):
+            with _naming(folder):
+                sync_folder(folder)
+        with _naming(self._layout.quarantine):
+            self._quarantine.remove(capture_ids)
+        with self._database.transaction() as database:
+            database.executemany(
+                "DELETE FROM captures WHERE capture_id = ? AND state = ?",
+                [(capture_id, CaptureState.REMOVED) for capture_id in capture_ids])
+        self._database.truncate_log()
 
     def _conclude(
-        self, capture_id: str, state: CaptureState, *, face_sha256: str | None = None,
+        self, capture_id: str, state: CaptureState, now: str, *, face_sha256: str | None = None,
         error: str | None = None, message: str | None = None,
     ) -> None:
-        with self._transaction() as database:
-            database.execute(
-                "INSERT OR IGNORE INTO outcomes (capture_id, settings_hash, face_sha256, error,"
-                " message, dead, finished_at) SELECT capture_id, settings_hash, ?, ?, ?, ?, ?"
-                " FROM captures WHERE capture_id = ?",
-                (face_sha256, error, message, state is CaptureState.DEAD, _now(), capture_id))
-            database.execute(
+        with self._database.transaction() as database:
+            changed = database.execute(
                 "UPDATE captures SET state = ? WHERE capture_id = ? AND state = ?",
                 (state, capture_id, CaptureState.ACCEPTED))
+            if changed.rowcount:
+                database.execute(
+                    "INSERT INTO outcomes (capture_id, face_sha256, error, message, dead,"
+                    " finished_at, finished_age_s) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                    (capture_id, face_sha256, error, message, state is CaptureState.DEAD, now,
+                     self._account.now()))
 
-    def _outcome(self, row: sqlite3.Row | None) -> Packet | None:
+    def _outcome(self, which: str, *values: str | int) -> Packet | None:
+        row = self._database.one(
+            f"SELECT outcomes.*, settings_hash FROM outcomes JOIN captures USING (capture_id)"  # noqa: S608
+            f" WHERE {which} LIMIT 1", *values)
         if row is None:
             return None
-        common = {"epoch": self._epoch, "sequence": row["sequence"],
-                  "capture_id": row["capture_id"]}
+        capture_id = row["capture_id"]
+        common = {"epoch": self._epoch, "sequence": row["sequence"], "capture_id": capture_id}
         if row["face_sha256"] is None:
             return Packet(CaptureFailed(
                 **common, error=row["error"], message=row["message"], dead=bool(row["dead"])))
-        path = self._face_path(row["capture_id"], row["settings_hash"])
-        stored = decode_to_hub(read_parts(path, row["face_sha256"]))
-        if not isinstance(stored.message, Result):
-            raise CorruptFileError(f"{path}: holds a {stored.message.kind}, a result expected")
-        return Packet(FaceDone(**common, face=stored.message.face), stored.arrays)
-
-    def _frame_path(self, capture_id: str) -> Path:
-        return self._frames / f"{capture_id}.frame"
-
-    def _face_path(self, capture_id: str, settings_hash: str) -> Path:
-        return self._faces / f"{capture_id}.{settings_hash}.face"
-
-    def _one(self, statement: str, *values: str | int) -> sqlite3.Row | None:
-        with self._transaction() as database:
-            row: sqlite3.Row | None = database.execute(statement, values).fetchone()
-        return row
-
-    @contextmanager
-    def _transaction(self) -> Iterator[sqlite3.Connection]:
+        path = self._layout.face(capture_id, row["settings_hash"])
         try:
-            self._database.execute("BEGIN IMMEDIATE")
-            try:
-                yield self._database
-            except BaseException:
-                if self._database.in_transaction:
-                    self._database.execute("ROLLBACK")
-                raise
-            self._database.execute("COMMIT")
-        except sqlite3.Error as error:
-            raise StoreError(f"captures.sqlite3: {error}") from error
+            kept = read_face(path, row["face_sha256"])
+        except CorruptFileError as error:
+            self._quarantine.take(path, str(error), capture_id)
+            raise DamagedFaceError(capture_id, str(error)) from error
+        return Packet(FaceDone(**common, face=kept.message.face), kept.arrays)
+
+    def _ids(self, which: str, *values: str | int) -> list[str]:
+        return [row["capture_id"] for row in self._database.all(
+            f"SELECT capture_id FROM captures WHERE {which}", *values)]  # noqa: S608
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise store_error(path, error) from error
 
 
 def _lock(path: Path) -> int:
@@ -297,7 +348,3 @@ def _lock(path: Path) -> int:
         os.close(descriptor)
         raise HubRunningError(f"{path.parent}: another hub has this data folder open") from error
     return descriptor
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -97,7 +97,8 @@ class _Worker:
             report = face.report.model_copy(update={"capture_id": job.capture_id})
             header, arrays = FaceHeader.of(Face(face.initial, face.dense, report))
             result = Result(
-                capture_id=job.capture_id, settings_hash=job.settings_hash, face=header)
+                capture_id=job.capture_id, settings_hash=job.settings_hash,
+                frame_sha256=job.frame_sha256, face=header)
         except Exception as error:
             final = isinstance(error, ReconstructionError)
             say = self._log.warning if final else self._log.exception
@@ -105,7 +106,8 @@ class _Worker:
                 reason=str(error))
             failure = JobFailed(
                 capture_id=job.capture_id, settings_hash=job.settings_hash,
-                error=type(error).__name__, message=str(error)[:4000], final=final)
+                frame_sha256=job.frame_sha256, error=type(error).__name__,
+                message=str(error)[:4000], final=final)
             return lambda: self._link.send(failure)
         self._log.info("face", capture_id=job.capture_id, points=report.dense_points,
                        total_ms=round(report.timings_ms.get("total", 0.0)))

@@ -16,6 +16,8 @@ COMMANDS = {
     "up": "run the whole service on this machine",
     "press": "take a frame now and wait for its face",
     "subscribe": "follow the faces as they are published",
+    "dead": "list, retry or drop captures that were given up",
+    "purge": "remove captures: frame, face, report and row",
     "status": "say who is connected to the hub and what was done",
     "hub": "run the hub alone",
     "capture": "run a capture process alone",

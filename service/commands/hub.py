@@ -11,6 +11,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """State the flags."""
     options.add_address(parser)
     options.add_hub(parser)
+    options.add_retention(parser)
     options.add_recon(parser)
     options.add_daemon(parser)
 

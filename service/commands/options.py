@@ -2,6 +2,7 @@
 
 import argparse
 import os
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,8 +10,9 @@ if TYPE_CHECKING:
     from recon.settings import Settings
     from service.settings import ServiceSettings
 
-__all__ = ["add_address", "add_daemon", "add_hub", "add_recon", "recon_arguments",
-           "recon_settings", "service_settings", "start_daemon", "use_one_thread"]
+__all__ = ["add_address", "add_daemon", "add_hub", "add_recon", "add_retention", "moment",
+           "recon_arguments", "recon_settings", "service_settings", "start_daemon",
+           "use_one_thread"]
 
 
 def add_address(parser: argparse.ArgumentParser) -> None:
@@ -32,6 +34,23 @@ def add_hub(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--data", type=Path, metavar="DIR",
                         help="folder of frames and faces (default: DENSEFACE_DATA, else this "
                              "user's data folder)")
+
+
+def add_retention(parser: argparse.ArgumentParser) -> None:
+    """Say for how long."""
+    parser.add_argument("--retention", metavar="TIME",
+                        help="remove captures so long after their outcome: 24h, 90m, 7d, or off "
+                             "(default: DENSEFACE_RETENTION, else 24h)")
+
+
+def moment(text: str) -> datetime:
+    """Read a time."""
+    from service.times import parse_time
+
+    try:
+        return parse_time(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def add_recon(parser: argparse.ArgumentParser) -> None:
@@ -83,7 +102,8 @@ def service_settings(args: argparse.Namespace) -> "ServiceSettings":
     from service.settings import ServiceSettings
 
     return ServiceSettings.of(
-        os.environ, address=args.address, data=getattr(args, "data", None))
+        os.environ, address=args.address, data=getattr(args, "data", None),
+        retention=getattr(args, "retention", None))
 
 
 def start_daemon(args: argparse.Namespace, name: str) -> None:

@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
         "sensors": ", ".join(status.sensors) or "none",
         "workers": ", ".join(status.workers) or "none",
         "now": f"{status.pressed} pressed, {status.queued} queued, {status.working} working",
-        "so far": f"{status.done} faces, {status.failed} without a face, {status.dead} given up",
+        "kept": f"{status.done} faces, {status.failed} without a face, {status.dead} given up",
     }
     for name, value in rows.items():
         print(f"{name:8} {value}")

@@ -14,9 +14,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--save", type=Path, metavar="DIR",
                         help="write each face as DIR/ID.ply with its report, DIR/ID.json")
     parser.add_argument("--count", type=int, metavar="N", help="end after N captures")
-    parser.add_argument("--after", type=int, metavar="SEQUENCE",
-                        help="start after this sequence number; 0 is all that is kept "
-                             "(default: only what comes from now on)")
+    start = parser.add_mutually_exclusive_group()
+    start.add_argument("--after", type=int, metavar="SEQUENCE",
+                       help="start after this sequence number; 0 is all that is kept "
+                            "(default: only what comes from now on)")
+    start.add_argument("--last", type=int, metavar="N",
+                       help="start with the last N captures that are kept")
+    start.add_argument("--since", type=options.moment, metavar="TIME",
+                       help="start with what ended at this time or later, such as "
+                            "2026-01-31T14:30, UTC or with a zone")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -25,14 +31,15 @@ def run(args: argparse.Namespace) -> int:
     from service.errors import UsageError
     from service.files import FaceFiles
 
-    for name in ("count", "after"):
+    for name in ("count", "after", "last"):
         value = getattr(args, name)
-        if value is not None and value < (name == "count"):
+        if value is not None and value < (name != "after"):
             raise UsageError(f"--{name} {value}: expected a number that is not negative, or zero")
     if args.save and not args.save.is_dir():
         raise UsageError(f"--save {args.save}: no such folder")
     with Client(options.service_settings(args).address) as client:
-        for number, outcome in enumerate(client.published(after=args.after), start=1):
+        published = client.published(after=args.after, last=args.last, since=args.since)
+        for number, outcome in enumerate(published, start=1):
             if isinstance(outcome, PublishedFailure):
                 print(f"{outcome.sequence} {outcome.capture_id} failed: {outcome.error}",
                       flush=True)

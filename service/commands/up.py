@@ -15,6 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         metavar="N", help="reconstruction processes (default: cores less one)")
     options.add_address(parser)
     options.add_hub(parser)
+    options.add_retention(parser)
     options.add_recon(parser)
     options.add_daemon(parser)
 
@@ -33,8 +34,10 @@ def run(args: argparse.Namespace) -> int:
     if args.debug:
         common.append("--debug")
     chosen = ["--calibration", str(args.calibration)] if args.calibration else []
-    table = processes(
-        args.source, args.workers, common, ["--data", str(settings.data), *changed], chosen)
+    hub = ["--data", str(settings.data), *changed]
+    if args.retention:
+        hub += ["--retention", args.retention]
+    table = processes(args.source, args.workers, common, hub, chosen)
     return Supervisor(table).run()
 
 

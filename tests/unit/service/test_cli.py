@@ -63,6 +63,21 @@ def outcome(capsys, *arguments):
     (["press", "--save", "face"], "ending missing"),
     (["subscribe", "--save", "{tmp}/none"], "no such folder"),
     (["subscribe", "--count", "0"], "--count 0"),
+    (["subscribe", "--last", "0"], "--last 0"),
+    (["subscribe", "--last", "1", "--after", "1"], "not allowed with"),
+    (["subscribe", "--since", "noon"], "'noon': expected a time"),
+    (["hub", "--retention", "0"], "--retention: "),
+    (["up", "--retention", "soon"], "24h, 90m or 7d, or off"),
+    (["dead", "bury"], "invalid choice: 'bury'"),
+    (["dead", "list", "a"], "takes neither"),
+    (["dead", "retry"], "expected ids, or --all"),
+    (["dead", "drop", "a", "--all"], "expected ids, or --all"),
+    (["dead", "drop", "../x"], "capture id '../x'"),
+    (["purge", "--yes"], "required"),
+    (["purge", "--all", "--id", "a"], "not allowed with"),
+    (["purge", "--before", "noon"], "'noon': expected a time"),
+    (["purge", "--id", "../x", "--yes"], "capture id '../x'"),
+    (["purge", "--all"], "--yes: expected"),
 ])
 def test_wrong_usage_is_one_line_and_status_2(room, capsys, arguments, message):
     for name in ("garbage.npz", "garbage.oni", "garbage.xyz"):

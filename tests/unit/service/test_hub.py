@@ -21,7 +21,7 @@ SENSOR, CLIENT, WORKER, OTHER = b"sensor", b"client", b"worker", b"other"
 HASH = settings_hash(Settings())
 FRAME, FRAME_ARRAYS = FrameHeader.of(small_frame())
 FACE, FACE_ARRAYS = FaceHeader.of(small_face())
-SETTINGS = ServiceSettings(address="ipc:///unused", attempts=2, queue=3)
+SETTINGS = ServiceSettings(address="ipc:///unused", attempts=2, queue=3, reserve_mib=0)
 
 
 @dataclass
@@ -57,13 +57,21 @@ class Bench:
     def frame(self, capture_id: str = "a"):
         return self.say(SENSOR, messages.Frame(capture_id=capture_id, frame=FRAME), FRAME_ARRAYS)
 
-    def result(self, capture_id: str = "a", peer: bytes = WORKER, hashed: str = HASH):
-        return self.say(peer, messages.Result(
-            capture_id=capture_id, settings_hash=hashed, face=FACE), FACE_ARRAYS)
+    def checksum(self, capture_id: str) -> str:
+        """Of the frame that is kept now."""
+        stored = self.store.find(capture_id)
+        return stored.frame_sha256 if stored else "0" * 64
 
-    def stumble(self, peer: bytes = WORKER, *, final: bool = False):
+    def result(self, capture_id: str = "a", peer: bytes = WORKER, hashed: str = HASH,
+               frame_sha256: str | None = None, arrays=FACE_ARRAYS):
+        return self.say(peer, messages.Result(
+            capture_id=capture_id, settings_hash=hashed, face=FACE,
+            frame_sha256=frame_sha256 or self.checksum(capture_id)), arrays)
+
+    def stumble(self, peer: bytes = WORKER, capture_id: str = "a", *, final: bool = False):
         return self.say(peer, messages.JobFailed(
-            capture_id="a", settings_hash=HASH, error="Error", message="why", final=final))
+            capture_id=capture_id, settings_hash=HASH, frame_sha256=self.checksum(capture_id),
+            error="Error", message="why", final=final))
 
     def accepted(self, *capture_ids: str) -> None:
         self.sensor()
@@ -269,7 +277,7 @@ def test_a_result_with_a_bad_face_is_tried_again(bench):
     bench.accepted("a")
     bench.worker()
     bad = FACE_ARRAYS | {"dense_points": FACE_ARRAYS["dense_points"] + np.float32("inf")}
-    bench.say(WORKER, messages.Result(capture_id="a", settings_hash=HASH, face=FACE), bad)
+    bench.result(arrays=bad)
     assert bench.published == []
     assert bench.worker(credit=1)[0][1].attempt == 2
 
@@ -345,23 +353,55 @@ def test_a_store_that_fails_answers_the_request(bench, monkeypatch):
     assert (answer[1].kind, answer[1].message) == ("request_failed", "disk on fire")
 
 
-def test_a_result_that_cannot_be_kept_is_made_again(bench, monkeypatch):
+def test_a_result_waits_for_room(bench, monkeypatch):
     def full(_):
+        raise StoreError("No space left on device")
+
+    bench.accepted("a", "b")
+    bench.worker()
+    monkeypatch.setattr(bench.store, "finish", full)
+    bench.result()
+    assert bench.worker(credit=1) == []
+    assert bench.wait(1.1) == []
+    assert bench.published == []
+    monkeypatch.undo()
+    assert kinds(bench.wait(1.1)) == [(WORKER, "job")]
+    (published,) = bench.published
+    assert (published.kind, published.capture_id) == ("face_done", "a")
+    assert bench.store.find("a").attempts == 1
+
+
+def test_a_failure_that_cannot_be_kept_is_told_again(bench, monkeypatch):
+    def full(*_, **__):
         raise StoreError("No space left on device")
 
     bench.accepted("a")
     bench.worker()
-    monkeypatch.setattr(bench.store, "finish", full)
-    bench.result()
+    monkeypatch.setattr(bench.store, "fail", full)
+    bench.stumble(final=True)
     monkeypatch.undo()
-    bench.worker(credit=1)
-    bench.result()
-    assert bench.published[0].kind == "face_done"
+    assert kinds(bench.worker(credit=1)) == [(WORKER, "job")]
+    bench.stumble(final=True)
+    assert [message.kind for message in bench.published] == ["capture_failed"]
+
+
+def test_an_answer_to_another_job_does_not_lose_the_capture(bench):
+    bench.accepted("a")
+    bench.worker()
+    bench.result(hashed="00")
+    assert kinds(bench.worker(credit=1)) == [(WORKER, "job")]
 
 
 def test_the_table_leads_from_every_state_on_disk_to_an_end():
-    ends = {CaptureState.DONE, CaptureState.FAILED, CaptureState.DEAD, CaptureState.REFUSED}
-    assert not ends & {state for state, _ in TRANSITIONS}
+    ends = {CaptureState.REMOVED, CaptureState.REFUSED}
     assert {state for state, _ in TRANSITIONS} == set(CaptureState) - ends
-    assert advance(CaptureState.DONE, CaptureEvent.RESULT) is None
+    reached = {CaptureState.ACCEPTED}
+    for _ in CaptureState:
+        reached |= {after for (before, _), after in TRANSITIONS.items() if before in reached}
+    assert reached == set(CaptureState) - {CaptureState.PRESSED, CaptureState.REFUSED}
+    for outcome in (CaptureState.DONE, CaptureState.FAILED, CaptureState.DEAD):
+        assert advance(outcome, CaptureEvent.EXPIRED) is CaptureState.REMOVED
+        for event in (CaptureEvent.RESULT, CaptureEvent.REJECTED, CaptureEvent.DISPATCHED):
+            assert advance(outcome, event) is None
+    assert advance(CaptureState.ACCEPTED, CaptureEvent.EXPIRED) is None
     assert advance(None, CaptureEvent.STORED) is None

@@ -1,4 +1,8 @@
-"""Any order of events: what was accepted ends once, nothing appears that was not pressed."""
+"""Any order of events: what was accepted ends once, nothing appears that was not pressed.
+
+An operator who purges, retries and drops, the retention, damaged files and a damaged database are
+among the events.
+"""
 
 import shutil
 import tempfile
@@ -6,19 +10,24 @@ from pathlib import Path
 
 from hypothesis import settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from recon.settings import Settings
 from service import messages
 from service.hub import Hub, settings_hash
 from service.outputs import Publish, Topic
 from service.settings import ServiceSettings
+from service.states import CaptureState
 from service.store import FolderStore
 from service.wire import Packet
+from tests.unit.service.clocks import FakeClock
 from tests.unit.service.test_hub import FACE, FACE_ARRAYS, FRAME, FRAME_ARRAYS
 
 HASH = settings_hash(Settings())
-SETTINGS = ServiceSettings(address="ipc:///unused", attempts=2, queue=4)
+SETTINGS = ServiceSettings(
+    address="ipc:///unused", attempts=2, queue=4, reserve_mib=0, retention=3600)
+_MEMORY = Path("/dev/shm")  # noqa: S108
+"""Syncing is not what is tested here."""
 ids = st.sampled_from("abcd")
 workers = st.sampled_from([b"w1", b"w2"])
 
@@ -28,12 +37,13 @@ class AnyOrder(RuleBasedStateMachine):
 
     @initialize()
     def start(self):
-        self.folder = Path(tempfile.mkdtemp())
-        self.store = FolderStore(self.folder / "data")
+        self.folder = Path(tempfile.mkdtemp(dir=_MEMORY if _MEMORY.is_dir() else None))
+        self.clock = FakeClock()
+        self.store = FolderStore(self.folder / "data", self.clock)
         self.now = 0.0
         self.credit = 0
         self.pressed, self.taken, self.accepted = set(), set(), set()
-        self.jobs: dict[bytes, list[str]] = {}
+        self.jobs: dict[bytes, list[messages.Job]] = {}
         self.published: list[messages.FaceDone | messages.CaptureFailed] = []
         self.restart()
 
@@ -42,17 +52,34 @@ class AnyOrder(RuleBasedStateMachine):
             return
         try:
             self.jobs.clear()  # those workers died; two good ones finish
-            for _ in range(20):
-                for worker in (b"w1", b"w2"):
-                    self.ready(worker)
-                    while self.jobs.get(worker):
-                        self.result(worker)
-                self.pass_time(4.0)
-            assert {outcome.capture_id for outcome in self.published} >= self.accepted
-            self.nothing_twice()
+            self.work()
+            self.read_all()  # finds what is damaged
+            self.work()
+            assert sorted(self.read_all()) == sorted(self.accepted)
+            self.ids_are_known()
         finally:
             self.store.__exit__()
             shutil.rmtree(self.folder)
+
+    def work(self):
+        for _ in range(20):
+            for worker in (b"w1", b"w2"):
+                self.ready(worker)
+                while self.jobs.get(worker):
+                    self.result(worker)
+            self.pass_time(4.0)
+
+    def read_all(self):
+        """What a subscriber gets that asks from the start."""
+        found, after = [], 0
+        while True:
+            packet = self.hub.receive(self.now, b"c", Packet(
+                messages.GetNext(request=1, after=after)))[0].packet
+            if isinstance(packet.message, messages.NothingNewer):
+                return found
+            assert packet.message.sequence > after
+            after = packet.message.sequence
+            found.append(packet.message.capture_id)
 
     def give(self, outputs):
         for output in outputs:
@@ -65,7 +92,12 @@ class AnyOrder(RuleBasedStateMachine):
             elif isinstance(message, messages.PressAccepted):
                 self.accepted.add(message.capture_id)
             elif isinstance(message, messages.Job):
-                self.jobs.setdefault(output.peer, []).append(message.capture_id)
+                self.jobs.setdefault(output.peer, []).append(message)
+
+    def answered(self, jobs):
+        job = jobs.pop()
+        return {"capture_id": job.capture_id, "settings_hash": job.settings_hash,
+                "frame_sha256": job.frame_sha256}
 
     def say(self, peer, message, arrays=None):
         self.give(self.hub.receive(self.now, peer, Packet(message, arrays or {})))
@@ -77,6 +109,7 @@ class AnyOrder(RuleBasedStateMachine):
     @rule(seconds=st.sampled_from([0.1, 1.0, 4.0, 11.0]))
     def pass_time(self, seconds):
         self.now += seconds
+        self.clock.pass_time(seconds)
         self.give(self.hub.tick(self.now))
 
     @rule()
@@ -112,19 +145,20 @@ class AnyOrder(RuleBasedStateMachine):
     @rule(worker=workers, truly=st.booleans())
     def heartbeat(self, worker, truly):
         held = self.jobs.get(worker) or [None]
-        self.say(worker, messages.Heartbeat(holding=held[-1] if truly else None))
+        holding = held[-1].capture_id if truly and held[-1] else None
+        self.say(worker, messages.Heartbeat(holding=holding))
 
     @rule(worker=workers)
     def result(self, worker):
         if jobs := self.jobs.get(worker):
             self.say(worker, messages.Result(
-                capture_id=jobs.pop(), settings_hash=HASH, face=FACE), FACE_ARRAYS)
+                **self.answered(jobs), face=FACE), FACE_ARRAYS)
 
     @rule(worker=workers, final=st.booleans())
     def failure(self, worker, final):
         if jobs := self.jobs.get(worker):
             self.say(worker, messages.JobFailed(
-                capture_id=jobs.pop(), settings_hash=HASH, error="E", message="m", final=final))
+                **self.answered(jobs), error="E", message="m", final=final))
 
     @rule(worker=workers)
     def job_never_arrives(self, worker):
@@ -138,14 +172,112 @@ class AnyOrder(RuleBasedStateMachine):
     def unreachable(self, peer):
         self.give(self.hub.unreachable(peer))
 
+    @rule(days=st.sampled_from([-400, 400]))
+    def set_the_wall_clock(self, days):
+        self.clock.set_wall(days * 86400.0)
+
+    @rule()
+    def the_retention_passes(self):
+        for _ in range(2):  # once more, for what was set back
+            self.clock.pass_time(3700.0)
+            self.now += 3700.0
+            for _ in range(3):
+                self.give(self.hub.tick(self.now))
+                self.now += 600.0
+        self.accepted &= set(self.store.unfinished())
+        assert self.store.last_sequence() == 0 or not self.store.outcome_after(0)
+
+    def operate(self, message):
+        outputs = self.hub.receive(self.now, b"o", Packet(message))
+        answers = [one.packet.message for one in outputs if getattr(one, "peer", None) == b"o"]
+        self.give(outputs)
+        (answer,) = answers
+        return answer
+
+    @rule(capture_id=ids)
+    def purge(self, capture_id):
+        answer = self.operate(messages.Purge(request=1, capture_id=capture_id))
+        assert answer.removed == (capture_id in self.accepted)
+        self.accepted.discard(capture_id)
+        self.taken.discard(capture_id)
+        assert not list((self.folder / "data").rglob(f"*{capture_id}.*f*"))
+
+    @rule()
+    def purge_all(self):
+        answer = self.operate(messages.Purge(request=1, everything=True))
+        assert (answer.removed, answer.left) == (len(self.accepted), False)
+        self.accepted.clear()
+        self.taken.clear()
+        assert not [path for path in (self.folder / "data").rglob("*/*") if path.is_file()]
+
+    @rule(drop=st.booleans())
+    def dead_letter(self, drop):
+        letters = self.operate(messages.ListDead(request=1)).letters
+        for letter in letters:
+            assert self.store.find(letter.capture_id).state is CaptureState.DEAD
+            if drop:
+                answer = self.operate(
+                    messages.DropDead(request=1, capture_id=letter.capture_id))
+                assert answer.removed == 1
+                self.accepted.discard(letter.capture_id)
+            else:
+                self.operate(messages.RetryDead(request=1, capture_id=letter.capture_id))
+
+    @precondition(lambda self: self.accepted)
+    @rule(data=st.data(), folder=st.sampled_from(["frames", "faces"]), gone=st.booleans())
+    def damage_a_file(self, data, folder, gone):
+        files = sorted((self.folder / "data" / folder).iterdir())
+        if not files:
+            return
+        path = data.draw(st.sampled_from(files))
+        if gone:
+            path.unlink()
+            return
+        content = bytearray(path.read_bytes())
+        content[data.draw(st.integers(0, len(content) - 1))] ^= 1
+        path.write_bytes(content)
+
+    @rule()
+    def kill(self):
+        self.store.__exit__()
+        self.store = FolderStore(self.folder / "data", self.clock)
+        self.restart()
+        self.ids_are_known()
+
+    @rule(damage=st.sampled_from(["gone", "empty", "cut", "garbage"]))
+    def damage_the_database(self, damage):
+        self.store.__exit__()
+        path = self.folder / "data" / "captures.sqlite3"
+        content = path.read_bytes()
+        match damage:
+            case "gone":
+                path.unlink()
+            case "empty":
+                path.write_bytes(b"")
+            case "cut":
+                path.write_bytes(content[:len(content) * 2 // 3])
+            case "garbage":
+                path.write_bytes(content[:5000] + b"\xff" * 4000 + content[9000:])
+        known = {path.name.partition(".")[0] for folder in ("frames", "faces")
+                 for path in (self.folder / "data" / folder).iterdir()}
+        self.store = FolderStore(self.folder / "data", self.clock)
+        self.restart()
+        self.published.clear()  # another epoch
+        self.accepted &= known  # a dead letter whose frame is gone is known to the rows alone
+        self.ids_are_known()
+
     @invariant()
-    def nothing_twice(self):
-        names = [outcome.capture_id for outcome in self.published]
-        assert len(names) == len(set(names))
-        assert [outcome.sequence for outcome in self.published] == list(
-            range(1, len(names) + 1))
-        assert set(names) <= self.pressed
+    def ids_are_known(self):
+        """What was accepted is there; what is there was accepted."""
+        rows = {capture_id for capture_id in "abcd" if self.store.find(capture_id)}
+        assert rows == self.accepted
+
+    @invariant()
+    def numbers_only_rise(self):
+        numbers = [outcome.sequence for outcome in self.published]
+        assert numbers == sorted(set(numbers))
+        assert {outcome.capture_id for outcome in self.published} <= self.pressed
 
 
 TestAnyOrder = AnyOrder.TestCase
-TestAnyOrder.settings = settings(deadline=None, max_examples=40, stateful_step_count=40)
+TestAnyOrder.settings = settings(deadline=None, max_examples=60, stateful_step_count=40)

@@ -126,6 +126,26 @@ def test_a_start_in_the_past_gives_all_since(hub):
         assert ids(follow, 2) == ["a2", "a3"]
 
 
+def test_numbers_that_were_removed_are_not_waited_for(hub, follow):
+    for _ in range(3):
+        hub.conclude(published=False)
+    follow._ask_next = lambda after, _: hub.asked.append(after) or Packet(
+        messages.NothingNewer(epoch=hub.epoch, sequence=3))
+    hub.publish(Topic.STATUS, hub.status())
+    hub.publish(Topic.STATUS, hub.status())
+    hub.conclude()
+    assert ids(follow, 1) == ["a4"]
+    assert hub.asked == [0]
+
+def test_a_start_is_asked_for(hub):
+    hub.conclude(published=False)
+    hub.conclude(published=False)
+    with Subscriber(hub.socket.context, "inproc://published", hub.next, hub.status) as follow:
+        hub.subscribed()
+        follow.start(None, 5, lambda _: messages.StartAt(epoch=hub.epoch, sequence=1))
+        assert ids(follow, 1) == ["a2"]
+
+
 def test_a_hub_that_is_away_is_waited_for(hub, follow):
     answers = iter([ClientTimeoutError("away"), ClientTimeoutError("away")])
     real = hub.next

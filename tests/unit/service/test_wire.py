@@ -1,6 +1,7 @@
 """Messages: round trips, garbage, limits."""
 
 import json
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,9 @@ ids = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", fullmatch=True)
 numbers = st.integers(0, 2**63 - 1)
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=200)
 hashes = st.from_regex(r"[0-9a-f]{1,64}", fullmatch=True)
+digests = st.from_regex(r"[0-9a-f]{64}", fullmatch=True)
+times = st.datetimes(datetime(1, 1, 2), datetime(9999, 12, 30), timezones=st.just(UTC))
+DIGEST = "0f" * 32
 
 
 def plain(kind, **fields):
@@ -32,17 +36,26 @@ to_hub = st.one_of(
     plain(messages.Press, request=numbers, capture_id=ids),
     plain(messages.GetFace, request=numbers, capture_id=ids, wait_s=st.floats(0, 3600)),
     plain(messages.GetNext, request=numbers, after=numbers),
+    plain(messages.FindStart, request=numbers, last=st.integers(1, 2**31 - 1)),
+    plain(messages.FindStart, request=numbers, since=times),
     plain(messages.GetStatus, request=numbers),
+    plain(messages.ListDead, request=numbers, after=numbers),
+    plain(messages.RetryDead, request=numbers, capture_id=ids),
+    plain(messages.DropDead, request=numbers, capture_id=ids),
+    plain(messages.Purge, request=numbers, capture_id=ids),
+    plain(messages.Purge, request=numbers, before=times),
+    plain(messages.Purge, request=numbers, everything=st.just(True)),
     plain(messages.SensorReady, name=texts, source=texts),
     plain(messages.WorkerReady, name=texts, credit=numbers),
     plain(messages.Heartbeat, holding=st.none() | ids),
     st.just(Packet(messages.Goodbye())),
     plain(messages.FrameFailed, capture_id=ids, message=texts),
-    plain(messages.JobFailed, capture_id=ids, settings_hash=hashes, error=texts, message=texts,
-          final=st.booleans()),
+    plain(messages.JobFailed, capture_id=ids, settings_hash=hashes, frame_sha256=digests,
+          error=texts, message=texts, final=st.booleans()),
     ids.map(lambda name: Packet(messages.Frame(capture_id=name, frame=FRAME), FRAME_ARRAYS)),
     ids.map(lambda name: Packet(
-        messages.Result(capture_id=name, settings_hash="0f", face=FACE), FACE_ARRAYS)),
+        messages.Result(capture_id=name, settings_hash="0f", frame_sha256=DIGEST, face=FACE),
+        FACE_ARRAYS)),
 )
 from_hub = st.one_of(
     plain(messages.PressAccepted, request=numbers, capture_id=ids),
@@ -51,6 +64,11 @@ from_hub = st.one_of(
     plain(messages.CaptureUnknown, request=numbers, capture_id=ids),
     plain(messages.RequestFailed, request=numbers, message=texts),
     plain(messages.NothingNewer, request=numbers, epoch=hashes, sequence=numbers),
+    plain(messages.StartAt, request=numbers, epoch=hashes, sequence=numbers),
+    plain(messages.Removed, request=numbers, removed=numbers, left=st.booleans()),
+    plain(messages.DeadLetters, request=numbers, letters=st.lists(st.builds(
+        messages.DeadLetter, sequence=numbers, capture_id=ids, error=texts, message=texts,
+        attempts=numbers, accepted_at=texts, finished_at=texts), max_size=3).map(tuple)),
     plain(messages.CaptureFailed, request=numbers, epoch=hashes, sequence=numbers, capture_id=ids,
           error=texts, message=texts, dead=st.booleans()),
     plain(messages.Status, request=numbers, epoch=hashes, sequence=numbers, hub_version=texts,
@@ -63,7 +81,7 @@ from_hub = st.one_of(
     plain(messages.FrameRefused, capture_id=ids, message=texts),
     st.builds(lambda name, preset: Packet(messages.Job(
         capture_id=name, attempt=1, settings=Settings.of(preset), settings_hash="0f",
-        frame=FRAME), FRAME_ARRAYS), ids, st.sampled_from(Preset)),
+        frame_sha256=DIGEST, frame=FRAME), FRAME_ARRAYS), ids, st.sampled_from(Preset)),
     ids.map(lambda name: Packet(messages.FaceDone(
         epoch="0f", sequence=3, capture_id=name, face=FACE), FACE_ARRAYS)),
 )
@@ -89,7 +107,7 @@ def test_what_the_hub_sends_comes_out_the_same(packet):
 def test_every_kind_is_covered_by_the_two_tests_above():
     kinds = {kind.model_fields["kind"].default for kind in messages.ToHub.__args__}
     kinds |= {kind.model_fields["kind"].default for kind in messages.FromHub.__args__}
-    assert len(kinds) == len(messages.ToHub.__args__) + len(messages.FromHub.__args__) == 26
+    assert len(kinds) == len(messages.ToHub.__args__) + len(messages.FromHub.__args__) == 34
 
 
 @given(to_hub)
@@ -112,8 +130,8 @@ def test_garbage_is_a_protocol_error(parts):
 
 WIRES = [encode(Packet(messages.Press(request=1, capture_id="a"))),
          encode(Packet(messages.Frame(capture_id="a", frame=FRAME), FRAME_ARRAYS)),
-         encode(Packet(messages.Result(capture_id="a", settings_hash="0f", face=FACE),
-                       FACE_ARRAYS))]
+         encode(Packet(messages.Result(
+             capture_id="a", settings_hash="0f", frame_sha256=DIGEST, face=FACE), FACE_ARRAYS))]
 
 
 @given(st.sampled_from(WIRES), st.data())

@@ -1,0 +1,48 @@
+"""`denseface purge`."""
+
+import argparse
+import sys
+
+from service.commands import options
+
+__all__ = ["add_arguments", "run"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """State the flags."""
+    options.add_address(parser)
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--id", metavar="ID", dest="capture_id",
+                      help="this capture, finished or not")
+    what.add_argument("--before", type=options.moment, metavar="TIME",
+                      help="what was accepted before this time, such as 2026-01-31T14:30, UTC or "
+                           "with a zone, finished or not")
+    what.add_argument("--all", action="store_true",
+                      help="all captures, finished or not, and what is in quarantine")
+    parser.add_argument("--yes", action="store_true", help="do not ask")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do it."""
+    from pydantic import ValidationError
+
+    from service.errors import LocalProtocolError, UsageError
+    from service.operator import Operator
+
+    chosen = (f"capture {args.capture_id}" if args.capture_id is not None
+              else f"all captures accepted before {args.before:%Y-%m-%d %H:%M:%S} UTC"
+              if args.before else "all captures")
+    if not args.yes:
+        if not sys.stdin.isatty():
+            raise UsageError("--yes: expected, as there is nobody to ask")
+        if input(f"Remove {chosen}, with frame, face and report? [y/N] ").strip().lower() != "y":
+            print("nothing removed")
+            return 1
+    with Operator(options.service_settings(args).address) as operator:
+        try:
+            removed = operator.purge(
+                capture_id=args.capture_id, before=args.before, everything=args.all)
+        except ValidationError as error:
+            raise LocalProtocolError(f"capture id {args.capture_id!r}: malformed") from error
+    print(f"{removed} {'capture' if removed == 1 else 'captures'} removed")
+    return 0

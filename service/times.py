@@ -1,0 +1,48 @@
+"""Durations and times as people write them."""
+
+import math
+import re
+from datetime import UTC, datetime
+
+__all__ = ["parse_time", "retention_of"]
+
+_UNITS = {"s": 1, "m": 60, "h": 3600, "d": 86400}
+_SHORTEST_S = 1.0
+
+
+def retention_of(given: object) -> float | None:
+    """Read a retention, seconds; None for `off`.
+
+    Zero is refused: some mean "keep nothing" by it, others "no limit".
+
+    Raises
+    ------
+    ValueError
+        One line that says what was expected.
+    """
+    if given is None or (isinstance(given, str) and given.strip().lower() == "off"):
+        return None
+    seconds = math.nan
+    if isinstance(given, int | float) and not isinstance(given, bool):
+        seconds = float(given)
+    elif match := re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([smhd]?)\s*", str(given)):
+        seconds = float(match.group(1)) * _UNITS[match.group(2) or "s"]
+    if not _SHORTEST_S <= seconds < math.inf:
+        raise ValueError("expected a time of 1 s or more such as 24h, 90m or 7d, or off")
+    return seconds
+
+
+def parse_time(text: str) -> datetime:
+    """Read an ISO 8601 time; UTC where it names no zone.
+
+    Raises
+    ------
+    ValueError
+        One line that says what was expected.
+    """
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError as error:
+        raise ValueError(
+            f"{text!r}: expected a time such as 2026-01-31T14:30, UTC or with a zone") from error
+    return moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
