@@ -1,0 +1,47 @@
+"""What messages are made of."""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.payload import Payload
+
+__all__ = ["BaseAnswer", "BaseMessage", "BaseRequest", "CaptureId", "Digest", "Name", "Number",
+           "Seconds", "Text", "Token"]
+
+CaptureId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
+"""Chosen by whoever pressed; also part of file names, hence no dots and no slashes."""
+
+Name = Annotated[str, Field(max_length=200)]
+Text = Annotated[str, Field(max_length=4000)]
+Token = Annotated[str, Field(pattern=r"^[0-9a-f]{1,64}$")]
+Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+Number = Annotated[int, Field(ge=0, lt=2**63)]
+Seconds = Annotated[float, Field(ge=0, le=3600)]
+
+
+class BaseMessage(BaseModel):
+    """What all have in common."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    version: Literal[1] = 1
+
+    @property
+    def payload(self) -> Payload | None:
+        """What says which arrays follow this header."""
+        return None
+
+
+class BaseRequest(BaseMessage):
+    """A client asks."""
+
+    request: Number
+    """Chosen by the client, repeated in the answer."""
+
+
+class BaseAnswer(BaseMessage):
+    """The hub answers."""
+
+    request: Number = 0
+    """The request answered; 0 where nobody asked: a publication."""
