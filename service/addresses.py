@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 from service.errors import AddressError, HubRunningError
 from service.settings import private_folder
 
-__all__ = ["check_bindable", "publications_of", "socket_file"]
+__all__ = ["check_bindable", "is_local", "publications_of", "socket_file"]
 
 _MAX_SOCKET_PATH = 107 - len(".publications")
 _PUBLICATIONS = ".publications"
@@ -47,28 +47,34 @@ def publications_of(address: str) -> str:
     return f"tcp://{f'[{host}]' if ':' in host else host}:{port + 1}"
 
 
-def check_bindable(address: str) -> None:
-    """Refuse what the hub may not bind, and an `ipc` address that another hub serves.
+def is_local(address: str) -> bool:
+    """Say whether an address is open to this machine alone: `ipc`, or a loopback TCP address.
 
     Raises
     ------
     AddressError
-        Where the address would be open to other machines: that needs CURVE keys, which this
-        version does not have.
+        As `socket_file`.
+    """
+    if socket_file(address):
+        return True
+    try:
+        return ip_address(_host_and_port(address)[0]).is_loopback
+    except ValueError:
+        return False
+
+
+def check_bindable(address: str) -> None:
+    """Make an `ipc` address's folder, and refuse an address that another hub serves.
+
+    Raises
+    ------
+    AddressError
+        As `socket_file`.
     HubRunningError
         Where a hub answers there already: binding would silently take its place.
     """
     path = socket_file(address)
     if path is None:
-        host, _ = _host_and_port(address)
-        try:
-            loopback = ip_address(host).is_loopback
-        except ValueError:
-            loopback = False
-        if not loopback:
-            raise AddressError(
-                f"{address}: refused, it is not a loopback address: other machines may only be "
-                "let in with CURVE security, use tcp://127.0.0.1:PORT or ipc://PATH")
         return
     private_folder(path.parent)
     with socket.socket(socket.AF_UNIX) as probe:

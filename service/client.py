@@ -11,6 +11,7 @@ import time
 import uuid
 from collections.abc import Callable, Iterator
 from datetime import datetime
+from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeVar
 
@@ -20,6 +21,7 @@ from pydantic import ValidationError
 from recon.face import Face
 from service import messages
 from service.addresses import publications_of
+from service.credentials import Credentials, connect
 from service.errors import (
     ClientTimeoutError,
     LocalProtocolError,
@@ -32,7 +34,7 @@ from service.errors import (
 from service.messages import Status
 from service.published import Published, PublishedFace, PublishedFailure, Subscriber, outcome_of
 from service.settings import ServiceSettings
-from service.sockets import connect, send_parts
+from service.sockets import send_parts
 from service.wire import Packet, decode_from_hub, encode
 
 __all__ = ["Client", "Published", "PublishedFace", "PublishedFailure", "expect"]
@@ -51,21 +53,29 @@ class Client:
     Parameters
     ----------
     address : the hub's; where None, `DENSEFACE_ADDRESS` or this user's own hub
+    key, hub_key : files of one's own secret key and of the hub's public one, for a hub elsewhere;
+        where None, `DENSEFACE_KEY` and `DENSEFACE_HUB_KEY`
+
+    Every call raises `KeyRefusedError` where the hub does not let this key in.
 
     Raises
     ------
     SettingsError
-        Where the address is malformed.
+        Where the address is malformed or a key file cannot be used.
     """
 
-    def __init__(self, address: str | None = None) -> None:
-        settings = ServiceSettings.of(os.environ, address=address)
+    def __init__(
+        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None
+    ) -> None:
+        settings = ServiceSettings.of(os.environ, address=address, key=key, hub_key=hub_key)
         self.address = settings.address
         self._resend_s = settings.resend_s
         self._publications = publications_of(self.address)
+        self._keys = Credentials.of(settings)
         self._requests = itertools.count(1)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._socket = connect(self._context, zmq.DEALER, self.address)
+        self._socket, self._knock = connect(
+            self._context, zmq.DEALER, self.address, self._keys)
 
     def __enter__(self) -> Self:
         return self
@@ -175,7 +185,8 @@ class Client:
             More than one start is given, `last` is not positive or `since` has no zone.
         """
         find = self._finder(after, last, since)
-        with Subscriber(self._context, self._publications, self._ask_next, self.status) as follow:
+        socket, knock = connect(self._context, zmq.SUB, self._publications, self._keys)
+        with Subscriber(socket, knock, self._ask_next, self.status) as follow:
             follow.start(after, timeout, find)
             while True:
                 yield follow.next(timeout)
@@ -214,6 +225,7 @@ class Client:
         parts = encode(Packet(message))
         deadline = time.monotonic() + timeout
         while (left := deadline - time.monotonic()) > 0:
+            self._knock.check()
             wait = self._resend_s if send_parts(self._socket, parts) else _UNCONNECTED_S
             answer = self._answer(message.request, min(left, wait))
             if answer is None:
@@ -221,9 +233,10 @@ class Client:
             if isinstance(answer.message, messages.RequestFailed):
                 raise RequestFailedError(f"{self.address}: {answer.message.message}")
             return answer
+        why = ("is it running, or was this key revoked?" if self._keys
+               else "is `denseface up` running?")
         raise ClientTimeoutError(
-            f"{self.address}: no answer from the hub within {timeout:g} s, "
-            "is `denseface up` running?")
+            f"{self.address}: no answer from the hub within {timeout:g} s, {why}")
 
     def _answer(self, request: int, wait: float) -> Packet | None:
         until = time.monotonic() + wait

@@ -5,6 +5,7 @@ Each error is also the builtin kind that a caller would expect to catch.
 
 __all__ = [
     "AddressError",
+    "AuthenticatorStoppedError",
     "CaptureFailedError",
     "ClientTimeoutError",
     "CorruptFileError",
@@ -13,6 +14,8 @@ __all__ = [
     "DiskFullError",
     "FormatError",
     "HubRunningError",
+    "KeyFileError",
+    "KeyRefusedError",
     "LocalProtocolError",
     "PressRefusedError",
     "ProtocolError",
@@ -39,7 +42,16 @@ class LocalProtocolError(ProtocolError):
 
 
 class RemoteProtocolError(ProtocolError):
-    """The other side sent something that is no message: drop it, do not answer it."""
+    """The other side sent something that is no message: drop it, do not answer it.
+
+    Attributes
+    ----------
+    reason : `malformed`, `oversized`, `truncated` or `version`
+    """
+
+    def __init__(self, message: str, reason: str = "malformed") -> None:
+        super().__init__(message)
+        self.reason = reason
 
 
 class ClientTimeoutError(ServiceError, TimeoutError):
@@ -110,6 +122,18 @@ class SettingsError(ServiceError, ValueError):
 
 class AddressError(SettingsError):
     """An address is malformed, or one that the hub may not bind."""
+
+
+class KeyFileError(SettingsError):
+    """A key file is missing, malformed, open to others, or its name is in use."""
+
+
+class AuthenticatorStoppedError(ServiceError, RuntimeError):
+    """The part of the hub that decides who may connect ended: so must the hub."""
+
+
+class KeyRefusedError(ServiceError, PermissionError):
+    """The hub does not let this key in."""
 
 
 class HubRunningError(ServiceError, RuntimeError):

@@ -13,6 +13,7 @@ import structlog
 
 from recon.settings import Settings
 from service import messages
+from service.counters import Counters
 from service.errors import DamagedDatabaseError, DamagedFaceError, ServiceError
 from service.intake import Intake
 from service.jobs import Jobs
@@ -41,10 +42,15 @@ class Hub:
     store : what was accepted before is resumed
     settings : time-outs and limits
     recon : settings of every job accepted from now on
+    counters : counts what is told apart here
     """
 
-    def __init__(self, store: Store, settings: ServiceSettings, recon: Settings) -> None:
+    def __init__(
+        self, store: Store, settings: ServiceSettings, recon: Settings,
+        counters: Counters | None = None,
+    ) -> None:
         self._store = store
+        self._counters = counters or Counters()
         self._settings = settings
         self._roster = Roster()
         self._outcomes = Outcomes(store, self._remake)
@@ -60,7 +66,7 @@ class Hub:
         Parameters
         ----------
         now : seconds, of a clock that only goes forward
-        peer : the sender's routing id
+        peer : names the sender's connection
 
         Raises
         ------
@@ -103,9 +109,13 @@ class Hub:
             self._log.error("tick failed", reason=str(error))
         return outputs
 
-    def unreachable(self, peer: bytes) -> list[Output]:
-        """Take note that a message to a peer could not be delivered."""
-        return list(self._gone(peer, "unreachable"))
+    def unreachable(self, peer: bytes, reason: str = "unreachable") -> list[Output]:
+        """Take note that a message to a peer could not be delivered, nor could the next."""
+        return list(self._gone(peer, reason))
+
+    def peers(self) -> list[bytes]:
+        """Give the sensors and workers that are known."""
+        return [*self._roster.sensors, *self._roster.workers]
 
     def _receive(self, now: float, peer: bytes, packet: Packet) -> Iterator[Output]:
         match packet.message:
@@ -177,4 +187,5 @@ class Hub:
             workers=tuple(worker.name for worker in self._roster.workers.values()),
             pressed=len(self._intake), queued=self._jobs.queued, working=self._jobs.working,
             done=counts.get(CaptureState.DONE, 0), failed=counts.get(CaptureState.FAILED, 0),
-            dead=counts.get(CaptureState.DEAD, 0))
+            dead=counts.get(CaptureState.DEAD, 0),
+            refused=self._counters.labels("refused"))

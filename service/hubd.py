@@ -1,18 +1,24 @@
 """The hub's process: the only one that binds. Sockets here, decisions in `service.hub`."""
 
 import math
+import os
 import time
 
 import structlog
 import zmq
 
 from recon.settings import Settings
-from service.addresses import check_bindable, publications_of, socket_file
-from service.errors import AddressError, ProtocolError
+from service import messages
+from service.access import missing_role
+from service.counters import Counters
+from service.doors import Incoming
+from service.entrance import Entrance
+from service.errors import RemoteProtocolError
 from service.hub import Hub
-from service.outputs import Output, Publish
+from service.outputs import Output, Publish, send
+from service.pressed import Pressed
+from service.refusals import Refusals
 from service.settings import ServiceSettings
-from service.sockets import open_socket, send_parts
 from service.stopping import StopSignal
 from service.store import FolderStore
 from service.wire import decode_to_hub, encode
@@ -20,8 +26,6 @@ from service.wire import decode_to_hub, encode
 __all__ = ["run"]
 
 _TICK_S = 0.25
-_BURST = 32
-"""Messages taken between two looks at the clock."""
 
 
 def run(settings: ServiceSettings, recon: Settings) -> int:
@@ -29,87 +33,86 @@ def run(settings: ServiceSettings, recon: Settings) -> int:
 
     Raises
     ------
-    AddressError, HubRunningError, StoreError
-        Where the address or the data folder cannot be had.
+    AddressError, KeyFileError, HubRunningError, StoreError
+        Where an address or the data folder cannot be had.
+    AuthenticatorStoppedError
+        Nobody could be let in any more.
     """
+    os.umask(0o077)  # the database's files too are for this user alone
     log = structlog.get_logger("hub")
+    counters = Counters()
+    refusals = Refusals(counters)
     with StopSignal() as stop, FolderStore(settings.data) as store, zmq.Context() as context:
-        loop = _Loop(context, settings.address, Hub(store, settings, recon))
-        log.info("listening", address=settings.address, data=str(settings.data))
+        entrance = Entrance(context, settings, refusals, stop)
         try:
+            loop = _Loop(entrance, Hub(store, settings, recon, counters), refusals)
+            log.info("listening", address=" ".join(entrance.addresses), data=str(settings.data))
             loop.serve(stop)
         finally:
-            loop.close()
+            entrance.close()
         log.info("stopped")
         return stop.exit_status
 
 
 class _Loop:
     def __init__(
-        self, context: "zmq.Context[zmq.Socket[bytes]]", address: str, hub: Hub
+        self, entrance: Entrance, hub: Hub, refusals: Refusals
     ) -> None:
-        check_bindable(address)
-        self._addresses = (address, publications_of(address))
+        self._entrance = entrance
         self._hub = hub
-        self._log = structlog.get_logger("hub")
-        self._router = open_socket(context, zmq.ROUTER)
-        self._router.set(zmq.ROUTER_MANDATORY, 1)
-        self._publisher = open_socket(context, zmq.XPUB)
-        for socket, one in zip((self._router, self._publisher), self._addresses, strict=True):
-            try:
-                socket.bind(one)
-            except zmq.ZMQError as error:
-                self.close()
-                raise AddressError(f"{one}: {error.strerror}") from error
-
-    def close(self) -> None:
-        self._router.close()
-        self._publisher.close()
-        for address in self._addresses:
-            if path := socket_file(address):
-                path.unlink(missing_ok=True)
+        self._refusals = refusals
+        self._pressed = Pressed()
 
     def serve(self, stop: StopSignal) -> None:
-        poller = zmq.Poller()
-        for one in (self._router, self._publisher, stop):
-            poller.register(one, zmq.POLLIN)
         due = 0.0
         while not stop:
             if (now := time.monotonic()) >= due:
                 due = now + _TICK_S
+                if self._entrance.tick():
+                    self._drop_revoked()
                 self._give_out(self._hub.tick(now))
-            ready = dict(poller.poll(max(0, math.ceil((due - now) * 1000))))
-            if self._router in ready:
-                self._take_in()
-            if self._publisher in ready:
-                self._publisher.recv_multipart()  # who subscribes to what is of no interest
-            if stop.fileno() in ready:
-                stop.drain()
+            for incoming in self._entrance.receive(max(0, math.ceil((due - now) * 1000))):
+                self._take_in(incoming)
+            stop.drain()
 
-    def _take_in(self) -> None:
-        for _ in range(_BURST):
-            try:
-                peer, *parts = self._router.recv_multipart(zmq.DONTWAIT)
-            except zmq.Again:
-                return
-            try:
-                packet = decode_to_hub(parts)
-            except ProtocolError as error:
-                self._log.warning("message dropped", peer=peer.hex(), reason=str(error))
-                continue
-            self._give_out(self._hub.receive(time.monotonic(), peer, packet))
+    def _drop_revoked(self) -> None:
+        for peer in self._hub.peers():
+            if not self._entrance.knows(peer):
+                self._give_out(self._hub.unreachable(peer, "its key or its roles changed"))
+
+    def _take_in(self, incoming: Incoming) -> None:
+        who = {"key": incoming.sender.name, "address": incoming.address}
+        try:
+            packet = decode_to_hub(incoming.parts)
+        except RemoteProtocolError as error:
+            self._refusals.note(error.reason, **who, detail=str(error))
+            return
+        message, sender = packet.message, incoming.sender
+        own = (isinstance(message, messages.GetFace)
+               and self._pressed.by(message.capture_id, sender.fingerprint))
+        lacks = missing_role(sender.roles, message, own=own)
+        if lacks:
+            self._refusals.note("role", **who, detail=lacks)
+            self._give_out([_denied(incoming, message, lacks)])
+            return
+        if isinstance(message, messages.Press):
+            self._pressed.note(message.capture_id, sender.fingerprint)
+        self._give_out(self._hub.receive(time.monotonic(), incoming.peer, packet))
 
     def _give_out(self, outputs: list[Output]) -> None:
         for output in outputs:
             parts = encode(output.packet)
             if isinstance(output, Publish):
-                send_parts(self._publisher, [output.topic.encode(), *parts])
-                continue
-            try:
-                delivered = send_parts(self._router, [output.peer, *parts])
-            except zmq.ZMQError as error:
-                if error.errno != zmq.EHOSTUNREACH:
-                    raise
-                delivered = False
-            if not delivered:
+                self._entrance.publish(output.topic, parts)
+            elif not self._entrance.send(output.peer, parts):
                 self._give_out(self._hub.unreachable(output.peer))
+
+
+def _denied(incoming: Incoming, message: messages.Message, lacks: str) -> Output:
+    """Say it in one line to whoever has a key of another role."""
+    has = ", ".join(sorted(incoming.sender.roles))
+    text = f"refused: {lacks}, the key {incoming.sender.name} has {has}"
+    request = getattr(message, "request", None)
+    if request is None:
+        return send(incoming.peer, messages.Denied(message=text))
+    return send(incoming.peer, messages.RequestFailed(request=request, message=text))

@@ -10,11 +10,12 @@ import structlog
 import zmq
 
 from service.background import Background
+from service.credentials import Credentials, connect
 from service.errors import ProtocolError
-from service.messages import Goodbye, Heartbeat, ToHub
+from service.messages import Denied, Goodbye, Heartbeat, ToHub
 from service.payload import Arrays
 from service.settings import ServiceSettings
-from service.sockets import connect, send_parts
+from service.sockets import send_parts
 from service.stopping import StopSignal
 from service.wire import Packet, decode_from_hub, encode
 
@@ -31,7 +32,9 @@ class HubLink:
         self._heartbeat_s = settings.heartbeat_s
         self._log = structlog.get_logger(name)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._socket = connect(self._context, zmq.DEALER, settings.address)
+        self._socket, self._knock = connect(
+            self._context, zmq.DEALER, settings.address, Credentials.of(settings))
+        self._denied = ""
 
     def __enter__(self) -> Self:
         return self
@@ -42,8 +45,7 @@ class HubLink:
     ) -> None:
         if error is None:
             self.send(Goodbye())
-        self._socket.close()
-        self._context.term()
+        self._context.destroy()
 
     def send(self, message: ToHub, arrays: Arrays | None = None) -> bool:
         """Send without waiting; False where the hub is not there."""
@@ -67,15 +69,27 @@ class HubLink:
             if (now := time.monotonic()) >= due:
                 sent = self.send(Heartbeat(holding=holding()))
                 due = now + (self._heartbeat_s if sent else min(_RETRY_S, self._heartbeat_s))
+                if self._knock.read():
+                    self._log.error("not let in", reason=str(self._knock.refused))
                 yield None
             ready = dict(poller.poll(max(0, math.ceil((due - time.monotonic()) * 1000))))
             if stop.fileno() in ready:
                 stop.drain()
             elif self._socket in ready:
                 try:
-                    yield decode_from_hub(self._socket.recv_multipart())
+                    packet = decode_from_hub(self._socket.recv_multipart())
                 except ProtocolError as error:
                     self._log.warning("message dropped", reason=str(error))
+                    continue
+                if isinstance(packet.message, Denied):
+                    self._say_denied(packet.message.message)
+                else:
+                    yield packet
             elif wake.fileno() in ready:
                 wake.drain()
                 yield None
+
+    def _say_denied(self, reason: str) -> None:
+        if reason != self._denied:  # once, not at every heartbeat
+            self._log.error("denied", reason=reason)
+            self._denied = reason

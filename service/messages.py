@@ -33,11 +33,11 @@ from service.payload import FaceHeader, FrameHeader
 
 __all__ = [
     "Announce", "CaptureFailed", "CaptureId", "CapturePending", "CaptureUnknown", "DeadLetter",
-    "DeadLetters", "DropDead", "FaceDone", "FindStart", "Frame", "FrameAccepted", "FrameFailed",
-    "FrameRefused", "FromHub", "GetFace", "GetNext", "GetStatus", "Goodbye", "Heartbeat", "Job",
-    "JobFailed", "ListDead", "Message", "NothingNewer", "Press", "PressAccepted", "PressRefused",
-    "Purge", "Removed", "Request", "RequestFailed", "Result", "RetryDead", "SensorReady",
-    "StartAt", "Status", "Take", "ToHub", "WorkerReady",
+    "DeadLetters", "Denied", "DropDead", "FaceDone", "FindStart", "Frame", "FrameAccepted",
+    "FrameFailed", "FrameRefused", "FromHub", "GetFace", "GetNext", "GetStatus", "Goodbye",
+    "Heartbeat", "Job", "JobFailed", "ListDead", "Message", "NothingNewer", "Press",
+    "PressAccepted", "PressRefused", "Purge", "Removed", "Request", "RequestFailed", "Result",
+    "RetryDead", "SensorReady", "StartAt", "Status", "Take", "ToHub", "WorkerReady",
 ]
 
 
@@ -199,6 +199,8 @@ class Status(BaseAnswer):
     done: Number
     failed: Number
     dead: Number
+    refused: dict[Name, Number] = {}
+    """Connections and messages that were not let in since the hub started, by reason."""
 
     @property
     def ready(self) -> bool:
@@ -286,6 +288,13 @@ class Announce(BaseMessage):
     kind: Literal["announce"] = "announce"
 
 
+class Denied(BaseMessage):
+    """Your key has not the role for what you said."""
+
+    kind: Literal["denied"] = "denied"
+    message: Text
+
+
 class Take(BaseMessage):
     """Send the newest frame as this capture."""
 
@@ -327,5 +336,5 @@ ToHub = (Press | GetFace | GetNext | FindStart | GetStatus | ListDead | RetryDea
          | JobFailed)
 FromHub = (PressAccepted | PressRefused | CapturePending | CaptureUnknown | RequestFailed
            | NothingNewer | StartAt | DeadLetters | Removed | FaceDone | CaptureFailed | Status
-           | Announce | Take | FrameAccepted | FrameRefused | Job)
+           | Announce | Denied | Take | FrameAccepted | FrameRefused | Job)
 Message = ToHub | FromHub

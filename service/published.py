@@ -10,6 +10,7 @@ from typing import Protocol, Self, TypeVar
 import zmq
 
 from recon.face import Face
+from service.credentials import Knock
 from service.errors import (
     CaptureFailedError,
     ClientTimeoutError,
@@ -18,7 +19,6 @@ from service.errors import (
 )
 from service.messages import CaptureFailed, FaceDone, NothingNewer, StartAt, Status
 from service.outputs import Topic
-from service.sockets import connect
 from service.wire import Packet, decode_from_hub
 
 __all__ = ["Published", "PublishedFace", "PublishedFailure", "Subscriber", "outcome_of"]
@@ -27,6 +27,10 @@ _T = TypeVar("_T")
 
 _PATIENCE_S = 5.0
 """Longest wait for one answer of a hub that may be restarting, seconds."""
+
+
+_LOOK_S = 1.0
+"""Time between two looks whether the hub still lets us in, seconds."""
 
 
 @dataclass(frozen=True)
@@ -82,16 +86,18 @@ class Subscriber:
 
     Parameters
     ----------
+    socket, knock : a SUB connected to the publications
     ask_next : gives the answer to `GetNext` for a sequence number, in at most some seconds
     """
 
     def __init__(
-        self, context: "zmq.Context[zmq.Socket[bytes]]", address: str,
+        self, socket: "zmq.Socket[bytes]", knock: Knock,
         ask_next: Callable[[int, float], Packet], ask_status: _AskStatus,
     ) -> None:
         self._ask_next = ask_next
         self._ask_status = ask_status
-        self._socket = connect(context, zmq.SUB, address)
+        self._socket = socket
+        self._knock = knock
         for topic in Topic:
             self._socket.subscribe(topic)
         self._epoch: str | None = None
@@ -105,6 +111,7 @@ class Subscriber:
         self, kind: type[BaseException] | None, error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
+        self._knock.close()
         self._socket.close(linger=0)
 
     def start(
@@ -146,9 +153,11 @@ class Subscriber:
         return packet
 
     def _receive(self, deadline: float) -> Packet | None:
-        left = deadline - time.monotonic()
-        if not self._socket.poll(None if left == math.inf else max(0, math.ceil(left * 1000))):
-            raise ClientTimeoutError("nothing was published in the time allowed")
+        while not self._socket.poll(
+                max(0, math.ceil(min(deadline - time.monotonic(), _LOOK_S) * 1000))):
+            self._knock.check()
+            if time.monotonic() >= deadline:
+                raise ClientTimeoutError("nothing was published in the time allowed")
         _, *parts = self._socket.recv_multipart()
         try:
             packet = decode_from_hub(parts)

@@ -8,7 +8,14 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import platformdirs
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+)
 
 from service.errors import SettingsError
 from service.times import retention_of
@@ -41,7 +48,15 @@ class ServiceSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     address: str = Field(default_factory=default_address)
-    """The hub's address: `ipc://PATH` or `tcp://127.0.0.1:PORT`."""
+    """The hub's address: `ipc://PATH` or `tcp://HOST:PORT`."""
+    listen: tuple[str, ...] = ()
+    """Where the hub listens too, for those with a key: `tcp://HOST:PORT`, several with commas."""
+    keys: Path = Field(default_factory=lambda: platformdirs.user_config_path("denseface") / "keys")
+    """Folder of the keys and of the hub's allow-list."""
+    key: Path | None = None
+    """File of one's own secret key."""
+    hub_key: Path | None = None
+    """File of the hub's public key."""
     data: Path = Field(default_factory=lambda: platformdirs.user_data_path("denseface"))
     """Folder of frames, faces and their database; created with mode 0700."""
     heartbeat_s: _Seconds = 1.0
@@ -62,6 +77,11 @@ class ServiceSettings(BaseModel):
     """Room that is to stay free on the disk, MiB; with less a press is refused."""
     resend_s: _Seconds = 2.0
     """Time after which an unanswered request or frame is sent again, seconds."""
+
+    @field_validator("listen", mode="before")
+    @classmethod
+    def _split(cls, given: object) -> object:
+        return tuple(filter(None, given.split(","))) if isinstance(given, str) else given
 
     @property
     def silence_s(self) -> float:

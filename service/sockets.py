@@ -2,9 +2,10 @@
 
 import zmq
 
+from service.errors import RemoteProtocolError
 from service.payload import MAX_ARRAY_BYTES
 
-__all__ = ["connect", "open_socket", "send_parts"]
+__all__ = ["TooLongError", "open_socket", "receive_parts", "send_parts"]
 
 _HIGH_WATER_MARK = 16
 """Messages that may wait in one direction for one peer, some of many megabytes; beyond it they
@@ -12,6 +13,19 @@ are dropped, and asked for again."""
 _LINGER_MS = 500
 """How long a closing socket tries to deliver its last messages."""
 _RECONNECT_MS, _RECONNECT_MAX_MS = 50, 500
+
+
+class TooLongError(RemoteProtocolError):
+    """A message had more parts or bytes than it may; all of it was dropped.
+
+    Attributes
+    ----------
+    first : its first part, with what libzmq knows of the sender
+    """
+
+    def __init__(self, message: str, first: zmq.Frame) -> None:
+        super().__init__(message, "oversized")
+        self.first = first
 
 
 def open_socket(context: "zmq.Context[zmq.Socket[bytes]]", kind: int) -> "zmq.Socket[bytes]":
@@ -26,18 +40,6 @@ def open_socket(context: "zmq.Context[zmq.Socket[bytes]]", kind: int) -> "zmq.So
     return socket
 
 
-def connect(
-    context: "zmq.Context[zmq.Socket[bytes]]", kind: int, address: str
-) -> "zmq.Socket[bytes]":
-    """Open a socket toward the hub, which may come later."""
-    socket = open_socket(context, kind)
-    if kind == zmq.DEALER:
-        # Nothing is queued for a hub that is not there: it would arrive stale.
-        socket.set(zmq.IMMEDIATE, 1)
-    socket.connect(address)
-    return socket
-
-
 def send_parts(socket: "zmq.Socket[bytes]", parts: list[bytes]) -> bool:
     """Send without waiting; False where nobody can take it now."""
     try:
@@ -45,3 +47,32 @@ def send_parts(socket: "zmq.Socket[bytes]", parts: list[bytes]) -> bool:
     except zmq.Again:
         return False
     return True
+
+
+def receive_parts(
+    socket: "zmq.Socket[bytes]", most: int, most_bytes: int
+) -> tuple[zmq.Frame, list[bytes]]:
+    """Receive without waiting: the first part with its properties, and those that follow it.
+
+    A message is taken part by part and kept only as far as it may go.
+
+    Raises
+    ------
+    zmq.Again
+        Where there is none.
+    TooLongError
+        Where more than `most` parts or `most_bytes` bytes follow the first.
+    """
+    first = frame = socket.recv(zmq.DONTWAIT, copy=False, track=False)
+    parts: list[bytes] = []
+    count = size = 0
+    while frame.more:
+        frame = socket.recv(zmq.DONTWAIT, copy=False, track=False)
+        count += 1
+        size += len(frame)
+        if count <= most and size <= most_bytes:
+            parts.append(frame.bytes)
+    if count > most or size > most_bytes:
+        raise TooLongError(
+            f"{count} parts with {size} bytes, at most {most} with {most_bytes} allowed", first)
+    return first, parts

@@ -20,10 +20,12 @@ _MAGIC = b"denseface spool 2\n"
 _DIGEST_BYTES = hashlib.sha256().digest_size
 
 
-def write_atomically(path: Path, chunks: Sequence[bytes], *, durable: bool = True) -> None:
+def write_atomically(path: Path, chunks: Sequence[bytes], *, durable: bool = True,
+                     mode: int = 0o666) -> None:
     """Write a file so that `path` is ever either the old contents or all of the new.
 
-    With `durable`, it is on the disk, and so is its name, when this returns.
+    With `durable`, it is on the disk, and so is its name, when this returns. `mode`, less the
+    umask, is that of the file.
 
     Raises
     ------
@@ -32,7 +34,8 @@ def write_atomically(path: Path, chunks: Sequence[bytes], *, durable: bool = Tru
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        with temporary.open("xb") as file:
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+        with os.fdopen(os.open(temporary, flags, mode), "wb") as file:
             for chunk in chunks:
                 file.write(chunk)
             file.flush()
@@ -62,7 +65,7 @@ def write_parts(path: Path, parts: Sequence[bytes]) -> str:
     for part in parts:
         digest.update(part)
     try:
-        write_atomically(path, [_MAGIC, digest.digest(), index, *parts])
+        write_atomically(path, [_MAGIC, digest.digest(), index, *parts], mode=0o600)
     except OSError as error:
         raise store_error(path, error) from error
     return digest.hexdigest()

@@ -85,20 +85,22 @@ def _decode(
     parts: Sequence[bytes], adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub]
 ) -> Packet:
     if not 1 <= len(parts) <= MAX_PARTS:
-        raise RemoteProtocolError(f"message has {len(parts)} parts, 1 to {MAX_PARTS} expected")
+        raise RemoteProtocolError(f"message has {len(parts)} parts, 1 to {MAX_PARTS} expected",
+                                  "oversized" if parts else "truncated")
     header, *buffers = parts
     if len(header) > MAX_HEADER_BYTES:
         raise RemoteProtocolError(
-            f"header has {len(header)} bytes, at most {MAX_HEADER_BYTES} allowed")
+            f"header has {len(header)} bytes, at most {MAX_HEADER_BYTES} allowed", "oversized")
     message = _header(header, adapter)
     infos = message.payload.arrays if message.payload else ()
     if len(buffers) != len(infos):
         raise RemoteProtocolError(
-            f"{message.kind}: {len(buffers)} arrays follow, {len(infos)} announced")
+            f"{message.kind}: {len(buffers)} arrays follow, {len(infos)} announced", "truncated")
     for info, buffer in zip(infos, buffers, strict=True):
         if len(buffer) != info.nbytes:
             raise RemoteProtocolError(
-                f"{message.kind}: {info.name} has {len(buffer)} bytes, {info.nbytes} announced")
+                f"{message.kind}: {info.name} has {len(buffer)} bytes, {info.nbytes} announced",
+                "truncated")
     return Packet(message, {
         info.name: np.frombuffer(buffer, info.dtype).reshape(info.shape)
         for info, buffer in zip(infos, buffers, strict=True)})
@@ -111,7 +113,8 @@ def _header(header: bytes, adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub]) -
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False, include_context=False)[0]
         where = ".".join(str(part) for part in first["loc"]) or "header"
-        raise RemoteProtocolError(f"{where}: {first['msg']}"[:500]) from error
+        reason = "version" if first["loc"][-1:] == ("version",) else "malformed"
+        raise RemoteProtocolError(f"{where}: {first['msg']}"[:500], reason) from error
     if "version" not in message.model_fields_set:
-        raise RemoteProtocolError(f"{message.kind}: no version given")
+        raise RemoteProtocolError(f"{message.kind}: no version given", "version")
     return message

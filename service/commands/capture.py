@@ -11,6 +11,7 @@ __all__ = ["add_arguments", "run"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """State the flags."""
     options.add_address(parser)
+    options.add_credentials(parser)
     add_source(parser)
     options.add_daemon(parser)
 

@@ -10,6 +10,7 @@ __all__ = ["add_arguments", "run"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """State the flags."""
     options.add_address(parser)
+    options.add_credentials(parser)
     parser.add_argument("action", choices=("list", "retry", "drop"),
                         help="list: sequence number, id, time, attempts, reason; retry: all "
                              "attempts again; drop: remove frame, error and row")
@@ -22,13 +23,12 @@ def run(args: argparse.Namespace) -> int:
     from pydantic import ValidationError
 
     from service.errors import LocalProtocolError, UsageError
-    from service.operator import Operator
 
     if args.action == "list" and (args.ids or args.all):
         raise UsageError("dead list: takes neither ids nor --all")
     if args.action != "list" and bool(args.ids) == args.all:
         raise UsageError(f"dead {args.action}: expected ids, or --all")
-    with Operator(options.service_settings(args).address) as operator:
+    with options.operator(args) as operator:
         if args.action == "list":
             for one in operator.dead():
                 reason = " ".join(one.message.split())

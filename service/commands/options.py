@@ -8,19 +8,48 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from recon.settings import Settings
+    from service.client import Client
+    from service.operator import Operator
     from service.settings import ServiceSettings
 
-__all__ = ["add_address", "add_daemon", "add_hub", "add_recon", "add_retention", "moment",
-           "recon_arguments", "recon_settings", "service_settings", "start_daemon",
-           "use_one_thread"]
+__all__ = ["add_address", "add_credentials", "add_daemon", "add_hub", "add_keys", "add_listen",
+           "add_recon", "add_retention", "client", "moment", "operator", "recon_arguments",
+           "recon_settings", "service_settings", "start_daemon", "use_one_thread"]
 
 
 def add_address(parser: argparse.ArgumentParser) -> None:
     """Say where the hub is."""
     parser.add_argument(
-        "--address", metavar="ADDRESS",
-        help="the hub's, ipc://PATH or tcp://127.0.0.1:PORT (default: DENSEFACE_ADDRESS, "
+        "--address", "--hub", metavar="ADDRESS",
+        help="the hub's, ipc://PATH or tcp://HOST:PORT (default: DENSEFACE_ADDRESS, "
              "else this user's own)")
+
+
+def add_credentials(parser: argparse.ArgumentParser) -> None:
+    """Say with which keys to go to a hub elsewhere."""
+    parser.add_argument("--key", type=Path, metavar="FILE",
+                        help="one's own secret key, for a hub on another machine "
+                             "(default: DENSEFACE_KEY)")
+    parser.add_argument("--hub-key", type=Path, metavar="FILE",
+                        help="the public key of that hub (default: DENSEFACE_HUB_KEY)")
+
+
+def add_listen(parser: argparse.ArgumentParser) -> None:
+    """Say where other machines are let in, and which."""
+    parser.add_argument("--listen", action="append", metavar="tcp://HOST:PORT",
+                        help="listen here too, for those with an allowed key; may be repeated "
+                             "(default: DENSEFACE_LISTEN)")
+    add_keys(parser)
+    parser.add_argument("--key", type=Path, metavar="FILE",
+                        help="the hub's secret key (default: DENSEFACE_KEY, else hub.secret in the "
+                             "folder of keys)")
+
+
+def add_keys(parser: argparse.ArgumentParser) -> None:
+    """Say where keys are kept."""
+    parser.add_argument("--keys", type=Path, metavar="DIR",
+                        help="folder of keys (default: DENSEFACE_KEYS, else denseface/keys in this "
+                             "user's configuration)")
 
 
 def add_daemon(parser: argparse.ArgumentParser) -> None:
@@ -101,9 +130,23 @@ def service_settings(args: argparse.Namespace) -> "ServiceSettings":
     """Put the flags over the environment."""
     from service.settings import ServiceSettings
 
+    names = ("address", "data", "key", "hub_key", "keys", "listen", "retention")
     return ServiceSettings.of(
-        os.environ, address=args.address, data=getattr(args, "data", None),
-        retention=getattr(args, "retention", None))
+        os.environ, **{name: getattr(args, name, None) for name in names})
+
+
+def client(args: argparse.Namespace) -> "Client":
+    """Connect as the flags of `add_address` and `add_credentials` say."""
+    from service.client import Client
+
+    return Client(args.address, key=args.key, hub_key=args.hub_key)
+
+
+def operator(args: argparse.Namespace) -> "Operator":
+    """Connect as `client`, to remove too."""
+    from service.operator import Operator
+
+    return Operator(args.address, key=args.key, hub_key=args.hub_key)
 
 
 def start_daemon(args: argparse.Namespace, name: str) -> None:

@@ -12,6 +12,7 @@ __all__ = ["add_arguments", "run", "seconds"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """State the flags."""
     options.add_address(parser)
+    options.add_credentials(parser)
     parser.add_argument("--id", metavar="ID", dest="capture_id",
                         help="id of the capture; the same one again is the same capture")
     parser.add_argument("--timeout", type=seconds, default=60.0, metavar="S",
@@ -29,11 +30,10 @@ def add_outputs(parser: argparse.ArgumentParser, *save: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do it."""
-    from service.client import Client
     from service.files import FaceFiles
 
     files = FaceFiles(args.save, args.report, args.preview)
-    with Client(options.service_settings(args).address) as client:
+    with options.client(args) as client:
         capture_id = client.press(args.capture_id, timeout=args.timeout)
         print(capture_id, flush=True)
         face = client.get(capture_id, timeout=args.timeout)

@@ -11,6 +11,7 @@ __all__ = ["add_arguments", "run"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """State the flags."""
     options.add_address(parser)
+    options.add_credentials(parser)
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--id", metavar="ID", dest="capture_id",
                       help="this capture, finished or not")
@@ -27,7 +28,6 @@ def run(args: argparse.Namespace) -> int:
     from pydantic import ValidationError
 
     from service.errors import LocalProtocolError, UsageError
-    from service.operator import Operator
 
     chosen = (f"capture {args.capture_id}" if args.capture_id is not None
               else f"all captures accepted before {args.before:%Y-%m-%d %H:%M:%S} UTC"
@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
         if input(f"Remove {chosen}, with frame, face and report? [y/N] ").strip().lower() != "y":
             print("nothing removed")
             return 1
-    with Operator(options.service_settings(args).address) as operator:
+    with options.operator(args) as operator:
         try:
             removed = operator.purge(
                 capture_id=args.capture_id, before=args.before, everything=args.all)

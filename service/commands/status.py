@@ -15,6 +15,7 @@ _TIMEOUT_S = 5.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """State the flags."""
     options.add_address(parser)
+    options.add_credentials(parser)
     parser.add_argument("--wait", type=seconds, metavar="SECONDS",
                         help="wait until hub, a sensor and a worker are ready; fail where they "
                              "are not in this time")
@@ -22,11 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do it."""
-    from service.client import Client
     from service.errors import ClientTimeoutError
 
     deadline = time.monotonic() + (args.wait or 0)
-    with Client(options.service_settings(args).address) as client:
+    with options.client(args) as client:
         status = client.status(timeout=args.wait or _TIMEOUT_S)
         while args.wait is not None and not status.ready:
             left = deadline - time.monotonic()
@@ -42,6 +42,9 @@ def run(args: argparse.Namespace) -> int:
         "now": f"{status.pressed} pressed, {status.queued} queued, {status.working} working",
         "kept": f"{status.done} faces, {status.failed} without a face, {status.dead} given up",
     }
+    if status.refused:
+        rows["refused"] = ", ".join(f"{reason} {count}" for reason, count in
+                                    status.refused.items())
     for name, value in rows.items():
         print(f"{name:8} {value}")
     return 0

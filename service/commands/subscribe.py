@@ -11,6 +11,7 @@ __all__ = ["add_arguments", "run"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """State the flags."""
     options.add_address(parser)
+    options.add_credentials(parser)
     parser.add_argument("--save", type=Path, metavar="DIR",
                         help="write each face as DIR/ID.ply with its report, DIR/ID.json")
     parser.add_argument("--count", type=int, metavar="N", help="end after N captures")
@@ -27,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do it."""
-    from service.client import Client, PublishedFailure
+    from service.client import PublishedFailure
     from service.errors import UsageError
     from service.files import FaceFiles
 
@@ -37,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
             raise UsageError(f"--{name} {value}: expected a number that is not negative, or zero")
     if args.save and not args.save.is_dir():
         raise UsageError(f"--save {args.save}: no such folder")
-    with Client(options.service_settings(args).address) as client:
+    with options.client(args) as client:
         published = client.published(after=args.after, last=args.last, since=args.since)
         for number, outcome in enumerate(published, start=1):
             if isinstance(outcome, PublishedFailure):

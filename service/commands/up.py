@@ -14,6 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=_count, default=max(1, (os.cpu_count() or 2) - 1),
                         metavar="N", help="reconstruction processes (default: cores less one)")
     options.add_address(parser)
+    options.add_listen(parser)
     options.add_hub(parser)
     options.add_retention(parser)
     options.add_recon(parser)
@@ -23,18 +24,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Do it."""
     options.start_daemon(args, "up")
-    from service.addresses import check_bindable
+    from service.addresses import check_bindable, is_local
+    from service.entrance import guard
+    from service.errors import AddressError
     from service.supervisor import Supervisor, processes
 
     settings = options.service_settings(args)
+    if not is_local(settings.address):
+        raise AddressError(
+            f"{settings.address}: the processes of `denseface up` meet at a local address; "
+            f"--listen {settings.address} lets other machines in, with CURVE keys")
     check_bindable(settings.address)
+    if settings.listen:
+        guard(settings)  # the hub would say so too, but later
     changed = options.recon_arguments(args)
     options.recon_settings(args)
     common = ["--address", settings.address, "--log", args.log]
     if args.debug:
         common.append("--debug")
     chosen = ["--calibration", str(args.calibration)] if args.calibration else []
-    hub = ["--data", str(settings.data), *changed]
+    hub = ["--data", str(settings.data), "--keys", str(settings.keys), *changed]
+    for address in settings.listen:
+        hub += ["--listen", address]
+    if settings.key:
+        hub += ["--key", str(settings.key)]
     if args.retention:
         hub += ["--retention", args.retention]
     table = processes(args.source, args.workers, common, hub, chosen)

@@ -4,6 +4,7 @@ import pytest
 import zmq
 
 from service import messages
+from service.credentials import connect
 from service.errors import ClientTimeoutError
 from service.outputs import Topic
 from service.published import Subscriber
@@ -61,7 +62,8 @@ def hub():
 
 @pytest.fixture
 def follow(hub):
-    with Subscriber(hub.socket.context, "inproc://published", hub.next, hub.status) as follow:
+    socket, knock = connect(hub.socket.context, zmq.SUB, "inproc://published", None)
+    with Subscriber(socket, knock, hub.next, hub.status) as follow:
         hub.subscribed()
         follow.start(None, 5)
         with pytest.raises(ClientTimeoutError):
@@ -120,7 +122,8 @@ def test_garbage_is_taken_for_something_missed(hub, follow):
 def test_a_start_in_the_past_gives_all_since(hub):
     for _ in range(3):
         hub.conclude(published=False)
-    with Subscriber(hub.socket.context, "inproc://published", hub.next, hub.status) as follow:
+    socket, knock = connect(hub.socket.context, zmq.SUB, "inproc://published", None)
+    with Subscriber(socket, knock, hub.next, hub.status) as follow:
         hub.subscribed()
         follow.start(1, 5)
         assert ids(follow, 2) == ["a2", "a3"]

@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from service.addresses import check_bindable, publications_of, socket_file
+from service.addresses import check_bindable, is_local, publications_of, socket_file
 from service.errors import AddressError, HubRunningError, SettingsError
 from service.settings import ServiceSettings, private_folder
 
@@ -40,16 +40,12 @@ def test_malformed_addresses_are_named(address):
         socket_file(address)
 
 
-@pytest.mark.parametrize("address", [
-    "tcp://0.0.0.0:5000", "tcp://192.168.1.2:5000", "tcp://example.com:5000", "tcp://[::]:5000"])
-def test_the_hub_binds_nothing_that_others_can_reach(address):
-    with pytest.raises(AddressError, match="CURVE"):
-        check_bindable(address)
-
-
-def test_loopback_may_be_bound():
-    check_bindable("tcp://127.0.0.1:5000")
-    check_bindable("tcp://[::1]:5000")
+@pytest.mark.parametrize(("address", "local"), [
+    ("tcp://0.0.0.0:5000", False), ("tcp://192.168.1.2:5000", False),
+    ("tcp://example.com:5000", False), ("tcp://[::]:5000", False), ("tcp://*:5000", False),
+    ("tcp://127.0.0.1:5000", True), ("tcp://[::1]:5000", True), ("ipc:///run/hub", True)])
+def test_what_others_can_reach_is_not_local(address, local):
+    assert is_local(address) is local
 
 
 def test_a_socket_in_use_is_not_taken_over(tmp_path, monkeypatch):

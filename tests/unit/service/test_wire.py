@@ -74,8 +74,10 @@ from_hub = st.one_of(
     plain(messages.Status, request=numbers, epoch=hashes, sequence=numbers, hub_version=texts,
           sensors=st.lists(texts, max_size=3).map(tuple),
           workers=st.lists(texts, max_size=3).map(tuple), pressed=numbers, queued=numbers,
-          working=numbers, done=numbers, failed=numbers, dead=numbers),
+          working=numbers, done=numbers, failed=numbers, dead=numbers,
+          refused=st.dictionaries(texts, numbers, max_size=3)),
     st.just(Packet(messages.Announce())),
+    plain(messages.Denied, message=texts),
     plain(messages.Take, capture_id=ids),
     plain(messages.FrameAccepted, capture_id=ids),
     plain(messages.FrameRefused, capture_id=ids, message=texts),
@@ -107,7 +109,7 @@ def test_what_the_hub_sends_comes_out_the_same(packet):
 def test_every_kind_is_covered_by_the_two_tests_above():
     kinds = {kind.model_fields["kind"].default for kind in messages.ToHub.__args__}
     kinds |= {kind.model_fields["kind"].default for kind in messages.FromHub.__args__}
-    assert len(kinds) == len(messages.ToHub.__args__) + len(messages.FromHub.__args__) == 34
+    assert len(kinds) == len(messages.ToHub.__args__) + len(messages.FromHub.__args__) == 35
 
 
 @given(to_hub)

@@ -1,0 +1,71 @@
+"""`denseface keys`."""
+
+import argparse
+from pathlib import Path
+
+from service.commands import options
+
+__all__ = ["add_arguments", "run"]
+
+_ROLES = ("sensor", "worker", "presser", "subscriber", "operator")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """State the flags."""
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    new = actions.add_parser("new", help="make a pair: NAME.secret and NAME.public", description=(
+        "Make a pair of keys. `hub` is the name of the hub's own."))
+    new.add_argument("name", metavar="NAME")
+    allow = actions.add_parser("allow", help="let a public key in", description=(
+        "Let a public key in, with one or more roles. A hub that runs takes note at once."))
+    allow.add_argument("name", metavar="NAME")
+    allow.add_argument("public", metavar="KEY", help="its file NAME.public, or its 40 characters")
+    allow.add_argument("roles", metavar="ROLE", nargs="+", choices=_ROLES,
+                       help=", ".join(_ROLES))
+    revoke = actions.add_parser("revoke", help="let a key in no more", description=(
+        "Let a key in no more. A hub that runs cuts off at once whoever uses it."))
+    revoke.add_argument("name", metavar="NAME")
+    listed = actions.add_parser("list", help="say which keys are let in")
+    for action in (new, allow, revoke, listed):
+        options.add_keys(action)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do it."""
+    import os
+
+    from service.settings import ServiceSettings
+
+    folder = ServiceSettings.of(os.environ, keys=args.keys).keys
+    {"new": _new, "allow": _allow, "revoke": _revoke, "list": _list}[args.action](args, folder)
+    return 0
+
+
+def _new(args: argparse.Namespace, folder: Path) -> None:
+    from service.keys import new_pair, read_public
+
+    secret, public = new_pair(folder, args.name)
+    print(f"{secret}  stays where it is used\n{public}  goes to the other side: "
+          f"{read_public(public)}")
+
+
+def _allow(args: argparse.Namespace, folder: Path) -> None:
+    from service.keyring import Role, allow
+    from service.keys import read_public
+
+    one = allow(folder, args.name, read_public(args.public), frozenset(map(Role, args.roles)))
+    print(f"{one.name} ({one.fingerprint}) may come in as {', '.join(sorted(one.roles))}")
+
+
+def _revoke(args: argparse.Namespace, folder: Path) -> None:
+    from service.keyring import revoke
+
+    revoke(folder, args.name)
+    print(f"{args.name} may come in no more")
+
+
+def _list(args: argparse.Namespace, folder: Path) -> None:  # noqa: ARG001
+    from service.keyring import Keyring
+
+    for one in sorted(Keyring(folder), key=lambda one: one.name):
+        print(f"{one.name:20} {one.fingerprint}  {', '.join(sorted(one.roles))}")

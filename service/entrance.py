@@ -1,0 +1,162 @@
+"""All doors of the hub, and the one authenticator before the guarded ones."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Protocol
+
+import zmq
+
+from service.access import TOPICS
+from service.addresses import check_bindable, is_local, socket_file
+from service.doors import Door, Guard, Incoming
+from service.errors import AddressError, AuthenticatorStoppedError
+from service.keyring import Allowed, Keyring
+from service.keys import HUB, read_pair
+from service.outputs import Topic
+from service.refusals import Refusals
+from service.settings import ServiceSettings
+from service.zap import TOPICS_DOMAIN, Authenticator
+
+__all__ = ["Entrance", "guard", "guarded_addresses"]
+
+
+class _Wakes(Protocol):
+    def fileno(self) -> int: ...
+
+
+class Entrance:
+    """Opens every door that the settings name.
+
+    Raises
+    ------
+    AddressError, KeyFileError, HubRunningError
+        Where a door cannot be opened, or other machines could reach it and there are no keys.
+    """
+
+    def __init__(
+        self, context: "zmq.Context[zmq.Socket[bytes]]", settings: ServiceSettings,
+        refusals: Refusals, wakes: _Wakes,
+    ) -> None:
+        self._keyring: Keyring | None = None
+        self._authenticator: Authenticator | None = None
+        self._doors: list[Door] = []
+        self._poller = zmq.Poller()
+        self._poller.register(wakes, zmq.POLLIN)
+        try:
+            guarded = guarded_addresses(settings)
+            if settings.address not in guarded:
+                check_bindable(settings.address)
+                self._doors.append(Door(context, settings.address, None, refusals))
+            if guarded:
+                keys = guard(settings)
+                self._keyring = keys.keyring
+                self._authenticator = Authenticator(context, keys.keyring, refusals, _admits)
+                self._poller.register(self._authenticator.socket, zmq.POLLIN)
+                self._doors += [Door(context, one, keys, refusals) for one in guarded]
+        except BaseException:
+            self.close()
+            raise
+        for door in self._doors:
+            for socket in door.sockets:
+                self._poller.register(socket, zmq.POLLIN)
+
+    @property
+    def addresses(self) -> list[str]:
+        """Where the hub listens."""
+        return [door.address for door in self._doors]
+
+    def close(self) -> None:
+        """Close all doors; the authenticator last."""
+        for door in self._doors:
+            door.close()
+        if self._authenticator:
+            self._authenticator.close()
+
+    def tick(self) -> bool:
+        """Look at the allow-list; True where peers may have been cut off."""
+        if self._keyring is None:
+            return False
+        changed = self._keyring.refresh()
+        for door in self._doors:
+            door.cut_revoked()
+        return changed
+
+    def receive(self, timeout_ms: int) -> Iterator[Incoming]:
+        """Wait, then give the messages that have come.
+
+        Raises
+        ------
+        AuthenticatorStoppedError
+            Nobody could be let in any more; libzmq refuses all until the hub is started again.
+        """
+        try:
+            ready = dict(self._poller.poll(timeout_ms))
+        except zmq.ZMQError as error:
+            if self._authenticator and self._authenticator.socket.closed:
+                raise AuthenticatorStoppedError("the authenticator has stopped") from error
+            raise
+        if self._authenticator and self._authenticator.socket in ready:
+            self._authenticator.answer()
+        for number, door in enumerate(self._doors):
+            router, *others = door.sockets
+            if router in ready:
+                for one in door.receive():
+                    yield replace(one, peer=bytes([number]) + one.peer)
+            if any(one in ready for one in others):
+                door.listen()
+
+    def send(self, peer: bytes, parts: list[bytes]) -> bool:
+        """Send to a peer; False where it cannot be reached, or its key was revoked."""
+        return self._doors[peer[0]].send(peer[1:], parts)
+
+    def publish(self, topic: Topic, parts: list[bytes]) -> None:
+        """Send to all who subscribed to a topic."""
+        for door in self._doors:
+            door.publish(topic, parts)
+
+    def knows(self, peer: bytes) -> bool:
+        """Say whether a peer's key is allowed still, with the roles that it had."""
+        return self._doors[peer[0]].knows(peer[1:])
+
+
+def guarded_addresses(settings: ServiceSettings) -> list[str]:
+    """Give the addresses that only allowed keys may come to.
+
+    Raises
+    ------
+    AddressError
+        Where one of them is malformed.
+    """
+    for address in settings.listen:
+        if socket_file(address):
+            raise AddressError(f"{address}: --listen expects tcp://HOST:PORT")
+    return [*settings.listen] if is_local(settings.address) else [
+        settings.address, *settings.listen]
+
+
+def guard(settings: ServiceSettings) -> Guard:
+    """Read the hub's key and its allow-list.
+
+    Raises
+    ------
+    AddressError
+        Where there is no hub key, or no key is allowed: the doors stay shut.
+    KeyFileError
+        Where the hub's key cannot be used.
+    """
+    address = guarded_addresses(settings)[0]
+    path = settings.key or settings.keys / f"{HUB}.secret"
+    if not path.exists():
+        raise AddressError(
+            f"{address}: refused, it is not local to this machine: others are only let in with "
+            f"CURVE security, and there is no hub key {path}; `denseface keys new {HUB}` makes one")
+    keyring = Keyring(settings.keys)
+    if not len(keyring):
+        raise AddressError(
+            f"{address}: refused, no key is allowed in {settings.keys / 'allowed'}; "
+            "`denseface keys allow NAME KEY ROLE` lets one in")
+    return Guard(read_pair(path), keyring)
+
+
+def _admits(user: Allowed, domain: bytes) -> bool:
+    return domain != TOPICS_DOMAIN or any(user.roles & needed for needed in TOPICS.values())

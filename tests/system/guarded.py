@@ -1,0 +1,199 @@
+"""A hub with a guarded door as a real process, a key for each role, and peers that say anything."""
+
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import zmq
+
+from service import messages
+from service.addresses import publications_of
+from service.client import Client
+from service.keyring import Role, allow
+from service.keys import KeyPair, new_pair, read_pair, read_public
+from service.payload import FaceHeader, FrameHeader
+from service.wire import Packet, decode_from_hub, encode
+from tests.system.running import REPOSITORY, until
+from tests.unit.service.faces import small_face, small_frame
+
+WAIT_MS = 10_000
+
+
+class Peer:
+    """A connection with any key, which says whatever a test has it say."""
+
+    def __init__(
+        self, address: str, pair: KeyPair | None = None, hub: str | None = None,
+        kind: int = zmq.DEALER,
+    ) -> None:
+        self.context = zmq.Context()
+        self.socket = self.context.socket(kind)
+        self.socket.linger = 0
+        if pair and hub:
+            self.socket.curve_serverkey = hub.encode()
+            self.socket.curve_publickey = pair.public.encode()
+            self.socket.curve_secretkey = pair.secret.encode()
+        if kind == zmq.SUB:
+            address = publications_of(address)
+        self.monitor = self.socket.get_monitor_socket()
+        self.socket.connect(address)
+
+    def say(self, message: messages.Message, arrays=None) -> None:
+        self.socket.send_multipart(encode(Packet(message, arrays or {})))
+
+    def hears(self, kind: str) -> Packet:
+        """Wait for a message of a kind."""
+        while self.socket.poll(WAIT_MS):
+            packet = decode_from_hub(self.socket.recv_multipart())
+            if packet.message.kind == kind:
+                return packet
+        raise AssertionError(f"no {kind} came")
+
+    def ask(self, message: messages.Request) -> messages.Message:
+        self.say(message)
+        while self.socket.poll(WAIT_MS):
+            answer = decode_from_hub(self.socket.recv_multipart()).message
+            if getattr(answer, "request", None) == message.request:
+                return answer
+        raise AssertionError(f"no answer to {message.kind}")
+
+    def status(self) -> messages.Status:
+        answer = self.ask(messages.GetStatus(request=99))
+        assert isinstance(answer, messages.Status)
+        return answer
+
+    def silent(self, milliseconds: int = 300) -> bool:
+        """Say whether nothing comes."""
+        return not self.socket.poll(milliseconds)
+
+    def close(self) -> None:
+        self.context.destroy(linger=0)
+
+
+@dataclass
+class GuardedHub:
+    """A running `denseface hub` with a local and a guarded door."""
+
+    process: "subprocess.Popen[str]"
+    local: str
+    address: str
+    keys: Path
+    log: Path
+
+    @property
+    def hub_key(self) -> Path:
+        return self.keys / "hub.public"
+
+    def secret(self, name: str) -> Path:
+        return self.keys / f"{name}.secret"
+
+    def new_key(self, name: str, *roles: Role) -> KeyPair:
+        """Make a key and, with roles, allow it and wait until the hub knows."""
+        secret, public = new_pair(self.keys, name)
+        if roles:
+            allow(self.keys, name, read_public(public), frozenset(roles))
+        return read_pair(secret)
+
+    def peer(self, name: str, kind: int = zmq.DEALER) -> Peer:
+        return Peer(self.address, read_pair(self.secret(name)), read_public(self.hub_key), kind)
+
+    def client(self, name: str) -> Client:
+        return Client(self.address, key=self.secret(name), hub_key=self.hub_key)
+
+    def status(self) -> messages.Status:
+        with Client(self.local) as client:
+            return client.status(timeout=20)
+
+    def refused(self, reason: str) -> int:
+        return self.status().refused.get(reason, 0)
+
+
+@contextmanager
+def guarded_hub(folder: Path, host: str = "127.0.0.1", port: int | None = None,
+                code: str = "") -> Iterator[GuardedHub]:
+    """Run a hub that has a key `hub` and for each role one of its name.
+
+    Parameters
+    ----------
+    code : Python that runs in the hub's process before the hub does
+    """
+    keys = folder / "keys"
+    new_pair(keys, "hub")
+    for role in Role:
+        _, public = new_pair(keys, role)
+        allow(keys, role, read_public(public), frozenset({role}))
+    with tempfile.TemporaryDirectory(prefix="df-") as short:
+        local = f"ipc://{short}/hub"
+        address = f"tcp://{host}:{port or free_port(host)}"
+        log = folder / "hub.log"
+        with log.open("w") as stderr:
+            process = subprocess.Popen(
+                [sys.executable, "-c", f"import sys\n{code}\nfrom service.cli import main\n"
+                 "sys.exit(main(sys.argv[1:]))", "hub", "--address", local, "--listen", address,
+                 "--keys", str(keys), "--data", str(folder / "data")],
+                cwd=REPOSITORY, stderr=stderr, text=True,
+                env=os.environ | {"DENSEFACE_HEARTBEAT_S": "0.2"})
+        hub = GuardedHub(process, local, address, keys, log)
+        try:
+            until(lambda: "listening" in log.read_text() or process.poll() is not None)
+            yield hub
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                process.terminate()
+            try:
+                process.wait(10)
+            finally:
+                process.kill()
+
+
+def free_port(host: str) -> int:
+    """Give a port that is free, and the next one too."""
+    for _ in range(100):
+        with socket.socket() as one, socket.socket() as two:
+            one.bind((host, 0))
+            port = one.getsockname()[1]
+            with contextlib.suppress(OSError, OverflowError):
+                two.bind((host, port + 1))
+                return int(port)
+    raise AssertionError("no two free ports")
+
+
+FRAME, FRAME_ARRAYS = FrameHeader.of(small_frame())
+FACE, FACE_ARRAYS = FaceHeader.of(small_face())
+
+
+def press_through(hub: GuardedHub, capture_id: str) -> None:
+    """Press with a key, be its sensor and its worker, and get the face."""
+    sensor, worker, presser = (hub.peer(name) for name in ("sensor", "worker", "presser"))
+    subscriber = hub.peer("subscriber", zmq.SUB)
+    try:
+        subscriber.socket.subscribe("faces")
+        subscriber.socket.subscribe("status")
+        assert subscriber.socket.poll(WAIT_MS)  # the first status
+        sensor.say(messages.SensorReady(name="s", source="x"))
+        worker.say(messages.WorkerReady(name="w", credit=0))
+        until(lambda: hub.status().ready)
+        presser.say(messages.Press(request=1, capture_id=capture_id))
+        sensor.hears("take")
+        sensor.say(messages.Frame(capture_id=capture_id, frame=FRAME), FRAME_ARRAYS)
+        presser.hears("press_accepted")
+        job = worker.hears("job").message
+        assert job.capture_id == capture_id
+        worker.say(messages.Result(capture_id=capture_id, settings_hash=job.settings_hash,
+                                   face=FACE), FACE_ARRAYS)
+        assert presser.ask(messages.GetFace(
+            request=2, capture_id=capture_id, wait_s=10)).kind == "face_done"
+        until(lambda: subscriber.socket.recv_multipart()[0] == b"faces")
+    finally:
+        for one in (sensor, worker):
+            one.say(messages.Goodbye())
+        until(lambda: not hub.status().workers)
+        for one in (sensor, worker, presser, subscriber):
+            one.close()
