@@ -186,8 +186,9 @@ def press_through(hub: GuardedHub, capture_id: str) -> None:
         presser.hears("press_accepted")
         job = worker.hears("job").message
         assert job.capture_id == capture_id
-        worker.say(messages.Result(capture_id=capture_id, settings_hash=job.settings_hash,
-                                   face=FACE), FACE_ARRAYS)
+        worker.say(messages.Result(
+            capture_id=capture_id, settings_hash=job.settings_hash,
+            frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
         assert presser.ask(messages.GetFace(
             request=2, capture_id=capture_id, wait_s=10)).kind == "face_done"
         until(lambda: subscriber.socket.recv_multipart()[0] == b"faces")

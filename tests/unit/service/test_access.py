@@ -28,7 +28,8 @@ SAID = [
     messages.SensorReady(name="s", source="x"),
     messages.Frame(capture_id="a", frame=FRAME),
     messages.WorkerReady(name="w", credit=0),
-    messages.JobFailed(capture_id="a", settings_hash="0", error="E", message="m", final=True),
+    messages.JobFailed(capture_id="a", settings_hash="0", frame_sha256="0" * 64,
+                       error="E", message="m", final=True),
     messages.Heartbeat(),
 ]
 MAY = {
@@ -65,7 +66,8 @@ def test_several_roles_add_up():
 
 def test_what_the_hub_says_is_for_nobody_to_say():
     job = messages.Job(
-        capture_id="a", attempt=1, settings=Settings(), settings_hash="0", frame=FRAME)
+        capture_id="a", attempt=1, settings=Settings(), settings_hash="0",
+        frame_sha256="0" * 64, frame=FRAME)
     assert missing_role(EVERY_ROLE, job)
 
 

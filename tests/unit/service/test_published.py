@@ -143,7 +143,8 @@ def test_numbers_that_were_removed_are_not_waited_for(hub, follow):
 def test_a_start_is_asked_for(hub):
     hub.conclude(published=False)
     hub.conclude(published=False)
-    with Subscriber(hub.socket.context, "inproc://published", hub.next, hub.status) as follow:
+    socket, knock = connect(hub.socket.context, zmq.SUB, "inproc://published", None)
+    with Subscriber(socket, knock, hub.next, hub.status) as follow:
         hub.subscribed()
         follow.start(None, 5, lambda _: messages.StartAt(epoch=hub.epoch, sequence=1))
         assert ids(follow, 1) == ["a2"]

@@ -226,7 +226,7 @@ def test_a_frame_that_cannot_be_kept_leaves_nothing(
         data, monkeypatch, number, kind, message, step):
     calls = []
 
-    def fails(*_):
+    def fails(*_, **__):
         raise OSError(number, os.strerror(number))
 
     def second_fails(descriptor):
