@@ -199,7 +199,7 @@ class Status(BaseAnswer):
     done: Number
     failed: Number
     dead: Number
-    refused: dict[Name, Number] = {}
+    refused: dict[Name, Number] = Field(default_factory=dict)
     """Connections and messages that were not let in since the hub started, by reason."""
 
     @property
