@@ -1,8 +1,13 @@
-"""Sums of Gaussians over scattered points, by way of a few points in each cell of a grid.
+"""Sums of Gaussians over scattered points, by way of a regular grid.
 
-Within a cell, a Gaussian is so smooth that its values at `_ORDER` Chebyshev points across and as
-many down tell it everywhere to 1e-6 (Lagrange interpolation). So each scattered weight is shared
-out among those points of its cell, once; after that all sums are products of thin matrices.
+A Gaussian is the product of narrower ones, summed over a regular grid of points s with step d:
+
+    exp(-b (x - t)^2) = d sqrt((a + e) / pi) sum_s exp(-a (x - s)^2) exp(-e (s - t)^2),
+    e = a b / (a - b),
+
+to about 2 exp(-pi^2 / (d^2 (a + e))). So each scattered weight is spread by the first factor over
+the few grid points around it, once; after that all sums, for any b up to the sharpest, are
+products of thin matrices of the second.
 """
 
 from dataclasses import dataclass
@@ -12,91 +17,121 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["Charges", "gaussians"]
+__all__ = ["Charges"]
 
-_ORDER = 8
-_CELL = 1.0
-_NEGLIGIBLE = 1e-7
-_AT = np.cos(np.pi * (np.arange(_ORDER) + 0.5) / _ORDER)
-# Row k: what each point's Lagrange polynomial has before t^k, for t from -1 to 1 in the cell.
-_LAGRANGE = np.linalg.inv(np.vander(_AT, increasing=True)).astype(np.float32)
+# a over the sharpest b, and d in units of the sharpest's radius: good to 2e-6 with `_TAPS` points.
+_NARROWER = 4.0
+_STEP = 0.3675
+_TAPS = 10
+_BEFORE = _TAPS // 2 - 1
+_FALL = _NARROWER * _STEP * _STEP  # a d^2
+_AT_TAPS = np.exp(-_FALL * np.arange(-_BEFORE, _TAPS - _BEFORE) ** 2.0).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
 class Charges:
-    """Scattered weights, shared out among the points of a grid.
+    """Scattered weights, spread over the points of a regular grid.
 
     Attributes
     ----------
     x, y : (nx,), (ny,) float64, where the grid's points are
-    shares : (k, ny, nx) float64, k kinds of weight
+    shares : (ny, k nx) float32, k kinds of weight, one beside the other
+    sharpness : a, of the Gaussian they were spread by
     """
 
     x: NDArray[np.float64]
     y: NDArray[np.float64]
-    shares: NDArray[np.float64]
+    shares: NDArray[np.float32]
+    sharpness: float
 
     @classmethod
     def of(
-        cls, x: NDArray[np.float64], y: NDArray[np.float64], weights: NDArray[np.float64]
+        cls, x: NDArray[np.float64], y: NDArray[np.float64],
+        weights: tuple[NDArray[np.floating], NDArray[np.floating]], sharpest: float,
     ) -> "Charges":
-        """Share out weights, (n, k), at (x, y), (n,) each, for Gaussians with sharpness <= 1."""
-        x_low, y_low = float(x.min()), float(y.min())
-        columns, rows = (int(np.ptp(one) / _CELL) + 1 for one in (x, y))
-        shares = _share_out((x - x_low) / _CELL, (y - y_low) / _CELL, weights, rows, columns,
-                            _LAGRANGE)
-        return cls(_points(x_low, columns), _points(y_low, rows), shares.astype(np.float64))
+        """Spread two kinds of weight at (x, y), (n,) each, for Gaussians with b <= sharpest."""
+        step = _STEP / np.sqrt(sharpest)
+        (xs, column, first_x, ratio_x), (ys, row, first_y, ratio_y) = (
+            _placed(values, step) for values in (x, y))
+        shares = np.zeros((len(ys), 2 * len(xs)), np.float32)
+        _spread(column, first_x, ratio_x, row, first_y, ratio_y, *(
+            np.asarray(one, np.float32) for one in weights), _AT_TAPS, shares)
+        return cls(xs, ys, shares, _NARROWER * sharpest)
+
+    def kind(self, index: int) -> NDArray[np.float32]:
+        """Give the shares of one kind of weight, (ny, nx)."""
+        return self.shares[:, index::2]
+
+    def factor(
+        self, points: NDArray[np.float64], at: NDArray[np.float64], b: float
+    ) -> NDArray[np.float32]:
+        """Give what a share at each of the grid's `points` counts in a sum at each of `at`.
+
+        points : (n,), `x` or `y`; at : (k,), t; b : sharpness of the sum's Gaussian
+
+        Gives (k, n).
+        """
+        a = self.sharpness
+        e = a * b / (a - b)
+        gap = (at[:, None] - points).astype(np.float32)
+        values = np.exp(np.float32(-e) * gap * gap)
+        values *= np.float32((points[1] - points[0]) * np.sqrt((a + e) / np.pi))
+        return values
+
+    def moments(
+        self, points: NDArray[np.float64], at: NDArray[np.float64], b: float,
+        center: float, scale: float,
+    ) -> NDArray[np.float32]:
+        """Give factors for weights times 1, u, u^2, where u = (x - center) / scale.
+
+        Summed over the grid, s has the mean (a x + e t) / (a + e) and a variance of
+        1 / (2 (a + e)): x and x^2 follow from it. Gives (3, k, n).
+        """
+        a = self.sharpness
+        e = a * b / (a - b)
+        plain = self.factor(points, at, b)
+        u = ((((a + e) * points - e * at[:, None]) / a - center) / scale).astype(np.float32)
+        first = plain * u
+        return np.stack(
+            [plain, first, first * u - np.float32((a + e) / (2 * (a * scale) ** 2)) * plain])
 
 
-def gaussians(
-    centers: NDArray[np.float64], points: NDArray[np.float64], sharpness: float
-) -> NDArray[np.float64]:
-    """exp(-sharpness (center - point)^2), 0 where negligible: (k,), (n,) -> (k, n)."""
-    gap = (centers[:, None] - points).astype(np.float32)
-    values: NDArray[np.float32] = np.exp(-np.float32(sharpness) * gap * gap)
-    values[values < _NEGLIGIBLE] = 0
-    # The products are taken in double precision: what BLAS rounds otherwise on more threads is
-    # then lost when the result is rounded to single.
-    return values.astype(np.float64)
+def _placed(
+    values: NDArray[np.float64], step: float
+) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]]:
+    """Give the grid's points; each value's first tap; its Gaussian there; its ratio from tap to tap.
 
-
-def _points(low: float, cells: int) -> NDArray[np.float64]:
-    points: NDArray[np.float64] = (
-        low + _CELL * (np.arange(cells)[:, None] + (_AT + 1) / 2)).ravel()
-    return points
+    The Gaussian at the taps is first, first ratio, first ratio^2, ... times `_AT_TAPS`.
+    """
+    low = float(values.min())
+    cells = (values - low) / step
+    tap = cells.astype(np.int32)
+    part = (cells - tap).astype(np.float32)
+    points = low + step * np.arange(-_BEFORE, int(tap.max()) + _TAPS - _BEFORE, dtype=np.float64)
+    return (points, tap, np.exp(np.float32(-_FALL) * part * (part + np.float32(2 * _BEFORE))),
+            np.exp(np.float32(2 * _FALL) * part))
 
 
 @compiled
-def _polynomials(t: float, lagrange: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    """out[a] = the a-th Lagrange polynomial at t."""
-    at = np.float32(t)
-    for a in range(_ORDER):
-        out[a] = lagrange[_ORDER - 1, a]
-    for k in range(_ORDER - 2, -1, -1):
-        for a in range(_ORDER):
-            out[a] = out[a] * at + lagrange[k, a]
-
-
-@compiled
-def _share_out(
-    x: NDArray[np.float64], y: NDArray[np.float64], weights: NDArray[np.float64],
-    rows: int, columns: int, lagrange: NDArray[np.float32],
-) -> NDArray[np.float32]:
-    """x, y : in cells; gives (k, rows order, columns order)."""
-    kinds = weights.shape[1]
-    width = columns * _ORDER
-    out = np.zeros(kinds * rows * _ORDER * width, np.float32)
-    across, down = np.empty(_ORDER, np.float32), np.empty(_ORDER, np.float32)
-    for i in range(len(x)):
-        column, row = min(int(x[i]), columns - 1), min(int(y[i]), rows - 1)
-        _polynomials(2 * (x[i] - column) - 1, lagrange, across)
-        _polynomials(2 * (y[i] - row) - 1, lagrange, down)
-        for kind in range(kinds):
-            weight = np.float32(weights[i, kind])
-            first = ((kind * rows + row) * width + column) * _ORDER
-            for b in range(_ORDER):
-                factor = weight * down[b]
-                line = out[first + b * width:first + b * width + _ORDER]
-                for a in range(_ORDER):
-                    line[a] += factor * across[a]
-    return out.reshape(kinds, rows * _ORDER, width)
+def _spread(
+    column: NDArray[np.int32], first_x: NDArray[np.float32], ratio_x: NDArray[np.float32],
+    row: NDArray[np.int32], first_y: NDArray[np.float32], ratio_y: NDArray[np.float32],
+    one: NDArray[np.float32], other: NDArray[np.float32], at_taps: NDArray[np.float32],
+    shares: NDArray[np.float32],
+) -> None:
+    """Add both weights of each point to `shares`, one beside the other."""
+    across = np.empty(2 * _TAPS, np.float32)
+    for i in range(len(one)):
+        power = first_x[i]
+        for k in range(_TAPS):
+            across[2 * k] = one[i] * power * at_taps[k]
+            across[2 * k + 1] = other[i] * power * at_taps[k]
+            power *= ratio_x[i]
+        power = first_y[i]
+        begin = 2 * column[i]
+        for k in range(_TAPS):
+            factor = power * at_taps[k]
+            power *= ratio_y[i]
+            line = shares[row[i] + k, begin:begin + 2 * _TAPS]
+            for j in range(2 * _TAPS):
+                line[j] += factor * across[j]

@@ -18,7 +18,7 @@ from recon.detect import detect_face
 from recon.errors import TooLittleDepthError
 from recon.face import Face, PointCloud, Report
 from recon.neighbors import mean_spacing
-from recon.rbf import MIN_SEEDS, Surface, fit_surface
+from recon.rbf import MIN_SEEDS, Surface, fit_surfaces
 from recon.registration import register
 from recon.segment import segment_face, window_of_box
 from recon.settings import Settings
@@ -95,11 +95,11 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
 def _fit(
     points: NDArray[np.float32], spacing: float, settings: Settings
 ) -> Surface | AdaptiveSurface:
-    fine = fit_surface(points, settings.r0_factor * spacing, settings.smoothing)
-    if settings.coarse_r0_factor is None:
-        return fine
-    coarse = fit_surface(points, settings.coarse_r0_factor * spacing, settings.coarse_smoothing)
-    return blend_surfaces(fine, coarse, points, spacing)
+    fits = [(settings.r0_factor * spacing, settings.smoothing)]
+    if settings.coarse_r0_factor is not None:
+        fits.append((settings.coarse_r0_factor * spacing, settings.coarse_smoothing))
+    fine, *coarser = fit_surfaces(points, fits)
+    return blend_surfaces(fine, coarser[0], points, spacing) if coarser else fine
 
 
 def _warnings(frame: RgbdFrame, seeds: int) -> tuple[str, ...]:

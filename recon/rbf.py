@@ -17,26 +17,31 @@ loop over pairs:  g(x - t) g(x - t') = exp(-|t - t'|^2 / R0^2) exp(-4 |x - (t + 
 The sums over seeds that are left are products of thin matrices too, see `recon._gridding`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._gridding import Charges, gaussians
+from recon._gridding import Charges
 from recon._kernels import conjugate_gradients
+from recon._trend import Trend, polynomial
 from recon.errors import TooLittleDepthError
 
-__all__ = ["MIN_SEEDS", "Surface", "fit_surface"]
+__all__ = ["MIN_SEEDS", "Surface", "fit_surface", "fit_surfaces"]
 
 MIN_SEEDS = 50
 """Fewer seeds than this are no face, and leave the polynomial without support."""
 
+# The sharpness, over R0^2, of a node's Gaussian and of its square, which the matrix is made of.
+_NODE = 2.0
+_DENSITY = 4.0
 _NODE_STEP = 0.45
 _NODE_STEP_SHARP = 0.40
 _SHARP_BELOW = 0.3
 _NEGLIGIBLE = 1e-5
 # Of the preconditioned residual.
-_TOLERANCE = 1e-6
+_TOLERANCE = 1e-5
 _MOST_ITERATIONS = 1000
 # Below this ratio of the principal extents, the seeds lie on a line.
 _COLLINEAR = 1e-3
@@ -126,7 +131,7 @@ class Surface:
         ex = _basis(xy[:, 0], self.nodes_x, self.r0)
         ey = _basis(xy[:, 1], self.nodes_y, self.r0)
         heights: NDArray[np.float64] = np.einsum("ij,ij->i", ey @ self.alpha, ex)
-        return heights + _polynomial(xy, self.center, self.scale) @ self.beta
+        return heights + polynomial(xy, self.center, self.scale) @ self.beta
 
 
 def fit_surface(
@@ -151,65 +156,99 @@ def fit_surface(
     ValueError
         Where an argument is out of its range, or a coordinate is not finite.
     """
-    points, W = _checked(points, r0, smoothing, weights)
-    xy, z = points[:, :2], points[:, 2]
-    center = (float(xy[:, 0].mean()), float(xy[:, 1].mean()))
-    scale = float(np.abs(xy - center).max())
+    return fit_surfaces(points, ((r0, smoothing),), weights)[0]
+
+
+def fit_surfaces(
+    points: NDArray[np.floating],
+    fits: Sequence[tuple[float, float]],
+    weights: NDArray[np.floating] | None = None,
+) -> list[Surface]:
+    """Fit several surfaces to the same points, which are gone through only once.
+
+    Parameters
+    ----------
+    points, weights : as of `fit_surface`
+    fits : R0, mm, and lambda of each
+
+    Raises
+    ------
+    TooLittleDepthError, ValueError
+        As `fit_surface`.
+    """
+    x, y, z, W = _checked(points, fits, weights)
+    # The polynomial is eliminated: what it explains by itself is taken off first, and the node
+    # weights are sought beside it. In single precision, which the small rest allows.
+    trend = Trend.of(x, y, z, W)
+    charges = Charges.of(x, y, (W, trend.rest), max(_DENSITY / r0**2 for r0, _ in fits))
+    extent = (float(x.min()), float(x.max())), (float(y.min()), float(y.max()))
+    return [_fit(trend, charges, extent, float(W.sum()), r0, smoothing) for r0, smoothing in fits]
+
+
+def _fit(
+    trend: Trend, charges: Charges, extent: tuple[tuple[float, float], tuple[float, float]],
+    total: float, r0: float, smoothing: float,
+) -> Surface:
+    """Fit what the trend leaves of the seeds.
+
+    charges : two kinds, W_i and W_i rest_i
+    extent : the least and the largest x, and y, mm
+    total : the sum of W_i
+    """
     q = _NODE_STEP_SHARP if smoothing < _SHARP_BELOW else _NODE_STEP
     # How many steps exp(-2 q^2 r^2), and its square root, are not negligible.
     near, far = (int(np.ceil(np.sqrt(-np.log(_NEGLIGIBLE) / k) / q)) for k in (2, 1))
-    nodes_x, nodes_y = (_nodes(xy[:, axis], q * r0, near) for axis in (0, 1))
-    x, y = ((xy - (nodes_x[0], nodes_y[0])) / (q * r0)).T
-
-    # The polynomial is eliminated: what it explains by itself is taken off first, and the node
-    # weights are sought beside it. In single precision, which the small rest allows.
-    P = _polynomial(xy, center, scale)
-    PW = P * W[:, None]
-    Q = P.T @ PW
-    trend = np.linalg.solve(Q, PW.T @ z)
-    rest = z - P @ trend
-    root = float(2 * q / np.sqrt(np.pi))  # sqrt(c0)
-    charges = Charges.of(x, y, np.column_stack([W, W * rest]))
-    sums, right = _node_sums(charges, len(nodes_x), len(nodes_y), 2 * q * q,
-                             (charges.x * q * r0 + nodes_x[0] - center[0]) / scale,
-                             (charges.y * q * r0 + nodes_y[0] - center[1]) / scale)
-    C, right = root * sums.reshape(6, -1).T, root * right
+    nodes_x, nodes_y = (_nodes(low, high, q * r0, near) for low, high in extent)
+    root = np.float32(2 * q / np.sqrt(np.pi))  # sqrt(c0)
+    sums, right = _node_sums(trend, charges, nodes_x, nodes_y, r0)
+    sums *= root
+    right *= root
     flat = _Flat(len(nodes_y), len(nodes_x), far)
-    half_x, half_y = (np.arange(2 * n) / 2 - far for n in (flat.width, flat.rows))
-    halves = (gaussians(half_y, charges.y, 4 * q * q) @ charges.shares[0]
-              ) @ gaussians(half_x, charges.x, 4 * q * q).T
-    # As four planes of every second point.
-    density = np.ascontiguousarray(
-        halves.reshape(flat.rows, 2, flat.width, 2).transpose(1, 3, 0, 2), np.float32
-    ).reshape(2, 2, -1)
-    G = np.linalg.solve(np.linalg.cholesky(Q), C.T).reshape(6, len(nodes_y), len(nodes_x))
+    terms = sums.reshape(6, -1).astype(np.float64)
+    G = (np.linalg.inv(np.linalg.cholesky(trend.normal)) @ terms).reshape(sums.shape)
     alpha, _ = conjugate_gradients(
-        density, _decay(q, far), smoothing, flat.pad(G), flat.pad(np.ones((1, *right.shape)))[0],
-        flat.width, flat.first, flat.size, flat.pad(right[None])[0], _TOLERANCE, _MOST_ITERATIONS)
+        _density(charges, nodes_x, nodes_y, flat, r0), _decay(q, far), smoothing, flat.pad(G),
+        flat.pad(np.ones((1, *right.shape)))[0], flat.width, flat.first, flat.size,
+        flat.pad(right[None])[0], _TOLERANCE, _MOST_ITERATIONS)
     found = flat.unpad(alpha)
-    beta = trend - np.linalg.solve(Q, C.T @ found.ravel())
+    beta = trend.beta - np.linalg.solve(trend.normal, terms @ found.ravel())
 
     # At the solution the squared residuals follow from the sums at hand.
-    squares = (W * rest * rest).sum() - (found * right).sum() - smoothing * (found * found).sum()
-    return Surface(nodes_x, nodes_y, root * found, beta, center, scale, r0,
-                   noise=float(np.sqrt(max(squares, 0.0) / W.sum())))
+    squares = trend.squares - (found * right).sum() - smoothing * (found * found).sum()
+    return Surface(nodes_x, nodes_y, float(root) * found, beta, trend.center, trend.scale, r0,
+                   noise=float(np.sqrt(max(squares, 0.0) / total)))
 
 
 def _node_sums(
-    charges: Charges, columns: int, rows: int, sharpness: float,
-    u: NDArray[np.float64], v: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sum g(x_i - t) W_i times each term of the polynomial, (6, rows, columns), and W_i rest_i.
+    trend: Trend, charges: Charges, nodes_x: NDArray[np.float64], nodes_y: NDArray[np.float64],
+    r0: float,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Sum g(x_i - t) W_i times each term of the polynomial, (6, rows, columns), and W_i rest_i."""
+    across, down = (
+        charges.moments(places, nodes, _NODE / r0**2, center, trend.scale)
+        for places, nodes, center in ((charges.x, nodes_x, trend.center[0]),
+                                      (charges.y, nodes_y, trend.center[1])))
+    by_v = down @ charges.kind(0)
+    terms = [by_v[j] @ across[i].T for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))]
+    return np.stack(terms), (down[0] @ charges.kind(1)) @ across[0].T
 
-    u, v : where the charges are, normalised
+
+def _density(
+    charges: Charges, nodes_x: NDArray[np.float64], nodes_y: NDArray[np.float64], flat: "_Flat",
+    r0: float,
+) -> NDArray[np.float32]:
+    """Sum W_i exp(-4 |x_i - s|^2 / R0^2) for s on a grid of half steps.
+
+    As four planes of every second point, (2, 2, rows width).
     """
-    across = gaussians(np.arange(columns, dtype=np.float64), charges.x, sharpness)
-    down = gaussians(np.arange(rows, dtype=np.float64), charges.y, sharpness)
-    weight, rest = charges.shares
-    by_v = [(down * v**power) @ weight for power in range(3)]
-    by_u = [(across * u**power).T for power in range(3)]
-    terms = [by_v[b] @ by_u[a] for a, b in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))]
-    return np.stack(terms), (down @ rest) @ by_u[0]
+    half_x, half_y = (
+        nodes[0] + (nodes[1] - nodes[0]) * (np.arange(2 * n) / 2 - flat.reach)
+        for nodes, n in ((nodes_x, flat.width), (nodes_y, flat.rows)))
+    down, across = (charges.factor(places, at, _DENSITY / r0**2)
+                    for places, at in ((charges.y, half_y), (charges.x, half_x)))
+    halves = (down @ charges.kind(0)) @ across.T
+    return np.ascontiguousarray(
+        halves.reshape(flat.rows, 2, flat.width, 2).transpose(1, 3, 0, 2)).reshape(2, 2, -1)
 
 
 @dataclass(frozen=True)
@@ -257,35 +296,36 @@ def _decay(q: float, reach: int) -> NDArray[np.float32]:
 
 def _checked(
     points: NDArray[np.floating],
-    r0: float,
-    smoothing: float,
+    fits: Sequence[tuple[float, float]],
     weights: NDArray[np.floating] | None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    checked: NDArray[np.float64] = np.array(points, np.float64)
-    if checked.ndim != 2 or checked.shape[1] != 3:
-        raise ValueError(f"points must have shape (n, 3), got {checked.shape}")
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Give x, y, z and W, each contiguous."""
+    if np.ndim(points) != 2 or np.shape(points)[1] != 3:
+        raise ValueError(f"points must have shape (n, 3), got {np.shape(points)}")
+    checked: NDArray[np.float64] = np.array(np.transpose(points), np.float64, order="C")
     if not np.isfinite(checked).all():
         raise ValueError("points must be finite")
-    for name, value in (("r0", r0), ("smoothing", smoothing)):
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be positive and finite, got {value}")
+    for fit in fits:
+        for name, value in zip(("r0", "smoothing"), fit, strict=True):
+            if not (np.isfinite(value) and value > 0):
+                raise ValueError(f"{name} must be positive and finite, got {value}")
     W: NDArray[np.float64] = np.ones(len(points)) if weights is None else np.array(weights, float)
     if W.shape != (len(points),) or not np.isfinite(W).all() or (W <= 0).any():
         raise ValueError(f"weights must be ({len(points)},), positive and finite")
     if len(points) < MIN_SEEDS:
         raise TooLittleDepthError(f"{len(points)} seeds, a fit needs at least {MIN_SEEDS}")
-    centered = checked[:, :2] - checked[:, :2].mean(axis=0)
-    least, most = np.linalg.eigvalsh(centered.T @ centered)
+    centered = checked[:2] - checked[:2].mean(axis=1, keepdims=True)
+    least, most = np.linalg.eigvalsh(centered @ centered.T)
     if least <= _COLLINEAR**2 * most:
         raise TooLittleDepthError(f"the {len(points)} seeds lie on a line: no surface to fit")
-    return checked, W
+    x, y, z = checked
+    return x, y, z, W
 
 
-def _nodes(values: NDArray[np.float64], step: float, margin: int) -> NDArray[np.float64]:
+def _nodes(low: float, high: float, step: float, margin: int) -> NDArray[np.float64]:
     """Nodes from `margin` steps before the least value to as many behind the largest."""
-    low = float(values.min()) - (margin + 0.5) * step
-    count = int(np.ceil(float(np.ptp(values)) / step)) + 2 * margin + 2
-    return low + step * np.arange(count, dtype=np.float64)
+    count = int(np.ceil((high - low) / step)) + 2 * margin + 2
+    return low - (margin + 0.5) * step + step * np.arange(count, dtype=np.float64)
 
 
 def _basis(
@@ -306,10 +346,3 @@ def _slope(
     slope: NDArray[np.float64] = (
         basis * (-4 / r0**2) * (np.asarray(values, np.float64)[:, None] - nodes))
     return slope
-
-
-def _polynomial(
-    xy: NDArray[np.floating], center: tuple[float, float], scale: float
-) -> NDArray[np.float64]:
-    u, v = ((np.asarray(xy, np.float64) - center) / scale).T
-    return np.column_stack([np.ones_like(u), u, v, u * u, u * v, v * v])

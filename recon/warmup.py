@@ -11,7 +11,7 @@ from recon.densify import densify
 from recon.detect import detect_face
 from recon.errors import NoFaceError
 from recon.neighbors import mean_spacing
-from recon.rbf import fit_surface
+from recon.rbf import fit_surfaces
 from recon.registration import register
 from recon.segment import segment_face
 from recon.settings import Settings
@@ -33,8 +33,8 @@ def warm() -> None:
         detect_face(frame.color, registered, _FOCAL_PX)
     seeds = segment_face(registered, _BOX, _FOCAL_PX)
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
-    fine = fit_surface(seeds.points, settings.r0_factor * spacing, settings.smoothing)
-    coarse = fit_surface(seeds.points, 2 * settings.r0_factor * spacing, settings.smoothing)
+    fine, coarse = fit_surfaces(seeds.points, [
+        (factor * settings.r0_factor * spacing, settings.smoothing) for factor in (1, 2)])
     surface = blend_surfaces(fine, coarse, seeds.points, spacing)
     densify(seeds, surface, spacing, settings.ratio, share=1.0)
 
