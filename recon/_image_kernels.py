@@ -5,7 +5,58 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["blur", "collect", "divide"]
+__all__ = ["blend", "blur", "collect", "divide", "scatter"]
+
+
+@compiled
+def blend(
+    fine: NDArray[np.float32], coarse: NDArray[np.float32], gain: NDArray[np.float32],
+    rows: NDArray[np.float32], columns: NDArray[np.float32],
+) -> None:
+    """Make fine = coarse + gain (fine - coarse), the gain bilinear.
+
+    fine, coarse : (m, k); rows, columns : (m,), (k,), places in `gain`, inside it
+    """
+    last = gain.shape[1] - 1
+    line, here = np.empty(last + 2, np.float32), np.empty(len(columns), np.float32)
+    for i in range(len(rows)):
+        above = int(rows[i])
+        below = min(above + 1, gain.shape[0] - 1)
+        part = rows[i] - np.float32(above)
+        for j in range(last + 1):
+            line[j] = gain[above, j] + part * (gain[below, j] - gain[above, j])
+        line[last + 1] = line[last]
+        for j in range(len(columns)):
+            left = int(columns[j])
+            here[j] = line[left] + (columns[j] - np.float32(left)) * (line[left + 1] - line[left])
+        one, other = fine[i], coarse[i]
+        for j in range(len(columns)):
+            one[j] = other[j] + here[j] * (one[j] - other[j])
+
+
+@compiled
+def scatter(
+    colors: NDArray[np.uint8], places: NDArray[np.float32], rows: int, columns: int
+) -> NDArray[np.float32]:
+    """Share each colour, and a 1 as a fourth channel, among the four pixels around its place.
+
+    places : (n, 2), (row, column), inside the image
+
+    Gives (rows, columns, 4).
+    """
+    sums = np.zeros((rows, columns, 4), np.float32)
+    for i in range(len(colors)):
+        row, column = int(places[i, 0]), int(places[i, 1])
+        low, right = places[i, 0] - np.float32(row), places[i, 1] - np.float32(column)
+        for down in range(2):
+            for across in range(2):
+                weight = (low if down else 1 - low) * (right if across else 1 - right)
+                if weight > 0:
+                    pixel = sums[row + down, column + across]
+                    for c in range(3):
+                        pixel[c] += weight * colors[i, c]
+                    pixel[3] += weight
+    return sums
 
 
 @compiled
@@ -68,13 +119,31 @@ def collect(
     slopes_x: NDArray[np.float32],
     slopes_y: NDArray[np.float32],
     colors: NDArray[np.uint8],
+    every: int,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8], NDArray[np.int32]]:
-    """Gather the grid's supported points, row by row: points, normals, colours, cells."""
+    """Gather the grid's supported points, row by row: points, normals, colours, cells.
+
+    colors : at every so many points each way, bilinear between; one more than covers the grid
+    """
     n = np.count_nonzero(support)
     points, normals = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
     rgb, cells = np.empty((n, 3), np.uint8), np.empty((n, 2), np.int32)
+    line = np.empty(3 * colors.shape[1], np.float32)
+    whole = np.empty(3 * support.shape[1], np.float32)
     i = 0
     for row in range(support.shape[0]):
+        above = row // every
+        part = np.float32(row - above * every) / np.float32(every)
+        one, other = colors[above].ravel(), colors[above + 1].ravel()
+        for j in range(len(line)):
+            line[j] = np.float32(0.5) + one[j] + part * (np.float32(other[j]) - one[j])
+        for offset in range(every):
+            part = np.float32(offset) / np.float32(every)
+            for left in range((support.shape[1] - 1 - offset) // every + 1):
+                at = 3 * (left * every + offset)
+                for c in range(3):
+                    here = line[3 * left + c]
+                    whole[at + c] = here + part * (line[3 * left + 3 + c] - here)
         for column in range(support.shape[1]):
             if support[row, column]:
                 cells[i, 0], cells[i, 1] = row, column
@@ -85,6 +154,6 @@ def collect(
                 normals[i, 0], normals[i, 1] = dx / length, dy / length
                 normals[i, 2] = np.float32(-1) / length
                 for c in range(3):
-                    rgb[i, c] = colors[row, column, c]
+                    rgb[i, c] = np.uint8(np.int32(whole[3 * column + c]))
                 i += 1
     return points, normals, rgb, cells

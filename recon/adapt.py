@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from recon._image_kernels import blend
 from recon.rbf import Surface
 from recon.support import support_on_grid
 
@@ -59,20 +60,22 @@ class AdaptiveSurface:
         As `Surface.sampled`: (k,), (m,) mm -> (m, k) each. The gain varies slowly beside the
         heights: its own slope is left out.
         """
-        gain = self._gain(xs, ys)
-        found = []
-        for one, other in zip(self.fine.sampled(xs, ys), self.coarse.sampled(xs, ys), strict=True):
-            one -= other
-            one *= gain
-            one += other
-            found.append(one)
-        return found[0], found[1], found[2]
+        found = self.fine.sampled(xs, ys)
+        columns, rows = self._places(xs, 0), self._places(ys, 1)
+        for one, other in zip(found, self.coarse.sampled(xs, ys), strict=True):
+            blend(one, other, self.gain, rows, columns)
+        return found
 
     def _gain(self, xs: NDArray[np.float64], ys: NDArray[np.float64]) -> NDArray[np.float32]:
-        columns = np.tile((xs - self.origin[0]) / self.step, (len(ys), 1)).astype(np.float32)
-        rows = np.tile((ys - self.origin[1]) / self.step, (len(xs), 1)).T.astype(np.float32)
-        return np.asarray(cv2.remap(self.gain, columns, np.ascontiguousarray(rows),
-                                    cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
+        """The gain, bilinear: (k,), (m,) mm -> (m, k)."""
+        gain = np.ones((len(ys), len(xs)), np.float32)
+        blend(gain, np.zeros_like(gain), self.gain, self._places(ys, 1), self._places(xs, 0))
+        return gain
+
+    def _places(self, values: NDArray[np.float64], axis: int) -> NDArray[np.float32]:
+        """Where on the gain's grid, in its points, kept inside it."""
+        places = (values - self.origin[axis]) / self.step
+        return np.clip(places, 0, self.gain.shape[1 - axis] - 1).astype(np.float32)
 
 
 def blend_surfaces(

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._image_kernels import blur, divide
+from recon._image_kernels import blur, divide, scatter
 
 __all__ = ["average_neighbors"]
 
@@ -16,7 +16,7 @@ _SMALLEST = 4
 
 def average_neighbors(
     colors: NDArray[np.uint8],
-    places: NDArray[np.integer],
+    places: NDArray[np.number],
     wanted: NDArray[np.bool_],
     radius: float,
     spacing: float,
@@ -26,7 +26,7 @@ def average_neighbors(
     Parameters
     ----------
     colors : (n, 3) uint8, RGB, n >= 1
-    places : (n, 2) int, (row, column) of each
+    places : (n, 2) int or float, (row, column) of each, inside the image
     wanted : (rows, columns) bool, the pixels of the image that need a colour
     radius : standard deviation where colours are dense, pixels; doubled as long as none is near
     spacing : usual distance of neighbouring colours, pixels
@@ -42,10 +42,8 @@ def average_neighbors(
     """
     if not len(colors):
         raise ValueError("colors must not be empty")
-    sums = np.zeros((*wanted.shape, 4), np.float32)
     # Channel 3 counts the colours: a mean is sum over count, blurred alike.
-    sums[places[:, 0], places[:, 1], :3] = colors
-    sums[places[:, 0], places[:, 1], 3] = 1
+    sums = scatter(colors, np.ascontiguousarray(places, np.float32), *wanted.shape)
     mean = _mean(sums, wanted, radius, _LEAST_WEIGHT / spacing**2)
     return np.asarray(cv2.convertScaleAbs(mean), np.uint8)  # rounds
 

@@ -1,6 +1,8 @@
 """Stage 6: the seeds propagated over their support, holes filled, coloured by their neighbours."""
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from recon._image_kernels import collect
 from recon.adapt import AdaptiveSurface
@@ -15,7 +17,11 @@ __all__ = ["densify"]
 
 # In units of the mean spacing.
 # A colour is the mean of the seeds around it, weighted by a Gaussian of this radius.
-_COLOR_RADIUS = 0.5
+_COLOR_RADIUS = 0.58
+_COLOR_STEP = 0.6
+# Variance, in squared pixels, that bilinear weights add on average; no blur is less than the last.
+_BILINEAR = 1 / 6
+_LEAST_RADIUS = 0.4
 _COARSE = 0.5
 
 
@@ -39,11 +45,11 @@ def densify(
     xs, ys, support = support_on_grid(seeds.points, spacing, step)
 
     heights, slopes_x, slopes_y = surface.sampled(xs, ys)
-    places = np.rint((seeds.points[:, 1::-1] - (ys[0], xs[0])) / step).astype(np.intp)
-    colors = average_neighbors(
-        seeds.colors, places, support, _COLOR_RADIUS * spacing / step, spacing / step)
+    # Colours have no detail finer than the seeds: every so many points are enough.
+    every = max(1, round(_COLOR_STEP * spacing / step))
+    colors = _colors(seeds, (xs[0], ys[0]), every * step, spacing, _coarser(support, every))
     points, normals, colors, cells = collect(
-        support, xs, ys, heights, slopes_x, slopes_y, colors)
+        support, xs, ys, heights, slopes_x, slopes_y, colors, every)
     sources = sources_of_error(
         seeds.points, support, heights, (slopes_x, slopes_y), (float(xs[0]), float(ys[0])), step,
         spacing)
@@ -56,3 +62,24 @@ def densify(
         grid_shape=support.shape,
         grid_step_mm=step,
     )
+
+
+def _colors(
+    seeds: Seeds, origin: tuple[float, float], step: float, spacing: float,
+    wanted: NDArray[np.bool_],
+) -> NDArray[np.uint8]:
+    """The seeds' mean colour on a grid of its own, (rows, columns, 3)."""
+    places = ((seeds.points[:, 1::-1] - origin[::-1]) / step).astype(np.float32)
+    # Sharing a colour among four pixels, and reading between four, blurs by as much.
+    radius = np.sqrt(max((_COLOR_RADIUS * spacing / step) ** 2 - 2 * _BILINEAR, _LEAST_RADIUS**2))
+    return average_neighbors(seeds.colors, places, wanted, float(radius), spacing / step)
+
+
+def _coarser(support: NDArray[np.bool_], every: int) -> NDArray[np.bool_]:
+    """Which of every so many points each way are next to a supported one."""
+    rows, columns = (-(-side // every) for side in support.shape)
+    whole = cv2.copyMakeBorder(
+        support.view(np.uint8) * 255, 0, (rows + 1) * every - support.shape[0], 0,
+        (columns + 1) * every - support.shape[1], cv2.BORDER_CONSTANT, value=0)
+    any_in = cv2.resize(whole, (columns + 1, rows + 1), interpolation=cv2.INTER_AREA)
+    return cv2.dilate(any_in, np.ones((2, 2), np.uint8), anchor=(1, 1)) > 0

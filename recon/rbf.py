@@ -99,12 +99,12 @@ class Surface:
         -------
         heights, slopes_x, slopes_y : (m, k) float32, mm and unitless
         """
-        (across, slope_x), (down, slope_y) = self._factors(xs, 0), self._factors(ys, 1)
-        weights = self._weights()
+        (across, slope_x), (down, slope_y) = (
+            [factor.astype(np.float32) for factor in self._factors(values, axis)]
+            for axis, values in enumerate((xs, ys)))
+        weights = self._weights().astype(np.float32)
         lines = down @ weights
-        # Rounded after the products: BLAS rounds otherwise on more threads.
-        return ((lines @ across.T).astype(np.float32), (lines @ slope_x.T).astype(np.float32),
-                ((slope_y @ weights) @ across.T).astype(np.float32))
+        return lines @ across.T, lines @ slope_x.T, (slope_y @ weights) @ across.T
 
     def _factors(
         self, values: NDArray[np.float64], axis: int

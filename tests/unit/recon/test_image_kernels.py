@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from recon._image_kernels import blur, collect, divide
+from recon._image_kernels import blend, blur, collect, divide, scatter
 
 
 @pytest.mark.parametrize("shape", [(40, 60), (3, 5), (1, 1), (200, 2)])
@@ -32,7 +32,7 @@ def test_the_supported_points_are_collected_row_by_row():
     heights, slopes_x, slopes_y = rng.normal(size=(3, 7, 9)).astype(np.float32)
     image = rng.integers(0, 256, (7, 9, 3), np.uint8)
     points, normals, colors, cells = collect(
-        support, xs, ys, heights, slopes_x, slopes_y, image)
+        support, xs, ys, heights, slopes_x, slopes_y, np.pad(image, ((0, 1), (0, 1), (0, 0))), 1)
     np.testing.assert_array_equal(cells, np.argwhere(support))
     np.testing.assert_array_equal(colors, image[support])
     row, column = cells.T
@@ -44,10 +44,44 @@ def test_the_supported_points_are_collected_row_by_row():
     np.testing.assert_allclose(normals, expected, atol=1e-6)
 
 
+@pytest.mark.parametrize("every", [1, 2, 3])
+@pytest.mark.parametrize("shape", [(7, 9), (6, 4), (1, 1)])
+def test_colours_between_the_given_ones_are_in_between(every, shape):
+    rows, columns = shape
+    tall, wide = ((side - 1) // every + 2 for side in shape)
+    ramp = 10 * every * np.arange(tall)[:, None] + 3 * every * np.arange(wide)
+    empty = np.zeros(shape, np.float32)
+    _, _, colors, cells = collect(
+        np.ones(shape, bool), np.arange(float(columns)), np.arange(float(rows)), empty, empty,
+        empty, np.dstack([ramp, ramp, 200 - ramp]).astype(np.uint8), every)
+    expected = cells @ (10, 3)
+    np.testing.assert_array_equal(colors, np.column_stack([expected, expected, 200 - expected]))
+
+
+def test_the_blend_is_by_the_gain_between_its_points():
+    fine, coarse = np.random.default_rng(0).normal(size=(2, 9, 13)).astype(np.float32)
+    gain = np.add.outer(0.2 * np.arange(4), 0.05 * np.arange(5)).astype(np.float32)
+    rows, columns = (np.linspace(0, last, count).astype(np.float32)
+                     for last, count in ((3, 9), (4, 13)))
+    here = np.add.outer(0.2 * rows, 0.05 * columns)
+    expected = coarse + here * (fine - coarse)
+    blend(fine, coarse, gain, rows, columns)
+    np.testing.assert_allclose(fine, expected, atol=1e-5)
+
+
+def test_a_colour_is_shared_among_the_pixels_around_it():
+    sums = scatter(np.array([[100, 0, 40], [8, 16, 4]], np.uint8),
+                   np.array([[1.25, 2.5], [3, 4]], np.float32), 4, 5)
+    np.testing.assert_allclose(sums[1, 2], (37.5, 0, 15, 0.375))
+    np.testing.assert_allclose(sums[2, 3], (12.5, 0, 5, 0.125))
+    np.testing.assert_allclose(sums[3, 4], (8, 16, 4, 1))
+    np.testing.assert_allclose(sums.sum(axis=(0, 1)), (108, 16, 44, 2))
+
+
 def test_nothing_supported_is_nothing_collected():
     empty = np.zeros((3, 4), np.float32)
     points, normals, colors, cells = collect(
         np.zeros((3, 4), bool), np.arange(4.0), np.arange(3.0), empty, empty, empty,
-        np.zeros((3, 4, 3), np.uint8))
+        np.zeros((4, 5, 3), np.uint8), 1)
     assert points.shape == normals.shape == colors.shape == (0, 3)
     assert cells.shape == (0, 2)
