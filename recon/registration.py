@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from capture.frame import RgbdFrame
+from recon._registration_kernels import EMPTY, look, project
 from recon.errors import NoDepthError
 
 __all__ = ["Registration", "register"]
@@ -68,29 +69,28 @@ def register(
     NoDepthError
         Where no pixel has a depth.
     """
-    depth = frame.depth[rows, columns]
+    depth = np.array(frame.depth[rows, columns])
     valid = depth > 0
     if not valid.any():
         raise NoDepthError("the depth image is empty: every pixel is 0 (no reading)")
-    z = np.where(valid, depth + np.float32(depth_offset_mm), np.float32(0))
-    points = np.empty((*depth.shape, 3), np.float32)
-    np.multiply(frame.depth_camera.rays()[rows, columns], z[..., None], out=points[..., :2])
-    points[..., 2] = z
-    moved = frame.depth_to_color.apply(points.reshape(-1, 3)).reshape(points.shape)
-    color_z = moved[..., 2]
-    color_z[~valid | (color_z <= 0)] = np.nan  # and so is all that follows from it
-    color_camera = frame.calibration.color
-    pixels = color_camera.project(moved).astype(np.float32)
-    u, v = pixels[..., 0], pixels[..., 1]
-    inside = ((u > -0.5) & (u < color_camera.width - 0.5)
-              & (v > -0.5) & (v < color_camera.height - 0.5))
-    pitch = max(1.0, color_camera.fx / frame.depth_camera.fx * (rows.step or 1))
-    visible = inside
-    visible[inside] = _unhidden(u[inside], v[inside], color_z[inside].astype(np.float32), pitch,
-                                (color_camera.height, color_camera.width))
-    colors = np.asarray(cv2.remap(
-        frame.color, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.uint8)
-    colors[~visible] = 0
+    points = np.zeros((*depth.shape, 3), np.float32)
+    pixels = np.full((*depth.shape, 2), np.nan, np.float32)
+    color_depth = np.zeros(depth.shape, np.float32)
+    (first_row, _, row_step), (first_column, _, column_step) = (
+        part.indices(side) for part, side in zip((rows, columns), frame.depth.shape, strict=True))
+    camera, moved = frame.calibration.color, frame.depth_to_color
+    pitch = max(1.0, camera.fx / frame.depth_camera.fx * row_step)
+    nearest = np.full([int(np.ceil(side / pitch)) + 1 for side in frame.color.shape[:2]], EMPTY)
+    project(depth, depth_offset_mm, frame.depth_camera.rays(), (first_row, first_column),
+            (row_step, column_step), np.array(moved.rotation, np.float64),
+            np.array(moved.translation_mm, np.float64),
+            np.array((camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
+                      *camera.distortion)), pitch, points, pixels, color_depth, nearest)
+    # Each point covers about its cell and the next: without this, a far surface would shine
+    # through between the samples of a near one.
+    covered = np.asarray(cv2.erode(nearest, np.ones((3, 3), np.uint8)), np.float32)
+    visible, colors = look(pixels, color_depth, covered, pitch, _HIDDEN_MM, _HIDDEN_SHARE,
+                           _read_only(frame.color))
     return Registration(
         rows=rows,
         columns=columns,
@@ -98,25 +98,14 @@ def register(
         points=points,
         valid=valid,
         pixels=pixels,
-        color_depth=np.nan_to_num(color_z.astype(np.float32)),
+        color_depth=color_depth,
         visible=visible,
         colors=colors,
     )
 
 
-def _unhidden(
-    u: NDArray[np.float32], v: NDArray[np.float32], z: NDArray[np.float32], pitch: float,
-    shape: tuple[int, int],
-) -> NDArray[np.bool_]:
-    """Say which points no nearer one hides, by a z-buffer with cells of one depth pixel's size."""
-    row, column = (((one + np.float32(0.5)) / np.float32(pitch)).astype(np.intp) for one in (v, u))
-    rows, columns = (int(np.ceil(side / pitch)) + 1 for side in shape)
-    flat = row * columns + column
-    nearest = np.full(rows * columns, np.inf, np.float32)
-    np.minimum.at(nearest, flat, z)
-    # Each point covers about its cell and the next: without this, a far surface would shine
-    # through between the samples of a near one.
-    covered = cv2.erode(nearest.reshape(rows, columns), np.ones((3, 3), np.uint8)).ravel()
-    unhidden: NDArray[np.bool_] = z <= covered[flat] + np.maximum(
-        np.float32(_HIDDEN_MM), np.float32(_HIDDEN_SHARE) * z)
-    return unhidden
+def _read_only(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The same image, of one kind whatever it was: a loop is compiled anew for each."""
+    same = np.ascontiguousarray(image).view()
+    same.setflags(write=False)
+    return same

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 
 from capture.frame import Calibration, CameraModel, RgbdFrame
+from recon._heap import keep_freed_memory
 from recon.adapt import blend_surfaces
 from recon.densify import densify
 from recon.detect import detect_face
@@ -25,7 +26,11 @@ _BOX = (58, 38, 44, 44)
 
 @cache
 def warm() -> None:
-    """Go once through every stage, with a ball for a face; does nothing when repeated."""
+    """Go once through every stage, with a ball for a face; does nothing when repeated.
+
+    From then on the process keeps memory that a frame frees for the next: `recon._heap`.
+    """
+    keep_freed_memory()
     settings = Settings()
     frame = _ball()
     registered = register(frame)

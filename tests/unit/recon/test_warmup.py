@@ -1,14 +1,21 @@
 """A fresh process is warm before its first frame."""
 
+import importlib
+import pkgutil
+
 import numba
 
-from recon import _gridding, _image_kernels, _kernels, _uncertainty_kernels, reconstruct, warm
+import recon
+from recon import reconstruct, warm
+
+MODULES = [importlib.import_module(f"recon.{found.name}")
+           for found in pkgutil.iter_modules(recon.__path__)]
 
 
 def compiled():
     """For which types each kernel stands compiled."""
     return {(module.__name__, name): list(one.signatures)
-            for module in (_gridding, _image_kernels, _kernels, _uncertainty_kernels)
+            for module in MODULES
             for name, one in vars(module).items()
             if isinstance(one, numba.core.registry.CPUDispatcher)}
 
