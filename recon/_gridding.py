@@ -54,8 +54,8 @@ class Charges:
         (xs, column, first_x, ratio_x), (ys, row, first_y, ratio_y) = (
             _placed(values, step) for values in (x, y))
         shares = np.zeros((len(ys), 2 * len(xs)), np.float32)
-        _spread(column, first_x, ratio_x, row, first_y, ratio_y, *(
-            np.asarray(one, np.float32) for one in weights), _AT_TAPS, shares)
+        one, other = (np.asarray(kind, np.float32) for kind in weights)
+        _spread(column, first_x, ratio_x, row, first_y, ratio_y, one, other, _AT_TAPS, shares)
         return cls(xs, ys, shares, _NARROWER * sharpest)
 
     def kind(self, index: int) -> NDArray[np.float32]:
@@ -74,7 +74,7 @@ class Charges:
         a = self.sharpness
         e = a * b / (a - b)
         gap = (at[:, None] - points).astype(np.float32)
-        values = np.exp(np.float32(-e) * gap * gap)
+        values: NDArray[np.float32] = np.exp(np.float32(-e) * gap * gap)
         values *= np.float32((points[1] - points[0]) * np.sqrt((a + e) / np.pi))
         return values
 
@@ -99,9 +99,9 @@ class Charges:
 def _placed(
     values: NDArray[np.float64], step: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]]:
-    """Give the grid's points; each value's first tap; its Gaussian there; its ratio from tap to tap.
+    """Give the grid's points, each value's first tap, and its Gaussian at all taps.
 
-    The Gaussian at the taps is first, first ratio, first ratio^2, ... times `_AT_TAPS`.
+    As its first value and a ratio: first, first ratio, first ratio^2, ... times `_AT_TAPS`.
     """
     low = float(values.min())
     cells = (values - low) / step

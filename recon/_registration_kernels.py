@@ -92,11 +92,11 @@ def look(
 
 
 @compiled
-def _inside(u: float, v: float, width: float, height: float) -> bool:
-    return u > -0.5 and u < width - 0.5 and v > -0.5 and v < height - 0.5
+def _inside(u: np.float32, v: np.float32, width: float, height: float) -> bool:
+    return bool(u > -0.5 and u < width - 0.5 and v > -0.5 and v < height - 0.5)
 
 
 @compiled
-def _cell(u: float, v: float, pitch: float) -> tuple[int, int]:
+def _cell(u: np.float32, v: np.float32, pitch: float) -> tuple[int, int]:
     return int((v + np.float32(0.5)) / np.float32(pitch)), int(
         (u + np.float32(0.5)) / np.float32(pitch))

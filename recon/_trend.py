@@ -42,7 +42,7 @@ class Trend:
         scale = float(max(x.max() - cx, cx - x.min(), y.max() - cy, cy - y.min()))
         u, v = (x - cx) / scale, (y - cy) / scale
         # All sums of W u^i v^j at once.
-        by_u = np.stack([weights, weights * u, weights * u * u, weights * u * u * u, weights * (u * u) ** 2])
+        by_u = weights * np.stack([np.ones_like(u), u, u * u, u * u * u, (u * u) ** 2])
         by_v = np.stack([np.ones_like(v), v, v * v, v * v * v, (v * v) ** 2])
         powers = _POWERS[:, None] + _POWERS
         normal = (by_u @ by_v.T)[powers[..., 0], powers[..., 1]]

@@ -90,7 +90,7 @@ def blend_surfaces(
     spacing : mean spacing of the points, mm
     """
     xs, ys, support = support_on_grid(points, spacing, spacing)
-    detail = np.where(support, fine.on_grid(xs, ys) - coarse.on_grid(xs, ys), 0).astype(np.float32)
+    detail = (fine.on_grid(xs, ys) - coarse.on_grid(xs, ys)).astype(np.float32) * support
     covered = _local_sum(support.astype(np.float32), spacing)
     energy = _local_sum(detail * detail, spacing) / np.maximum(covered, np.float32(1e-6))
     noise = np.percentile(energy[support], _NOISE_PERCENTILE) if support.any() else 0.0

@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from recon._compiled import compiled
 from recon.settings import Neighbors
 
 __all__ = ["exact_spacing", "lattice_spacing", "mean_spacing", "randomized_neighbors",
@@ -14,7 +15,9 @@ _FLANN_INDEX_KDTREE = 1
 _TREES = 4
 # 8 checks overestimate the spacing by up to a tenth, 32 are right.
 _CHECKS = 32
-_FAR = np.float32(1e6)
+_NOWHERE = np.float32(1e9)
+# Square millimetres: no two seeds are as far apart, and each is farther from nowhere.
+_FAR = np.float32(1e12)
 
 
 def mean_spacing(
@@ -87,20 +90,36 @@ def lattice_spacing(xy: NDArray[np.float32], pixels: NDArray[np.int32]) -> float
     Where no seed has one, the exact tree decides.
     """
     low = pixels.min(axis=0)
-    rows, columns = pixels.max(axis=0) - low + 1
-    places = tuple((pixels - low).T)
-    # Where there is no seed, the plane is far away.
-    x, y = np.full((2, rows, columns), _FAR, np.float32)
-    x[places], y[places] = xy.T
-    nearest = np.full((rows, columns), _FAR, np.float32)
-    for down in range(3):
-        for right in range(-2 if down else 1, 3):
-            left, end = max(0, -right), columns - max(0, right)
-            here = np.s_[:rows - down, left:end]
-            there = np.s_[down:, left + right:end + right]
-            gap = (x[here] - x[there]) ** 2 + (y[here] - y[there]) ** 2
-            np.minimum(nearest[here], gap, out=nearest[here])
-            np.minimum(nearest[there], gap, out=nearest[there])
-    squared = nearest[places]
-    found = squared < _FAR
-    return float(np.sqrt(squared[found]).mean()) if found.any() else exact_spacing(xy)
+    nearest = _nearest_around(xy, pixels - low, *(int(most) for most in pixels.max(axis=0) - low))
+    found = nearest[nearest < _FAR]
+    return float(np.sqrt(found).mean(dtype=np.float64)) if len(found) else exact_spacing(xy)
+
+
+@compiled
+def _nearest_around(
+    xy: NDArray[np.float32], places: NDArray[np.int32], last_row: int, last_column: int
+) -> NDArray[np.float32]:
+    """The squared distance of each seed to the nearest among the 24 pixels around it; else 1e12."""
+    # Where there is no seed, the plane is far away; so it is on two pixels all around.
+    rows, columns = last_row + 5, last_column + 5
+    x, y = np.full((rows, columns), _NOWHERE), np.full((rows, columns), _NOWHERE)
+    for i in range(len(places)):
+        row, column = places[i, 0] + 2, places[i, 1] + 2
+        x[row, column], y[row, column] = xy[i, 0], xy[i, 1]
+    nearest = np.full((rows, columns), _FAR)
+    for row in range(2, rows - 2):
+        for down in range(3):
+            for right in range(-2 if down else 1, 3):
+                here, there = slice(2, columns - 2), slice(2 + right, columns - 2 + right)
+                x1, x2 = x[row, here], x[row + down, there]
+                y1, y2 = y[row, here], y[row + down, there]
+                least, other = nearest[row, here], nearest[row + down, there]
+                for k in range(columns - 4):
+                    across, along = x1[k] - x2[k], y1[k] - y2[k]
+                    gap = across * across + along * along
+                    least[k] = min(least[k], gap)
+                    other[k] = min(other[k], gap)
+    squared = np.empty(len(places), np.float32)
+    for i in range(len(places)):
+        squared[i] = nearest[places[i, 0] + 2, places[i, 1] + 2]
+    return squared

@@ -19,6 +19,7 @@ The sums over seeds that are left are products of thin matrices too, see `recon.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,9 @@ _TOLERANCE = 1e-5
 _MOST_ITERATIONS = 1000
 # Below this ratio of the principal extents, the seeds lie on a line.
 _COLLINEAR = 1e-3
+
+
+_Float = TypeVar("_Float", np.float32, np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +86,8 @@ class Surface:
         -------
         (m, k) float64, mm
         """
-        (across, _), (down, _) = self._factors(xs, 0), self._factors(ys, 1)
+        (across, _), (down, _) = (
+            self._factors(xs, 0, np.float64), self._factors(ys, 1, np.float64))
         heights: NDArray[np.float64] = (down @ self._weights()) @ across.T
         return heights
 
@@ -100,23 +105,30 @@ class Surface:
         heights, slopes_x, slopes_y : (m, k) float32, mm and unitless
         """
         (across, slope_x), (down, slope_y) = (
-            [factor.astype(np.float32) for factor in self._factors(values, axis)]
-            for axis, values in enumerate((xs, ys)))
-        weights = self._weights().astype(np.float32)
-        lines = down @ weights
-        return lines @ across.T, lines @ slope_x.T, (slope_y @ weights) @ across.T
+            self._factors(xs, 0, np.float32), self._factors(ys, 1, np.float32))
+        weights: NDArray[np.float32] = self._weights().astype(np.float32)
+        lines: NDArray[np.float32] = down @ weights
+        heights: NDArray[np.float32] = lines @ across.T
+        slopes_x: NDArray[np.float32] = lines @ slope_x.T
+        lines = slope_y @ weights
+        slopes_y: NDArray[np.float32] = lines @ across.T
+        return heights, slopes_x, slopes_y
 
     def _factors(
-        self, values: NDArray[np.float64], axis: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        self, values: NDArray[np.float64], axis: int, kind: type[_Float]
+    ) -> tuple[NDArray[_Float], NDArray[_Float]]:
         """The nodes' Gaussians and 1, t, t^2 of the polynomial along one axis, and their slopes."""
         nodes = self.nodes_y if axis else self.nodes_x
-        basis = _basis(values, nodes, self.r0)
+        count = len(nodes)
+        gap = ((values[:, None] - nodes) / self.r0).astype(kind)
         t = (values - self.center[axis]) / self.scale
-        one = np.ones_like(t)
-        return (np.column_stack([basis, one, t, t * t]),
-                np.column_stack([_slope(basis, values, nodes, self.r0), 0 * t,
-                                 one / self.scale, 2 * t / self.scale]))
+        factors, slopes = (np.empty((len(values), count + 3), kind) for _ in range(2))
+        np.exp(kind(-_NODE) * gap * gap, out=factors[:, :count])
+        np.multiply(kind(-2 * _NODE / self.r0) * gap, factors[:, :count], out=slopes[:, :count])
+        factors[:, count], factors[:, count + 1], factors[:, count + 2] = 1, t, t * t
+        slopes[:, count], slopes[:, count + 1] = 0, 1 / self.scale
+        slopes[:, count + 2] = 2 * t / self.scale
+        return factors, slopes
 
     def _weights(self) -> NDArray[np.float64]:
         """What stands between the factors of y and those of x."""
@@ -199,10 +211,10 @@ def _fit(
     # How many steps exp(-2 q^2 r^2), and its square root, are not negligible.
     near, far = (int(np.ceil(np.sqrt(-np.log(_NEGLIGIBLE) / k) / q)) for k in (2, 1))
     nodes_x, nodes_y = (_nodes(low, high, q * r0, near) for low, high in extent)
-    root = np.float32(2 * q / np.sqrt(np.pi))  # sqrt(c0)
+    root = float(2 * q / np.sqrt(np.pi))  # sqrt(c0)
     sums, right = _node_sums(trend, charges, nodes_x, nodes_y, r0)
-    sums *= root
-    right *= root
+    sums *= np.float32(root)
+    right *= np.float32(root)
     flat = _Flat(len(nodes_y), len(nodes_x), far)
     terms = sums.reshape(6, -1).astype(np.float64)
     G = (np.linalg.inv(np.linalg.cholesky(trend.normal)) @ terms).reshape(sums.shape)
@@ -215,7 +227,7 @@ def _fit(
 
     # At the solution the squared residuals follow from the sums at hand.
     squares = trend.squares - (found * right).sum() - smoothing * (found * found).sum()
-    return Surface(nodes_x, nodes_y, float(root) * found, beta, trend.center, trend.scale, r0,
+    return Surface(nodes_x, nodes_y, root * found, beta, trend.center, trend.scale, r0,
                    noise=float(np.sqrt(max(squares, 0.0) / total)))
 
 
@@ -246,9 +258,10 @@ def _density(
         for nodes, n in ((nodes_x, flat.width), (nodes_y, flat.rows)))
     down, across = (charges.factor(places, at, _DENSITY / r0**2)
                     for places, at in ((charges.y, half_y), (charges.x, half_x)))
-    halves = (down @ charges.kind(0)) @ across.T
-    return np.ascontiguousarray(
-        halves.reshape(flat.rows, 2, flat.width, 2).transpose(1, 3, 0, 2)).reshape(2, 2, -1)
+    lines: NDArray[np.float32] = down @ charges.kind(0)
+    halves: NDArray[np.float32] = lines @ across.T
+    planes = halves.reshape(flat.rows, 2, flat.width, 2).transpose(1, 3, 0, 2)
+    return np.ascontiguousarray(planes).reshape(2, 2, -1)
 
 
 @dataclass(frozen=True)
@@ -329,20 +342,9 @@ def _nodes(low: float, high: float, step: float, margin: int) -> NDArray[np.floa
 
 
 def _basis(
-    values: NDArray[np.floating], nodes: NDArray[np.float64], r0: float, sharpness: float = 2.0
+    values: NDArray[np.floating], nodes: NDArray[np.float64], r0: float
 ) -> NDArray[np.float64]:
-    """exp(-sharpness (value - node)^2 / R0^2), (n, nodes)."""
+    """The nodes' Gaussians at some values, (n, nodes)."""
     gap = (np.asarray(values, np.float64)[:, None] - nodes) / r0
-    basis: NDArray[np.float64] = np.exp(-sharpness * gap * gap)
+    basis: NDArray[np.float64] = np.exp(-_NODE * gap * gap)
     return basis
-
-
-def _slope(
-    basis: NDArray[np.float64],
-    values: NDArray[np.floating],
-    nodes: NDArray[np.float64],
-    r0: float,
-) -> NDArray[np.float64]:
-    slope: NDArray[np.float64] = (
-        basis * (-4 / r0**2) * (np.asarray(values, np.float64)[:, None] - nodes))
-    return slope
