@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["blend", "blur", "collect", "divide", "scatter"]
+__all__ = ["blend", "blur", "collect", "divide", "fill", "halve", "scatter"]
 
 
 @compiled
@@ -108,6 +108,48 @@ def divide(
                 else:
                     missing[row, column] = True
     return mean, missing
+
+
+@compiled
+def halve(
+    sums: NDArray[np.float32], missing: NDArray[np.bool_]
+) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    """Give the mean of each four pixels of `sums`, and whether one of them is missing, 0 or 1.
+
+    sums : (rows, columns, 4), zero outside; missing : (rows, columns)
+    """
+    rows, columns = missing.shape
+    half = np.zeros(((rows + 1) // 2, (columns + 1) // 2, 4), np.float32)
+    wanted = np.zeros(half.shape[:2], np.uint8)
+    for row in range(rows):
+        for column in range(columns):
+            for c in range(4):
+                half[row // 2, column // 2, c] += np.float32(0.25) * sums[row, column, c]
+            wanted[row // 2, column // 2] |= missing[row, column]
+    return half, wanted
+
+
+@compiled
+def fill(
+    mean: NDArray[np.float32], missing: NDArray[np.bool_], coarse: NDArray[np.float32]
+) -> None:
+    """Fill (rows, columns, 3) where missing from one of half its size, bilinear."""
+    last_row, last_column = coarse.shape[0] - 1, coarse.shape[1] - 1
+    quarter = np.float32(0.25)
+    for row in range(mean.shape[0]):
+        # The middle of four pixels is half a pixel from the first.
+        upper, lower = max((row - 1) // 2, 0), min((row + 1) // 2, last_row)
+        down = 3 * quarter if row % 2 == 0 else quarter
+        for column in range(mean.shape[1]):
+            if missing[row, column]:
+                left, right = max((column - 1) // 2, 0), min((column + 1) // 2, last_column)
+                across = 3 * quarter if column % 2 == 0 else quarter
+                for c in range(3):
+                    mean[row, column, c] = (
+                        (1 - down) * ((1 - across) * coarse[upper, left, c]
+                                      + across * coarse[upper, right, c])
+                        + down * ((1 - across) * coarse[lower, left, c]
+                                  + across * coarse[lower, right, c]))
 
 
 @compiled

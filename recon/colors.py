@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._image_kernels import blur, divide, scatter
+from recon._image_kernels import blur, divide, fill, halve, scatter
 
 __all__ = ["average_neighbors"]
 
@@ -58,10 +58,7 @@ def _mean(
     smallest = max(wanted.shape) <= _SMALLEST
     mean, missing = divide(blurred, wanted, 0.0 if smallest else least)
     if missing.any() and not smallest:
-        half = (-(-wanted.shape[1] // 2), -(-wanted.shape[0] // 2))
-        below = cv2.resize(missing.astype(np.float32), half, interpolation=cv2.INTER_AREA)
-        coarse = _mean(np.asarray(cv2.resize(blurred, half, interpolation=cv2.INTER_AREA)),
-                       cv2.dilate(below, np.ones((5, 5), np.uint8)) > 0, radius, least)
-        filled = cv2.resize(coarse, wanted.shape[::-1], interpolation=cv2.INTER_LINEAR)
-        mean[missing] = filled[missing]
+        half, below = halve(blurred, missing)
+        coarse = _mean(half, cv2.dilate(below, np.ones((5, 5), np.uint8)) > 0, radius, least)
+        fill(mean, missing, coarse)
     return mean

@@ -5,6 +5,7 @@ Unconstrained Environment".
 """
 
 import time
+from functools import cache
 from importlib.metadata import version
 
 import numpy as np
@@ -86,10 +87,15 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
         settings=settings,
         calibration=frame.calibration_origin,
         skew_us=frame.skew_us,
-        version=version("denseface"),
+        version=_version(),
         warnings=_warnings(frame, len(initial)),
     )
     return Face(initial, dense, report)
+
+
+@cache
+def _version() -> str:
+    return version("denseface")
 
 
 def _fit(

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from recon._image_kernels import blend, blur, collect, divide, scatter
+from recon._image_kernels import blend, blur, collect, divide, fill, halve, scatter
 
 
 @pytest.mark.parametrize("shape", [(40, 60), (3, 5), (1, 1), (200, 2)])
@@ -56,6 +56,28 @@ def test_colours_between_the_given_ones_are_in_between(every, shape):
         empty, np.dstack([ramp, ramp, 200 - ramp]).astype(np.uint8), every)
     expected = cells @ (10, 3)
     np.testing.assert_array_equal(colors, np.column_stack([expected, expected, 200 - expected]))
+
+
+def test_half_the_size_is_the_mean_of_four():
+    sums = np.random.default_rng(2).uniform(size=(5, 6, 4)).astype(np.float32)
+    missing = np.zeros((5, 6), bool)
+    missing[2, 3] = missing[4, 0] = True
+    half, wanted = halve(sums, missing)
+    padded = np.pad(sums, ((0, 1), (0, 0), (0, 0)))
+    np.testing.assert_allclose(half, padded.reshape(3, 2, 3, 2, 4).mean(axis=(1, 3)), rtol=1e-6)
+    np.testing.assert_array_equal(wanted, [[0, 0, 0], [0, 1, 0], [1, 0, 0]])
+
+
+def test_what_is_missing_is_filled_from_half_the_size():
+    row, column = np.mgrid[:6, :8]
+    ramp = np.dstack([row, column, 30 - row - column]).astype(np.float32)
+    # The middle of each four.
+    coarse = np.ascontiguousarray(ramp.reshape(3, 2, 4, 2, 3).mean(axis=(1, 3)))
+    missing = np.random.default_rng(3).random((6, 8)) < 0.5
+    mean = np.where(missing[..., None], np.float32(0), ramp)
+    fill(mean, missing, coarse)
+    np.testing.assert_allclose(mean[1:-1, 1:-1], ramp[1:-1, 1:-1], atol=1e-5)
+    np.testing.assert_array_equal(mean[~missing], ramp[~missing])
 
 
 def test_the_blend_is_by_the_gain_between_its_points():
