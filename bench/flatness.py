@@ -9,7 +9,7 @@ from itertools import cycle, islice
 from bench.accuracy import RECORDINGS
 from bench.machine import describe
 from bench.memory import resident_mb
-from capture import open_source
+from capture import RgbdFrame, open_source
 from recon import ReconstructionError, reconstruct, warm
 
 __all__: list[str] = []
@@ -24,7 +24,7 @@ def main() -> int:
     args = parser.parse_args()
     if args.frames < 1:
         parser.error(f"--frames must be at least 1, got {args.frames}")
-    frames = []
+    frames: list[RgbdFrame] = []
     for path in sorted(RECORDINGS.glob("*.oni")):
         with open_source(str(path)) as source:
             frames.extend(islice(source, 1))
