@@ -22,19 +22,23 @@ def _apply(
     # Slices, since an index that might be negative keeps a loop from being vectorised.
     reach = (len(decay) - 1) // 2
     here, own = out[first:first + size], alpha[first:first + size]
+    itself, plane = decay[reach, reach], density[0, 0, first:first + size]
     for i in range(size):
-        here[i] = np.float32(smoothing) * own[i]
-    for down in range(-reach, reach + 1):
-        for right in range(-reach, reach + 1):
+        here[i] = (np.float32(smoothing) + itself * plane[i]) * own[i]
+    # Each step together with the opposite one, whose decay is the same.
+    for down in range(reach + 1):
+        for right in range(-reach if down else 1, reach + 1):
             factor = decay[down + reach, right + reach]
             if factor == 0:
                 continue
-            middle = first + (down >> 1) * width + (right >> 1)
-            plane = density[down & 1, right & 1, middle:middle + size]
-            other = first + down * width + right
-            there = alpha[other:other + size]
+            step, middle = down * width + right, first + (down >> 1) * width + (right >> 1)
+            back = first + (-down >> 1) * width + (-right >> 1)
+            one = density[down & 1, right & 1, middle:middle + size]
+            other = density[down & 1, right & 1, back:back + size]
+            after = alpha[first + step:first + step + size]
+            before = alpha[first - step:first - step + size]
             for i in range(size):
-                here[i] += factor * plane[i] * there[i]
+                here[i] += factor * (one[i] * after[i] + other[i] * before[i])
     for k in range(len(G)):
         line = G[k, first:first + size]
         total = np.float32(0)
