@@ -15,7 +15,7 @@ from recon import Neighbors, Preset, ReconstructionError, Settings, reconstruct
 from recon.face import Face
 from tests.simulator import KINECT_CALIBRATED, Person, Scene, Truth, head_names, simulate
 
-__all__ = ["HOLE_SPACINGS", "Case", "recorded", "simulated", "with_preset"]
+__all__ = ["HOLE_SPACINGS", "Case", "recorded", "reported_heads", "simulated", "with_preset"]
 
 HOLE_SPACINGS = 2.0
 """A point farther than this many mean spacings from every seed, over (X, Y), is inside a hole."""
@@ -105,9 +105,14 @@ def recorded(frames: int) -> Iterator[Case]:
                     yield _case(f"{name}/{index}", frame, truth)
 
 
+def reported_heads() -> list[str]:
+    """Name the heads that figures are reported on; no setting was chosen on them."""
+    return [name for name in _HEADS if name in head_names()] or ["procedural"]
+
+
 def simulated(count: int) -> Iterator[Case]:
     """Give frames of heads at random distances and turns, all with many holes."""
-    heads = [name for name in _HEADS if name in head_names()] or ["procedural"]
+    heads = reported_heads()
     for index in range(count):
         rng = np.random.default_rng([7, index])
         head = heads[index % len(heads)]

@@ -1,4 +1,10 @@
-"""Stage 6: the seeds propagated over their support, holes filled, coloured by their neighbours."""
+"""Stage 6: the seeds propagated over their support, holes filled, coloured by their neighbours.
+
+Inside a hole there are no neighbours to be coloured by, often because it is dark there: brows,
+hair, pupils. Their place in the colour image says more than the hole's border.
+"""
+
+from collections.abc import Callable
 
 import cv2
 import numpy as np
@@ -13,7 +19,10 @@ from recon.segment import Seeds
 from recon.support import support_on_grid
 from recon.uncertainty import sources_of_error, standard_error
 
-__all__ = ["densify"]
+__all__ = ["LookUp", "densify"]
+
+LookUp = Callable[[NDArray[np.float32]], tuple[NDArray[np.uint8], NDArray[np.bool_]]]
+"""Points, (n, 3) float32, mm, to their colours, (n, 3) uint8, and which are seen, (n,) bool."""
 
 # In units of the mean spacing.
 # A colour is the mean of the seeds around it, weighted by a Gaussian of this radius.
@@ -23,10 +32,17 @@ _COLOR_STEP = 0.6
 _BILINEAR = 1 / 6
 _LEAST_RADIUS = 0.4
 _COARSE = 0.5
+# Farther than this from every seed, over (X, Y), a point is in a hole.
+_HOLE = 1.5
 
 
 def densify(
-    seeds: Seeds, surface: Surface | AdaptiveSurface, spacing: float, ratio: float, share: float,
+    seeds: Seeds,
+    surface: Surface | AdaptiveSurface,
+    spacing: float,
+    ratio: float,
+    share: float,
+    look_up: LookUp | None = None,
 ) -> DenseCloud:
     """Sample the surface on a regular grid, `ratio` points for each seed.
 
@@ -37,6 +53,7 @@ def densify(
     spacing : mean spacing of the seeds, mm
     ratio : dense points for each seed
     share : of the residuals' variance, how much the surface keeps as error: `noise_share`
+    look_up : tells the colours of points in holes; None, and their border's colours fill them
     """
     # Filled holes add to the support: a coarse try tells how much, and the step follows.
     _, _, support = support_on_grid(seeds.points, spacing, _COARSE * spacing)
@@ -50,6 +67,11 @@ def densify(
     colors = _colors(seeds, (xs[0], ys[0]), every * step, spacing, _coarser(support, every))
     points, normals, colors, cells = collect(
         support, xs, ys, heights, slopes_x, slopes_y, colors, every)
+    if look_up is not None:
+        hole = _far_from_seeds(seeds, (xs[0], ys[0]), step, support, _HOLE * spacing)
+        if hole.any():
+            own, seen = look_up(points[hole])
+            colors[hole] = np.where(seen[:, None], own, colors[hole])
     sources = sources_of_error(
         seeds.points, support, heights, (slopes_x, slopes_y), (float(xs[0]), float(ys[0])), step,
         spacing)
@@ -62,6 +84,18 @@ def densify(
         grid_shape=support.shape,
         grid_step_mm=step,
     )
+
+
+def _far_from_seeds(
+    seeds: Seeds, origin: tuple[float, float], step: float, support: NDArray[np.bool_],
+    radius: float,
+) -> NDArray[np.bool_]:
+    """Which of the supported points have no seed within a radius, mm."""
+    empty = np.ones(support.shape, np.uint8)
+    columns, rows = np.rint((seeds.points[:, :2] - origin) / step).astype(np.intp).T
+    empty[rows, columns] = 0
+    distance = cv2.distanceTransform(empty, cv2.DIST_L2, cv2.DIST_MASK_3)
+    return np.asarray(distance[support] * step > radius)
 
 
 def _colors(

@@ -129,7 +129,8 @@ def find_boxes(
     min_neighbors: int = 5,
 ) -> list[Box]:
     """Run one cascade over a (H, W) uint8 image for boxes between two widths, pixels."""
-    low, high = int(smallest), int(np.ceil(largest))
+    widest = max(gray.shape)  # and beyond it may be more than OpenCV's integers hold
+    low, high = int(min(smallest, widest)), int(np.ceil(min(largest, widest)))
     found = _cascade(cascade).detectMultiScale(
         gray, scaleFactor=scale_step, minNeighbors=min_neighbors,
         minSize=(low, low), maxSize=(high, high))

@@ -5,7 +5,7 @@ Unconstrained Environment".
 """
 
 import time
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import version
 
 import numpy as np
@@ -20,7 +20,7 @@ from recon.errors import TooLittleDepthError
 from recon.face import Face, PointCloud, Report
 from recon.neighbors import mean_spacing
 from recon.rbf import MIN_SEEDS, Surface, fit_surfaces
-from recon.registration import register
+from recon.registration import Registration, look_up, register
 from recon.segment import segment_face, window_of_box
 from recon.settings import Settings
 from recon.uncertainty import noise_share
@@ -56,8 +56,7 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     settings = settings or Settings()
     focal_px = frame.calibration.color.fx
     clock = _Stopwatch()
-    sparse = slice(None, None, _SPARSE)
-    overview = register(frame, settings.depth_offset_mm, sparse, sparse)
+    overview = _overview(frame, settings.depth_offset_mm)
     clock.lap("overview")
     found = detect_face(frame.color, overview, focal_px)
     clock.lap("detection")
@@ -72,7 +71,8 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     clock.lap("neighbors")
     surface = _fit(seeds.points, spacing, settings)
     clock.lap("rbf")
-    dense = densify(seeds, surface, spacing, settings.ratio, noise_share(settings))
+    dense = densify(seeds, surface, spacing, settings.ratio, noise_share(settings),
+                    partial(look_up, frame, registered))
     clock.lap("propagation")
     initial = PointCloud(seeds.points, seeds.colors)
     report = Report(
@@ -91,6 +91,14 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
         warnings=_warnings(frame, len(initial)),
     )
     return Face(initial, dense, report)
+
+
+def _overview(frame: RgbdFrame, depth_offset_mm: float) -> Registration:
+    """Every so many pixels registered, or all where none of those has a depth."""
+    sparse = slice(None, None, _SPARSE)
+    if frame.depth[sparse, sparse].any():
+        return register(frame, depth_offset_mm, sparse, sparse)
+    return register(frame, depth_offset_mm)
 
 
 @cache

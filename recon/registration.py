@@ -10,7 +10,7 @@ from capture.frame import RgbdFrame
 from recon._registration_kernels import EMPTY, look, project
 from recon.errors import NoDepthError
 
-__all__ = ["Registration", "register"]
+__all__ = ["Registration", "look_up", "register"]
 
 # A point is hidden when another, nearer one falls on the same spot of the colour image. A steep
 # surface differs by a few millimetres from spot to spot without hiding itself.
@@ -34,6 +34,9 @@ class Registration:
     color_depth : (H, W) float32, mm, z in the colour camera's frame; zero where not `valid`
     visible : (H, W) bool, inside the colour image and not hidden by a nearer surface
     colors : (H, W, 3) uint8, RGB, bilinear; zero where not `visible`
+    pitch : side of the z-buffer's cells, pixels of the colour image
+    nearest : (rows, columns) float32, mm, the z-buffer: nearest z in the colour camera's frame in
+        each cell and the cells around it, 1e30 where nothing
     """
 
     rows: slice
@@ -45,6 +48,8 @@ class Registration:
     color_depth: NDArray[np.float32]
     visible: NDArray[np.bool_]
     colors: NDArray[np.uint8]
+    pitch: float
+    nearest: NDArray[np.float32]
 
 
 def register(
@@ -101,7 +106,35 @@ def register(
         color_depth=color_depth,
         visible=visible,
         colors=colors,
+        pitch=pitch,
+        nearest=covered,
     )
+
+
+def look_up(
+    frame: RgbdFrame, registered: Registration, points: NDArray[np.float32]
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """Look any points' colours up in the colour image, as if they had been measured.
+
+    Parameters
+    ----------
+    frame : that of `registered`
+    registered : what may hide the points
+    points : (n, 3) float32, mm, depth camera frame
+
+    Returns
+    -------
+    colors : (n, 3) uint8, RGB, bilinear; zero where not `seen`
+    seen : (n,) bool, inside the colour image and hidden by nothing registered
+    """
+    moved = frame.depth_to_color.apply(points)
+    ahead = moved[:, 2] > 0
+    pixels = np.zeros((1, len(points), 2), np.float32)
+    pixels[0, ahead] = frame.calibration.color.project(moved[ahead])
+    z = np.where(ahead, moved[:, 2], 0).astype(np.float32)[None]
+    seen, colors = look(pixels, z, registered.nearest, registered.pitch, _HIDDEN_MM, _HIDDEN_SHARE,
+                        _read_only(frame.color))
+    return colors[0], seen[0]
 
 
 def _read_only(image: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -11,11 +11,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon.colors import average_neighbors
 from recon.errors import FaceWithoutDepthError
 from recon.face import Box
 from recon.masks import fill_holes
 from recon.registration import Registration
+from recon.seed_colors import seed_colors
 
 __all__ = ["CLUSTERS", "Seeds", "cluster_depths", "crop_to_box", "keep_face", "segment_face",
            "window_of_box"]
@@ -63,7 +63,7 @@ class Seeds:
     ----------
     points : (n, 3) float32, mm, depth camera frame
     colors : (n, 3) uint8, RGB; the neighbours' mean where the colour camera does not see the
-        point, and along the outline, where the background mixes in
+        point, and along the outline where the background mixes in
     pixels : (n, 2) int32, (row, column) in the depth image
     """
 
@@ -90,7 +90,7 @@ def segment_face(registered: Registration, box: Box, focal_px: float) -> Seeds:
     cluster = cluster_depths(registered, crop, box)
     face = keep_face(registered, cluster, box, focal_px)
     corner = (registered.rows.start or 0, registered.columns.start or 0)
-    return Seeds(registered.points[face], _colors(registered, face),
+    return Seeds(registered.points[face], seed_colors(registered, face, _solid(face)),
                  (np.argwhere(face) + corner).astype(np.int32))
 
 
@@ -232,21 +232,6 @@ def _bridged(
     return np.where(known, z, mean), known | (near & (z == 0))
 
 
-def _colors(registered: Registration, face: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """The seeds' colours, (n, 3) uint8; where not to be trusted, their neighbours'."""
-    seen = face & registered.visible
-    inner = _away_from_outline(face) & seen
-    trusted = inner if inner.any() else seen
-    colors = registered.colors[face]
-    if not trusted.any():
-        return colors
-    low, high = np.argwhere(face).min(axis=0), np.argwhere(face).max(axis=0) + 1
-    window = np.s_[low[0]:high[0], low[1]:high[1]]
-    averaged = average_neighbors(registered.colors[trusted], np.argwhere(trusted) - low,
-                                 (face & ~trusted)[window], 1, 1)
-    return np.where(trusted[face][:, None], colors, averaged[face[window]])
-
-
 def _smooth_outline(face: NDArray[np.bool_], spur_px: float) -> NDArray[np.bool_]:
     """The face's area without spurs and islands.
 
@@ -259,11 +244,6 @@ def _smooth_outline(face: NDArray[np.bool_], spur_px: float) -> NDArray[np.bool_
     areas = np.bincount(parts.ravel())[1:]
     kept = 1 + np.flatnonzero(areas >= _ISLAND_SHARE * areas.max(initial=0))
     return np.isin(parts, kept)
-
-
-def _away_from_outline(face: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The face without its outermost pixels; holes inside it have no outline."""
-    return face & (cv2.erode(_solid(face), np.ones((5, 5), np.uint8)) > 0)
 
 
 def _solid(face: NDArray[np.bool_]) -> NDArray[np.uint8]:

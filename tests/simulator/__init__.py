@@ -6,6 +6,7 @@ from tests.simulator.kinect import KINECT_CALIBRATED, KINECT_DEFAULT, KinectMode
 from tests.simulator.labels import Label
 from tests.simulator.scene import Light, Person, Scene
 from tests.simulator.sensor import Simulated, simulate
+from tests.simulator.true_colors import TrueColors
 from tests.simulator.truth import Truth
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "Person",
     "Scene",
     "Simulated",
+    "TrueColors",
     "Truth",
     "head_names",
     "load_head",

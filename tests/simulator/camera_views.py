@@ -12,7 +12,7 @@ from tests.simulator.kinect import KinectModel
 from tests.simulator.scene import Light, Scene
 from tests.simulator.world import Hits, World, build_world
 
-__all__ = ["SUPERSAMPLING", "DepthView", "color_view", "depth_view"]
+__all__ = ["SUPERSAMPLING", "DepthView", "color_view", "depth_view", "ray_directions", "shade"]
 
 SUPERSAMPLING = 2
 """Rays for each pixel along x and along y."""
@@ -54,7 +54,7 @@ def _depth_view(scene: Scene, sensor: KinectModel) -> DepthView:
     world = build_world(scene)
     camera = sensor.calibration.depth.scaled(SUPERSAMPLING)
     shape = (camera.height, camera.width)
-    directions = _directions(camera)
+    directions = ray_directions(camera)
     hits = world.cast(np.zeros(3), directions)
     hit = hits.part >= 0
     depth = np.where(hit, hits.distance, 0).astype(np.float32)
@@ -78,7 +78,7 @@ def color_view(scene: Scene, sensor: KinectModel) -> NDArray[np.float32]:
     to_color = sensor.calibration.depth_to_color
     R, t = np.array(to_color.rotation), np.array(to_color.translation_mm)
     camera = sensor.calibration.color.scaled(SUPERSAMPLING)
-    directions = np.einsum("nd,de->ne", _directions(camera), R.astype(np.float32))
+    directions = np.einsum("nd,de->ne", ray_directions(camera), R.astype(np.float32))
     origin = -R.T @ t
     image = shade(world, world.cast(origin, directions), directions, scene.light)
     size = (sensor.calibration.color.width, sensor.calibration.color.height)
@@ -101,7 +101,7 @@ def shade(
     return np.asarray(255 * np.clip(linear, 0, 1) ** _GAMMA, np.float32)
 
 
-def _directions(camera: CameraModel) -> NDArray[np.float32]:
+def ray_directions(camera: CameraModel) -> NDArray[np.float32]:
     """Give each pixel's ray with z = 1, (H W, 3) float32."""
     rays = camera.rays().reshape(-1, 2)
     return np.concatenate([rays, np.ones((len(rays), 1))], axis=1).astype(np.float32)

@@ -11,11 +11,13 @@ from tests.simulator.surface import Surface
 __all__ = ["room", "wall"]
 
 
-def wall(distance_mm: float, decor: int) -> list[Surface]:
+def wall(
+    distance_mm: float, decor: int, color: tuple[int, int, int]
+) -> list[Surface]:
     """Build one flat wall across the whole view, `distance_mm` along z."""
     half = 1.2 * distance_mm
     return [_panel((-half, -half, distance_mm), (2 * half, 0, 0), (0, 2 * half, 0),
-                   _pattern(decor, (196, 190, 178), 2 * half))]
+                   _pattern(decor, color, 2 * half))]
 
 
 def room(decor: int) -> list[Surface]:

@@ -47,6 +47,8 @@ class Scene:
     people: tuple[Person, ...] = (Person(),)
     wall_mm: float | None = None
     """Distance of one flat wall; None for a room with furniture, its far wall at about 3 m."""
+    wall_color: tuple[int, int, int] = (196, 190, 178)
+    """The one wall's paint, RGB (sRGB), 0-255."""
     light: Light = Light()
     holes: float = 0.25
     """How much of the face gives no depth: 0 nothing, 0.25 traces at eyes and nostrils,

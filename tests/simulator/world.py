@@ -70,7 +70,7 @@ class World:
         for index, person in enumerate(scene.people):
             self._add_person(person, target=index == scene.target)
         backdrop = (room.room(scene.decor) if scene.wall_mm is None
-                    else room.wall(scene.wall_mm, scene.decor))
+                    else room.wall(scene.wall_mm, scene.decor, scene.wall_color))
         for surface in backdrop:
             self._add(surface, np.eye(3), np.zeros(3), Label.BACKGROUND)
         self._caster = Caster()

@@ -1,5 +1,8 @@
 """Small made-up frames and calibrations."""
 
+from dataclasses import replace
+
+import cv2
 import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -22,6 +25,24 @@ def frame(
     depth: NDArray[np.uint16], color: NDArray[np.uint8], calib: Calibration | None = None, **more
 ) -> RgbdFrame:
     return RgbdFrame(depth, color, 1000, 2000, calib or calibration(), **more)
+
+
+def resampled(frame: RgbdFrame, factor: int | float) -> RgbdFrame:
+    """The frame of a sensor with another resolution of both cameras."""
+    known = frame.calibration
+    if factor > 1:
+        depth = frame.depth.repeat(factor, axis=0).repeat(factor, axis=1)
+        camera = known.depth.scaled(factor)
+    else:
+        every = round(1 / factor)
+        depth = np.ascontiguousarray(frame.depth[::every, ::every])
+        camera = known.depth.scaled(factor).model_copy(update={
+            "cx": known.depth.cx * factor, "cy": known.depth.cy * factor})
+    color = cv2.resize(frame.color, None, fx=factor, fy=factor,
+                       interpolation=cv2.INTER_AREA if factor < 1 else cv2.INTER_LINEAR)
+    calib = Calibration(depth=camera, color=known.color.scaled(factor),
+                        depth_to_color=known.depth_to_color)
+    return replace(frame, depth=depth, color=color, calibration=calib)
 
 
 @st.composite

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 
 from recon.densify import densify
 from recon.neighbors import exact_spacing
@@ -116,3 +117,25 @@ def test_arrays_are_of_the_documented_kinds():
     assert dense.colors.dtype == np.uint8
     assert dense.cells.dtype == np.int32
     assert dense.grid_step_mm < 1.3
+
+
+def test_points_in_a_hole_are_coloured_by_what_is_seen_there():
+    points = raised(disc_seeds(1.3, 40, 8), sphere)
+    spacing = exact_spacing(points[:, :2])
+    surface = fit_surface(points, 8 * spacing, 0.1)
+    asked = []
+
+    def look_up(some):
+        asked.append(some)
+        return np.full((len(some), 3), (10, 20, 30), np.uint8), some[:, 0] > 0
+
+    dense = densify(seeds(points), surface, spacing, 10, 0.5, look_up)
+    far, _ = cKDTree(points[:, :2]).query(dense.points[:, :2])
+    inside = far > 1.8 * spacing
+    assert len(asked[0]) >= inside.sum() > 100
+    assert np.hypot(*asked[0][:, :2].T).max() < 8
+    right = dense.points[:, 0] > 0
+    assert (dense.colors[inside & right] == (10, 20, 30)).all()
+    # What the camera does not see there is filled from the border.
+    assert (dense.colors[inside & ~right] == 128).all()
+    assert (dense.colors[far < spacing] == 128).all()

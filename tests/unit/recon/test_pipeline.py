@@ -3,12 +3,11 @@
 import json
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from capture.frame import Calibration, RgbdFrame
+from capture.frame import RgbdFrame
 from recon import (
     FaceWithoutDepthError,
     NoDepthError,
@@ -22,6 +21,7 @@ from recon import (
 )
 from recon.registration import register
 from tests.simulator import Accuracy, Light, Person, Scene, measure, simulate
+from tests.unit.frames import resampled
 
 STAGES = ["overview", "detection", "registration", "segmentation", "neighbors", "rbf",
           "propagation", "total"]
@@ -30,24 +30,6 @@ STAGES = ["overview", "detection", "registration", "segmentation", "neighbors", 
 def apart(a, b):
     """Mean distance from the points of one cloud to the nearest of another, mm."""
     return float(cKDTree(b).query(a)[0].mean())
-
-
-def resampled(frame: RgbdFrame, factor: int | float) -> RgbdFrame:
-    """The frame of a sensor with another resolution of both cameras."""
-    known = frame.calibration
-    if factor > 1:
-        depth = frame.depth.repeat(factor, axis=0).repeat(factor, axis=1)
-        camera = known.depth.scaled(factor)
-    else:
-        every = round(1 / factor)
-        depth = np.ascontiguousarray(frame.depth[::every, ::every])
-        camera = known.depth.scaled(factor).model_copy(update={
-            "cx": known.depth.cx * factor, "cy": known.depth.cy * factor})
-    color = cv2.resize(frame.color, None, fx=factor, fy=factor,
-                       interpolation=cv2.INTER_AREA if factor < 1 else cv2.INTER_LINEAR)
-    calib = Calibration(depth=camera, color=known.color.scaled(factor),
-                        depth_to_color=known.depth_to_color)
-    return replace(frame, depth=depth, color=color, calibration=calib)
 
 
 def registered(frame: RgbdFrame) -> RgbdFrame:

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from capture.frame import Calibration, DepthToColor
 from recon.errors import NoDepthError
-from recon.registration import register
+from recon.registration import look_up, register
 from tests.unit.frames import calibration, camera, cameras, frame, poses
 
 NEAR, FAR = 600, 1200
@@ -111,3 +111,23 @@ def test_depth_behind_the_colour_camera_is_not_visible():
 def test_empty_depth_is_named():
     with pytest.raises(NoDepthError, match="empty"):
         register(frame(np.zeros((120, 160), np.uint16), np.zeros((120, 160, 3), np.uint8)))
+
+
+def test_points_are_looked_up_as_if_they_had_been_measured():
+    depth, color = two_planes()
+    shot = frame(depth, color)
+    registered = register(shot)
+    colors, seen = look_up(shot, registered, registered.points.reshape(-1, 3))
+    np.testing.assert_array_equal(seen, registered.visible.ravel())
+    np.testing.assert_array_equal(colors[seen], registered.colors[registered.visible])
+    assert colors.dtype == np.uint8
+
+
+def test_what_lies_outside_or_behind_is_not_seen():
+    depth, color = two_planes()
+    shot = frame(depth, color)
+    behind = shot.depth_camera.back_project(np.array([[80.0, 60.0]]), 900.0)
+    aside, backward = np.array([[5000.0, 0.0, 700.0]]), np.array([[0.0, 0.0, -700.0]])
+    points = np.concatenate([behind, aside, backward]).astype(np.float32)
+    _, seen = look_up(shot, register(shot), points)
+    assert not seen.any()

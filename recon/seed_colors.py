@@ -1,0 +1,120 @@
+"""The seeds' colours: none of the background's along the outline, none where another hides it."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from recon.colors import average_neighbors
+from recon.registration import Registration
+
+__all__ = ["seed_colors"]
+
+# How far inside the outline the background may still mix into a depth pixel's colour, and how far
+# inside it a pixel may lie that shows nothing else: the sensor's edge is frayed.
+_RIM = np.ones((5, 5), np.uint8)
+_FRAYED = np.ones((7, 7), np.uint8)
+# Around the face, where its background is looked for.
+_AROUND = np.ones((9, 9), np.uint8)
+# How many pixels wide the windows are in which the face's own colour, and its background's, are
+# looked for. Background farther aside may have another colour.
+_INSIDE = 7
+_BESIDE = 25
+_MARGIN_PX = 12
+# What lies so far behind the face is background, not hair, neck or a hand.
+_BEHIND_MM = 25.0
+# Two colours nearer than this, of 255, are not told apart.
+_ALIKE = 10.0
+# With this share of the background, nothing of the face's own is left in a colour.
+_SHARE = 0.35
+# A mixture lies on the way from the face's colour to the background's, within this share of it
+# and so many of 255: hair before a wall does not.
+_ASIDE = 0.5
+_ASIDE_LEAST = 10.0
+# Within the rim's inner border, a background less different (of 255) would not be noticed.
+_CONTRAST = 60.0
+
+
+def seed_colors(
+    registered: Registration, face: NDArray[np.bool_], solid: NDArray[np.uint8]
+) -> NDArray[np.uint8]:
+    """Give the colour of each pixel of the face, (n, 3) uint8, RGB, in the order of its rows.
+
+    Where the colour camera does not see it, its neighbours' mean. Along the outline, what of the
+    colour behind is in it is taken out, and where that is much, the neighbours' mean again. Where
+    nothing is measured behind and beside it, no outline is trusted.
+
+    Parameters
+    ----------
+    registered : the depth tied to the colour image
+    face : (H, W) bool
+    solid : (H, W) uint8, 0 or 1, the same with its holes filled: holes have no outline
+    """
+    seen = face & registered.visible
+    inner = seen & (cv2.erode(solid, _RIM) > 0)
+    inner = inner if inner.any() else seen
+    if not inner.any():
+        return registered.colors[face]
+    deep = inner & (cv2.erode(solid, _FRAYED) > 0)
+    window = _window(face)
+    behind = _behind(registered, window, face[window], solid[window])
+    colors = registered.colors[window].copy()
+    face, seen, inner, deep = (
+        mask[window] for mask in (face, seen, inner, deep if deep.any() else inner))
+    own = inner.copy()
+    edge = seen & ~deep
+    near, some = _local_mean(colors, deep, edge, _INSIDE)
+    far, any_behind = _local_mean(colors, behind, edge, _BESIDE)
+    told = some & any_behind
+    edge[edge] = told
+    if edge.any():
+        colors[edge], own[edge] = _without(colors[edge], near[told], far[told], ~inner[edge])
+    lost = face & ~own
+    colors[lost] = average_neighbors(colors[own], np.argwhere(own), lost, 1, 1)[lost]
+    return colors[face]
+
+
+def _window(face: NDArray[np.bool_]) -> tuple[slice, slice]:
+    rows, columns = (np.flatnonzero(face.any(axis=axis)) for axis in (1, 0))
+    return (slice(max(rows[0] - _MARGIN_PX, 0), rows[-1] + _MARGIN_PX + 1),
+            slice(max(columns[0] - _MARGIN_PX, 0), columns[-1] + _MARGIN_PX + 1))
+
+
+def _behind(
+    registered: Registration, window: tuple[slice, slice], face: NDArray[np.bool_],
+    solid: NDArray[np.uint8],
+) -> NDArray[np.bool_]:
+    """The visible pixels beside the face that are farther than any of it nearby."""
+    z = registered.points[window][..., 2]
+    farthest = cv2.dilate(np.where(face, z, np.float32(0)), _AROUND)
+    behind: NDArray[np.bool_] = (
+        registered.visible[window] & (solid == 0) & (z > farthest + np.float32(_BEHIND_MM)))
+    return behind
+
+
+def _local_mean(
+    colors: NDArray[np.uint8], among: NDArray[np.bool_], wanted: NDArray[np.bool_], width: int
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """The mean colour of the pixels `among` those near each wanted one, (n, 3), if any, (n,)."""
+    sums = np.dstack([colors, np.full(among.shape, 255, np.uint8)]) * among[..., None]
+    total = cv2.boxFilter(sums, cv2.CV_32F, (width, width), normalize=False,
+                          borderType=cv2.BORDER_CONSTANT)[wanted]
+    count = total[:, 3:] / 255
+    return np.asarray(total[:, :3] / np.maximum(count, 1), np.float32), count[:, 0] > 0
+
+
+def _without(
+    colors: NDArray[np.uint8], near: NDArray[np.float32], far: NDArray[np.float32],
+    rim: NDArray[np.bool_],
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """Take out of the `rim`'s colours, (n, 3), what of `far` is in them besides `near`.
+
+    Also says of which colours something of the face's own is left.
+    """
+    way, off = far - near, colors - near
+    length = np.maximum((way * way).sum(axis=1), np.float32(_ALIKE**2))
+    share = np.maximum((off * way).sum(axis=1) / length, np.float32(0))
+    aside = ((off - share[:, None] * way) ** 2).sum(axis=1)
+    share[aside > np.maximum(_ASIDE**2 * length, _ASIDE_LEAST**2)] = 0
+    own = (share < _SHARE) | (~rim & (length < _CONTRAST**2))
+    cleared = colors - (share * (rim & own))[:, None] * way
+    return np.clip(np.rint(cleared), 0, 255).astype(np.uint8), own
