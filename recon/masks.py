@@ -1,10 +1,10 @@
-"""Binary images: discs and holes."""
+"""Binary images: discs, holes, openings."""
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["disc", "fill_holes"]
+__all__ = ["disc", "fill_holes", "opened"]
 
 
 def disc(radius: float) -> NDArray[np.uint8]:
@@ -19,3 +19,16 @@ def fill_holes(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     outside = cv2.copyMakeBorder(image, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     cv2.floodFill(outside, None, (0, 0), 2)
     return np.asarray(outside[1:-1, 1:-1] != 2, np.uint8)
+
+
+def opened(image: NDArray[np.uint8], radius: float) -> NDArray[np.uint8]:
+    """Keep what a disc of that radius, pixels, covers without leaving the area.
+
+    (H, W) uint8, 0 or 1, to the same; beyond the image's edge the area goes on. By distances: for
+    large discs that is many times faster than OpenCV's morphology.
+    """
+    middles = cv2.distanceTransform(image, cv2.DIST_L2, cv2.DIST_MASK_5) > radius
+    if not middles.any():
+        return np.zeros_like(image)
+    away = cv2.distanceTransform((~middles).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    return (away <= radius).astype(np.uint8)

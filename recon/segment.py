@@ -1,30 +1,25 @@
 """Stage 3: the depth of the face alone, from its box in the colour image.
 
 What counts as face is forehead to chin and ear to ear. Ears, hair and neck of the same head may
-stay where they touch it; walls, shoulders and other people may not.
+stay where they touch it; glasses, hands, walls, shoulders and other people may not.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from recon._segment_kernels import connect, cut_depth, large_parts, within_reach
+from recon.clusters import split_depths
 from recon.errors import FaceWithoutDepthError
 from recon.face import Box
-from recon.masks import fill_holes
+from recon.masks import fill_holes, opened
 from recon.registration import Registration
 from recon.seed_colors import seed_colors
 
-__all__ = ["CLUSTERS", "Seeds", "cluster_depths", "crop_to_box", "keep_face", "segment_face",
+__all__ = ["Seeds", "cluster_depths", "crop_to_box", "keep_face", "segment_face",
            "window_of_box"]
-
-CLUSTERS = 3
-"""The paper's: face, body or hair, background."""
-
-# About so many depths are enough to find the centres.
-_CLUSTERED = 2000
 
 # The cascades' box ends inside the forehead and near the chin, and sits aside of a turned face:
 # how far a face reaches from its centre, in widths of the box.
@@ -36,23 +31,42 @@ _REACH_DOWN = 0.80
 _ROUNDNESS = 2.5
 # How far behind its front a face reaches, in widths of the box, by how far below the centre: the
 # ears at the top, the jaw, then the chin, behind which neck and chest begin.
-_BELOW = (0.20, 0.35, 0.50, 0.60, 0.70, 0.75, 0.80)
-_BEHIND = (0.95, 0.60, 0.48, 0.415, 0.30, 0.20, 0.0)
+_BELOW = np.array([0.20, 0.35, 0.50, 0.60, 0.70, 0.75, 0.80])
+_BEHIND = np.array([0.75, 0.60, 0.48, 0.415, 0.30, 0.20, 0.0])
+# A box that is wider than this is larger than its face.
+_BROADEST_MM = 165.0
 # The part of the box, each way from its centre, in which the front is sought.
 _FRONT_PART = 0.3
 # Two clusters are parts of one surface unless this much empty depth lies between them.
 _GAP_MM = 60.0
-# From pixel to pixel a face's surface steps less than this.
-_STEP_MM = 12.0
-# Unmeasured spots up to this many pixels across do not cut the surface in two.
+# From pixel to pixel a face's surface steps less than this, where pixels are coarse less than the
+# second times their distance.
+_STEP_MM = 10.0
+_STEEPEST = 6.0
+# A reading so much nearer than all ways to it is of another surface: outward a face only recedes,
+# but for the nose, the lips and the chin.
+_RISE_MM = 28.0
+# The next reading may be so many pixels away, with unmeasured ones between.
 _BRIDGE_PX = 5
+# And so far where something stands before the face.
+_COVERED_MM = 45.0
+# A frame of glasses is narrower than the first, stands out by the second, is larger than the third.
+_WIRE_MM = 7.0
+_WIRE_STEP_MM = 6.0
+_WIRE_MM2 = 50.0
+# What stands before a face is broader than this and casts a shadow as wide as the second.
+_FINGER_MM = 5.0
+_SHADOW_MM = 8.0
+# Bays of the outline that are narrower than this are unmeasured spots at its edge, unless they part
+# an ear from it: farther sideways from the middle than the second, and less up or down.
+_BAY_MM = 16.0
+_EAR = 0.35
 # What is narrower than this is no part of a face but an ear, hair, or the frayed edge of depth.
 _SPUR_MM = 30.0
 # A part of the area, cut off from the largest, that is smaller than this share of it.
 _ISLAND_SHARE = 0.15
 # Around the box, what may hide a part of it and what smooths its outline.
 _WINDOW_MARGIN_PX = 8
-_SEED = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,9 +103,12 @@ def segment_face(registered: Registration, box: Box, focal_px: float) -> Seeds:
     crop = _measured_crop(registered, box)
     cluster = cluster_depths(registered, crop, box)
     face = keep_face(registered, cluster, box, focal_px)
-    corner = (registered.rows.start or 0, registered.columns.start or 0)
-    return Seeds(registered.points[face], seed_colors(registered, face, _solid(face)),
-                 (np.argwhere(face) + corner).astype(np.int32))
+    at = np.flatnonzero(face)
+    row, column = np.divmod(at.astype(np.int32), np.int32(face.shape[1]))
+    pixels = np.stack([row + np.int32(registered.rows.start or 0),
+                       column + np.int32(registered.columns.start or 0)], axis=1)
+    return Seeds(registered.points.reshape(-1, 3)[at],
+                 seed_colors(registered, face, _solid(face)), pixels)
 
 
 def window_of_box(registered: Registration, box: Box) -> tuple[slice, slice]:
@@ -129,11 +146,8 @@ def crop_to_box(registered: Registration, box: Box) -> NDArray[np.bool_]:
 
     Gives (H, W) bool.
     """
-    across, down = _in_box(registered, box)
-    reach = np.where(down < 0, _REACH_UP, _REACH_DOWN)
-    inside: NDArray[np.bool_] = registered.valid & (
-        np.abs(across / _REACH_SIDE) ** _ROUNDNESS + np.abs(down / reach) ** _ROUNDNESS < 1)
-    return inside
+    return within_reach(registered.valid, *_in_box(registered, box),
+                        np.array((_REACH_SIDE, _REACH_UP, _REACH_DOWN), np.float32))
 
 
 def cluster_depths(
@@ -145,21 +159,15 @@ def cluster_depths(
     the face it cuts the face itself. So clusters with no empty depth between them are joined
     before the one in the middle of the box is kept. Gives (H, W) bool.
     """
-    z = np.ascontiguousarray(registered.points[..., 2][crop])
-    if len(z) < CLUSTERS:
-        return crop
-    cv2.setRNGSeed(_SEED)  # k-means++ draws its first centres: same frame, same clusters
-    _, _, centers = cv2.kmeans(
-        z[::len(z) // _CLUSTERED + 1, None], CLUSTERS, np.empty(0, np.int32),
-        (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 30, 0.5), 3, cv2.KMEANS_PP_CENTERS)
-    # In one dimension, the nearest centre is told by the middles between them.
-    ordered = np.sort(np.asarray(centers, np.float32).ravel())
-    labels = np.searchsorted((ordered[1:] + ordered[:-1]) / 2, z).astype(np.int32)
-    label_image = np.full(crop.shape, -1, np.int32)
-    label_image[crop] = labels
-    middle = _nearest_pixel(registered, crop, box)
-    kept = _joined(z, labels, int(label_image[middle]))
-    return crop & np.isin(label_image, list(kept))
+    z = registered.points[..., 2]
+    clusters = split_depths(z[crop])
+    middle = round(float(z[_nearest_pixel(registered, crop, box)]))
+    first = last = sum(cluster.last < middle for cluster in clusters)
+    while first > 0 and clusters[first].low - clusters[first - 1].high < _GAP_MM:
+        first -= 1
+    while last + 1 < len(clusters) and clusters[last + 1].low - clusters[last].high < _GAP_MM:
+        last += 1
+    return crop & (z > clusters[first].first - 1) & (z < clusters[last].last + 1)
 
 
 def keep_face(
@@ -169,20 +177,53 @@ def keep_face(
 
     Gives (H, W) bool.
     """
-    start = _nearest_pixel(registered, cluster, box)
-    depth, known = _bridged(registered.points[..., 2], cluster)
-    blocked = np.zeros((depth.shape[0] + 2, depth.shape[1] + 2), np.uint8)
-    blocked[1:-1, 1:-1] = ~known
-    cv2.floodFill(depth, blocked, (int(start[1]), int(start[0])), 0.0,
-                  _STEP_MM, _STEP_MM, 8 | cv2.FLOODFILL_MASK_ONLY | (2 << 8))
-    face: NDArray[np.bool_] = cluster & (blocked[1:-1, 1:-1] == 2)
+    z = np.ascontiguousarray(registered.points[..., 2])
+    px = registered.focal_px / float(z[_nearest_pixel(registered, cluster, box)])  # for each mm
+    cover = _frames_of_glasses(z, cluster, px)
+    wanted = cluster & ~cover
+    start = _nearest_pixel(registered, wanted, box)
+    face = _connected(z, wanted, cover, start, px)
+    hand = _before(z, registered.valid, face, px)
+    if hand.any():
+        cover |= hand
+        face = _connected(z, wanted, cover, start, px)
     across, down = _in_box(registered, box)
-    z = registered.points[..., 2]
     middle = face & (np.abs(across) < _FRONT_PART) & (np.abs(down) < _FRONT_PART)
     front = float(np.percentile(z[middle if middle.any() else face], 2))
     box_mm = box[2] * front / focal_px
-    face &= z < front + box_mm * np.interp(down, _BELOW, _BEHIND)
-    return face & _smooth_outline(face, _SPUR_MM * registered.focal_px / front)
+    cut_depth(face, z, down, front, _BELOW, min(box_mm, _BROADEST_MM) * _BEHIND)
+    return face & _smooth_outline(
+        face | cover, registered.valid & ~face, start, _EAR * box_mm * px, px)
+
+
+def _connected(
+    z: NDArray[np.float32], wanted: NDArray[np.bool_], cover: NDArray[np.bool_],
+    start: tuple[int, int], px: float,
+) -> NDArray[np.bool_]:
+    return connect(z, wanted, cover, *start, max(_STEP_MM, _STEEPEST / px), _RISE_MM, _BRIDGE_PX,
+                   max(round(_COVERED_MM * px), _BRIDGE_PX))
+
+
+def _frames_of_glasses(
+    z: NDArray[np.float32], cluster: NDArray[np.bool_], px: float
+) -> NDArray[np.bool_]:
+    """What stands before the surface, is narrow and long; `px` pixels are a millimetre."""
+    kernel = np.ones((2 * round(_WIRE_MM * px / 2) + 1,) * 2, np.uint8)
+    behind = cv2.dilate(np.where(cluster, z, np.float32(0)), kernel)
+    behind = cv2.erode(np.where(behind > 0, behind, np.float32(np.inf)), kernel)
+    return large_parts(cluster & (behind - z > _WIRE_STEP_MM), _WIRE_MM2 * px * px)
+
+
+def _before(
+    z: NDArray[np.float32], valid: NDArray[np.bool_], face: NDArray[np.bool_], px: float
+) -> NDArray[np.bool_]:
+    """A hand, or what else stands before the face, and its shadow in which nothing is measured."""
+    nearer = (valid & ~face & (z < np.median(z[face]))).view(np.uint8)
+    side = 2 * round(_FINGER_MM * px / 2) + 1
+    hand = cv2.morphologyEx(nearer, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
+    side = 2 * round(_SHADOW_MM * px) + 1
+    around = cv2.dilate(hand, np.ones((side, side), np.uint8)) > 0
+    return around & ~face & ((hand > 0) | ~valid)
 
 
 def _in_box(
@@ -202,48 +243,33 @@ def _nearest_pixel(
     if not seen.any():
         raise FaceWithoutDepthError("no depth was measured where the colour camera sees the face")
     across, down = _in_box(registered, box)
-    row, column = np.argwhere(seen)[np.argmin((across**2 + down**2)[seen])]
-    return int(row), int(column)
+    nearest = int(np.argmin(np.where(seen, across * across + down * down, np.float32(np.inf))))
+    return nearest // seen.shape[1], nearest % seen.shape[1]
 
 
-def _joined(z: NDArray[np.float32], labels: NDArray[np.integer], kept: int) -> set[int]:
-    """The clusters that hang together with `kept`, without an empty depth between."""
-    spans = {label: np.percentile(z[labels == label], (2, 98)) for label in np.unique(labels)}
-    together = {kept}
-    for order in (sorted(spans, key=lambda k: spans[k][0]),
-                  sorted(spans, key=lambda k: -spans[k][0])):
-        for nearer, farther in pairwise(order):
-            low, high = sorted((spans[nearer], spans[farther]), key=lambda s: float(s[0]))
-            if nearer in together and low[1] + _GAP_MM > high[0]:
-                together.add(farther)
-    return together
-
-
-def _bridged(
-    z: NDArray[np.float32], known: NDArray[np.bool_]
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Fill narrow gaps between known depths with their neighbours' mean."""
-    kernel = (_BRIDGE_PX, _BRIDGE_PX)
-    weight = cv2.boxFilter(known.astype(np.float32), -1, kernel, normalize=False)
-    total = cv2.boxFilter(np.where(known, z, np.float32(0)), -1, kernel, normalize=False)
-    near = weight > 0.5
-    mean = np.divide(total, weight, out=np.zeros_like(total), where=near)
-    # A depth that was measured and is not wanted is no gap: the flood shall not pass over it.
-    return np.where(known, z, mean), known | (near & (z == 0))
-
-
-def _smooth_outline(face: NDArray[np.bool_], spur_px: float) -> NDArray[np.bool_]:
-    """The face's area without spurs and islands.
+def _smooth_outline(
+    face: NDArray[np.bool_], other: NDArray[np.bool_], middle: tuple[int, int], ear_px: float,
+    px: float,
+) -> NDArray[np.bool_]:
+    """The face's area without spurs and islands; `px` pixels are a millimetre.
 
     At a depth edge the sensor sets pixels to either side; an island is an ear, or hair.
     """
-    side = 2 * round(spur_px / 2) + 1
-    opened = cv2.morphologyEx(
-        _solid(face), cv2.MORPH_OPEN, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
-    _, parts = cv2.connectedComponents(opened, connectivity=4)
-    areas = np.bincount(parts.ravel())[1:]
-    kept = 1 + np.flatnonzero(areas >= _ISLAND_SHARE * areas.max(initial=0))
-    return np.isin(parts, kept)
+    side = 2 * round(_BAY_MM * px / 2) + 1
+    closed = cv2.morphologyEx(
+        face.view(np.uint8), cv2.MORPH_CLOSE, np.ones((side, side), np.uint8)).view(bool)
+    top, left, bottom, right = (max(round(place + way), 0) for way in (-ear_px, ear_px)
+                                for place in middle)
+    closed[top:bottom, :left] = closed[top:bottom, right:] = False
+    area = _solid(face | (closed & ~other))
+    # Half the pixels each way: so much detail is enough, in a fourth of the time.
+    half = np.asarray(
+        cv2.dilate(area, np.ones((2, 2), np.uint8), anchor=(0, 0))[::2, ::2], np.uint8, order="C")
+    _, parts = cv2.connectedComponents(opened(half, _SPUR_MM * px / 4), connectivity=4)
+    areas = np.bincount(parts.ravel())
+    areas[0] = 0
+    kept = ((areas > 0) & (areas >= _ISLAND_SHARE * areas.max()))[parts]
+    return np.asarray(kept.repeat(2, axis=0).repeat(2, axis=1)[:face.shape[0], :face.shape[1]])
 
 
 def _solid(face: NDArray[np.bool_]) -> NDArray[np.uint8]:

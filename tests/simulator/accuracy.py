@@ -19,6 +19,10 @@ NEAR_MM = 2.0
 
 # A point this far off the head's surface is not its rim but on something else.
 _ELSEWHERE_MM = 10.0
+# On a hand, a frame of glasses or cloth that touches the face, a point is when it is this far off
+# the head and nearer to that thing.
+_OFF_MM = 3.0
+_THINGS = (Label.BODY, Label.HAND, Label.GLASSES)
 # A reading of the face's pixel that differs more is not of the face.
 _READING_MM = 15.0
 
@@ -41,7 +45,7 @@ class Accuracy:
     lost: float
     """Share of the sensor's readings of the true face that are not in the initial cloud."""
     elsewhere: float
-    """Share of the dense cloud that lies on walls, shoulders or other people."""
+    """Share of the dense cloud on walls, shoulders, other people, a hand, or glasses."""
 
     @property
     def ratio(self) -> float:
@@ -63,10 +67,17 @@ def measure(face: Face, truth: Truth, frame: RgbdFrame) -> Accuracy:
         gross=float((errors > GROSS_MM).mean()),
         covered=float(np.isfinite(nearest).mean()),
         lost=_lost(face, truth, frame),
-        elsewhere=float((
-            (errors > _ELSEWHERE_MM)
-            & ~np.isin(truth.labels_at(face.dense.points), (Label.FACE, Label.HEAD))).mean()),
+        elsewhere=_elsewhere(face.dense.points, errors, truth),
     )
+
+
+def _elsewhere(
+    points: NDArray[np.float32], errors: NDArray[np.float64], truth: Truth
+) -> float:
+    off = ~np.isin(truth.labels_at(points), (Label.FACE, Label.HEAD)) & (errors > _OFF_MM)
+    off[off] = (errors[off] > _ELSEWHERE_MM) | (
+        truth.surface_distance(points[off], _THINGS) < errors[off])
+    return float(off.mean())
 
 
 def _lost(face: Face, truth: Truth, frame: RgbdFrame) -> float:

@@ -217,12 +217,22 @@ def test_many_holes_are_filled():
 
 
 @pytest.mark.parametrize("missing", [0.5, 0.8])
-def test_readings_that_drop_out_at_random(shot, missing):
+def test_readings_that_drop_out_at_random(face, shot, missing):
     gone = np.random.default_rng(5).random(shot.frame.depth.shape) < missing
     one = reconstruct(replace(shot.frame, depth=np.where(gone, 0, shot.frame.depth)))
     check_sound(one)
     assert shot.truth.surface_distance(one.dense.points).mean() < 0.8
-    assert any("seeds" in warning for warning in one.report.warnings) == (missing > 0.7)
+    assert len(one.initial) > 0.9 * (1 - missing) * len(face.initial)
+    assert one.report.warnings == ()
+
+
+def test_few_seeds_are_warned_of():
+    far = simulate(Scene((Person(distance_mm=2200),)), seed=6)[0]
+    one = reconstruct(far.frame)
+    check_sound(one)
+    assert len(one.initial) < 2000
+    assert one.report.warnings == (
+        f"only {len(one.initial)} seeds: the face is far away or mostly unmeasured",)
 
 
 def test_frames_far_apart_in_time_are_warned_of(shot):

@@ -1,0 +1,174 @@
+"""The loops over the depth image around a face, compiled."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recon._compiled import compiled
+
+__all__ = ["connect", "cut_depth", "large_parts", "within_reach"]
+
+_EMPTY, _HIDDEN, _WANTED, _FOUND, _BLOCKED = 0, 1, 2, 3, 4
+
+
+@compiled
+def within_reach(
+    valid: NDArray[np.bool_],
+    across: NDArray[np.float32],
+    down: NDArray[np.float32],
+    reach: NDArray[np.float32],
+) -> NDArray[np.bool_]:
+    """Say which valid pixels lie in a superellipse of power 2.5 about the origin.
+
+    reach : (3,), sideward, upward, downward
+    """
+    rows, columns = valid.shape
+    inside = np.zeros((rows, columns), np.bool_)
+    for row in range(rows):
+        for column in range(columns):
+            if valid[row, column]:
+                a = abs(across[row, column]) / reach[0]
+                d = down[row, column]
+                b = -d / reach[1] if d < 0 else d / reach[2]
+                if a >= 1 or b >= 1:
+                    continue
+                inside[row, column] = a * a * np.sqrt(a) + b * b * np.sqrt(b) < 1
+    return inside
+
+
+@compiled
+def connect(
+    z: NDArray[np.float32],
+    wanted: NDArray[np.bool_],
+    hidden: NDArray[np.bool_],
+    start_row: int,
+    start_column: int,
+    step: float,
+    rise: float,
+    reach: int,
+    hidden_reach: int,
+) -> NDArray[np.bool_]:
+    """Follow a surface from one pixel to all that small steps connect with it.
+
+    From each pixel it goes along the eight directions of the grid to the first that was measured
+    (z > 0) and is not `hidden`, over at most `reach` - 1 others, `hidden_reach` - 1 where all are
+    hidden: there, if it is wanted, if its depth differs by less than `step`, and if some way to it
+    never went deeper than it by `rise`. Ways are followed in the order of their deepest point
+    (priority flood, Barnes, Lehman, Mulla, 2014, doi:10.1016/j.cageo.2013.04.024).
+    """
+    rows, columns = z.shape
+    nearest = farthest = z[start_row, start_column]
+    # What a pixel is, with a border around, so that no step leaves the image.
+    wide = columns + 2
+    kind = np.full((rows + 2) * wide, _BLOCKED, np.uint8)
+    depth = np.zeros((rows + 2) * wide, np.float32)
+    for row in range(rows):
+        for column in range(columns):
+            here = z[row, column]
+            at = (row + 1) * wide + column + 1
+            if hidden[row, column]:
+                kind[at] = _HIDDEN
+            elif here <= 0:
+                kind[at] = _EMPTY
+            elif wanted[row, column]:
+                kind[at] = _WANTED
+                depth[at] = here
+                nearest = min(nearest, here)
+                farthest = max(farthest, here)
+    # Pixels wait in lists, one for each millimetre of depth.
+    low = int(nearest)
+    size = int(farthest) - low + 1
+    first = np.full(size, -1, np.int32)
+    following = np.full(len(kind), -1, np.int32)
+    level = int(z[start_row, start_column]) - low
+    at = (start_row + 1) * wide + start_column + 1
+    kind[at] = _FOUND
+    first[level] = at
+    while level < size:
+        at = first[level]
+        if at < 0:
+            level += 1
+            continue
+        first[level] = following[at]
+        here = depth[at]
+        for down in (-wide, 0, wide):
+            for way in range(down - 1, down + 2):
+                place = at + way
+                if kind[place] >= _FOUND:
+                    continue
+                gap, steps = 1, 1
+                while kind[place] <= _HIDDEN and steps < hidden_reach:
+                    if kind[place] == _EMPTY:
+                        gap += 1
+                        if gap > reach:
+                            break
+                    place += way
+                    steps += 1
+                if kind[place] != _WANTED:
+                    continue
+                there = depth[place]
+                if abs(there - here) < step and there > level + low - rise:
+                    kind[place] = _FOUND
+                    bucket = max(level, int(there) - low)
+                    following[place] = first[bucket]
+                    first[bucket] = place
+    found = np.empty((rows, columns), np.bool_)
+    for row in range(rows):
+        for column in range(columns):
+            found[row, column] = kind[(row + 1) * wide + column + 1] == _FOUND
+    return found
+
+
+@compiled
+def large_parts(image: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
+    """Keep the parts, whose pixels touch at sides or corners, of at least so many pixels."""
+    rows, columns = image.shape
+    left = image.copy()
+    kept = np.zeros((rows, columns), np.bool_)
+    part = np.empty(np.count_nonzero(image), np.int64)
+    for row in range(rows):
+        for column in range(columns):
+            if not left[row, column]:
+                continue
+            left[row, column] = False
+            part[0] = row * columns + column
+            done, count = 0, 1
+            while done < count:
+                i, j = part[done] // columns, part[done] % columns
+                done += 1
+                for k in range(max(i - 1, 0), min(i + 2, rows)):
+                    for m in range(max(j - 1, 0), min(j + 2, columns)):
+                        if left[k, m]:
+                            left[k, m] = False
+                            part[count] = k * columns + m
+                            count += 1
+            if count >= least:
+                for k in range(count):
+                    kept[part[k] // columns, part[k] % columns] = True
+    return kept
+
+
+@compiled
+def cut_depth(
+    face: NDArray[np.bool_],
+    z: NDArray[np.float32],
+    down: NDArray[np.float32],
+    front: float,
+    below: NDArray[np.float64],
+    behind: NDArray[np.float64],
+) -> None:
+    """Drop from `face` what lies deeper than front + a line through (below, behind), by `down`."""
+    for row in range(face.shape[0]):
+        for column in range(face.shape[1]):
+            if face[row, column]:
+                d = down[row, column]
+                k = 0
+                while k < len(below) and d >= below[k]:
+                    k += 1
+                if k == 0:
+                    most = behind[0]
+                elif k == len(below):
+                    most = behind[-1]
+                else:
+                    share = (d - below[k - 1]) / (below[k] - below[k - 1])
+                    most = behind[k - 1] + share * (behind[k] - behind[k - 1])
+                face[row, column] = z[row, column] < front + most
