@@ -15,7 +15,8 @@ from recon import Neighbors, Preset, ReconstructionError, Settings, reconstruct
 from recon.face import Face
 from tests.simulator import KINECT_CALIBRATED, Person, Scene, Truth, head_names, simulate
 
-__all__ = ["HOLE_SPACINGS", "Case", "recorded", "reported_heads", "simulated", "with_preset"]
+__all__ = ["HOLE_SPACINGS", "Case", "posed", "recorded", "reporting_heads", "simulated",
+           "with_preset"]
 
 HOLE_SPACINGS = 2.0
 """A point farther than this many mean spacings from every seed, over (X, Y), is inside a hole."""
@@ -105,25 +106,36 @@ def recorded(frames: int) -> Iterator[Case]:
                     yield _case(f"{name}/{index}", frame, truth)
 
 
-def reported_heads() -> list[str]:
-    """Name the heads that figures are reported on; no setting was chosen on them."""
-    return [name for name in _HEADS if name in head_names()] or ["procedural"]
-
-
 def simulated(count: int) -> Iterator[Case]:
     """Give frames of heads at random distances and turns, all with many holes."""
-    heads = reported_heads()
+    heads = reporting_heads()
     for index in range(count):
         rng = np.random.default_rng([7, index])
         head = heads[index % len(heads)]
         distance, yaw = rng.uniform(*_DISTANCES_MM), rng.uniform(-_YAW, _YAW)
-        scene = Scene((Person(head, distance, yaw=yaw),), holes=1.0, decor=index)
-        shot, = simulate(scene, KINECT_CALIBRATED, seed=100 + index)
-        name = f"{head} {distance:.0f} mm {yaw:+.0f} deg"
-        try:
-            yield _case(name, shot.frame, shot.truth)
-        except ReconstructionError as error:
-            print(f"{name} is left out: {error}", file=sys.stderr)
+        case = posed(head, distance, yaw, 1.0, 100 + index)
+        if case is not None:
+            yield case
+
+
+def reporting_heads() -> list[str]:
+    """List the heads at hand that no setting was chosen on."""
+    return [name for name in _HEADS if name in head_names()] or ["procedural"]
+
+
+def posed(head: str, distance: float, yaw: float, holes: float, seed: int) -> Case | None:
+    """Simulate one head at a distance, mm, turned by degrees; None, and a line, where it fails.
+
+    holes : `Scene.holes`; seed : of noise, holes and the wall's pattern, at least 100
+    """
+    scene = Scene((Person(head, distance, yaw=yaw),), holes=holes, decor=seed - 100)
+    shot, = simulate(scene, KINECT_CALIBRATED, seed=seed)
+    name = f"{head} {distance:.0f} mm {yaw:+.0f} deg"
+    try:
+        return _case(name, shot.frame, shot.truth)
+    except ReconstructionError as error:
+        print(f"{name} is left out: {error}", file=sys.stderr)
+        return None
 
 
 def _case(name: str, frame: RgbdFrame, truth: Truth) -> Case:

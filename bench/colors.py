@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from bench.cases import HOLE_SPACINGS, reported_heads
+from bench.cases import HOLE_SPACINGS, reporting_heads
 from bench.machine import describe
 from recon import ReconstructionError, reconstruct
 from recon.face import Face
@@ -153,7 +153,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="script/bench colors", description=__doc__)
     parser.add_argument("--simulated", type=int, default=24, metavar="N",
                         help="frames of heads before a room (24)")
-    parser.add_argument("--heads", nargs="+", default=reported_heads(), choices=head_names(),
+    parser.add_argument("--heads", nargs="+", default=reporting_heads(), choices=head_names(),
                         help="default: the reported ones")
     args = parser.parse_args()
     print(describe(f"script/bench colors --simulated {args.simulated}"))

@@ -13,7 +13,7 @@ from scipy.optimize import brentq, minimize
 
 from bench.calibration_samples import Samples
 from recon import Preset, Settings
-from recon.uncertainty import cutoff
+from recon.uncertainty import average_cutoff, cutoff
 
 __all__ = ["fitted"]
 
@@ -33,10 +33,9 @@ def fitted(samples: dict[Preset, Samples]) -> dict[str, float]:
     scale = math.sqrt(math.prod(_scale(preset, samples[preset], found)
                                 for preset in (Preset.FAITHFUL, Preset.PAPER)))
     settings = Settings.of(Preset.BEST)
-    fine = scale * cutoff(settings.r0_factor, settings.smoothing) ** 2
-    coarse = scale * cutoff(settings.coarse_r0_factor or settings.r0_factor,
-                            settings.coarse_smoothing) ** 2
-    return found | {"_SHARE": scale, "_FINE_PART": (share - coarse) / (fine - coarse)}
+    base = scale * cutoff(settings.r0_factor, settings.smoothing) ** 2
+    detail = scale * average_cutoff(settings.detail_factor or math.inf) ** 2
+    return found | {"_SHARE": scale, "_DETAIL_PART": (share - base) / detail}
 
 
 def _most_likely(sources: Floats, of: Samples) -> Floats:

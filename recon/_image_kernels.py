@@ -5,33 +5,31 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["blend", "blur", "collect", "divide", "fill", "halve", "scatter"]
+__all__ = ["add_between", "blur", "collect", "divide", "fill", "halve", "scatter"]
 
 
 @compiled
-def blend(
-    fine: NDArray[np.float32], coarse: NDArray[np.float32], gain: NDArray[np.float32],
-    rows: NDArray[np.float32], columns: NDArray[np.float32],
+def add_between(
+    image: NDArray[np.float32], coarse: NDArray[np.float32], rows: NDArray[np.float32],
+    columns: NDArray[np.float32],
 ) -> None:
-    """Make fine = coarse + gain (fine - coarse), the gain bilinear.
+    """Add another image, bilinear, to one, (m, k).
 
-    fine, coarse : (m, k); rows, columns : (m,), (k,), places in `gain`, inside it
+    rows, columns : (m,), (k,), places in `coarse`, inside it
     """
-    last = gain.shape[1] - 1
-    line, here = np.empty(last + 2, np.float32), np.empty(len(columns), np.float32)
+    last = coarse.shape[1] - 1
+    line = np.empty(last + 2, np.float32)
     for i in range(len(rows)):
         above = int(rows[i])
-        below = min(above + 1, gain.shape[0] - 1)
+        below = min(above + 1, coarse.shape[0] - 1)
         part = rows[i] - np.float32(above)
         for j in range(last + 1):
-            line[j] = gain[above, j] + part * (gain[below, j] - gain[above, j])
+            line[j] = coarse[above, j] + part * (coarse[below, j] - coarse[above, j])
         line[last + 1] = line[last]
+        own = image[i]
         for j in range(len(columns)):
             left = int(columns[j])
-            here[j] = line[left] + (columns[j] - np.float32(left)) * (line[left + 1] - line[left])
-        one, other = fine[i], coarse[i]
-        for j in range(len(columns)):
-            one[j] = other[j] + here[j] * (one[j] - other[j])
+            own[j] += line[left] + (columns[j] - np.float32(left)) * (line[left + 1] - line[left])
 
 
 @compiled

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._image_kernels import collect
-from recon.adapt import AdaptiveSurface
 from recon.colors import average_neighbors
+from recon.detail import DetailedSurface
 from recon.face import DenseCloud
 from recon.rbf import Surface
 from recon.segment import Seeds
@@ -38,7 +38,7 @@ _HOLE = 1.5
 
 def densify(
     seeds: Seeds,
-    surface: Surface | AdaptiveSurface,
+    surface: Surface | DetailedSurface,
     spacing: float,
     ratio: float,
     share: float,

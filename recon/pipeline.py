@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from capture.frame import RgbdFrame
 from recon._threads import one_blas_thread
-from recon.adapt import AdaptiveSurface, blend_surfaces
 from recon.densify import densify
+from recon.detail import DetailedSurface, add_detail
 from recon.detect import detect_face
 from recon.errors import TooLittleDepthError
 from recon.face import Face, PointCloud, Report
 from recon.neighbors import mean_spacing
-from recon.rbf import MIN_SEEDS, Surface, fit_surfaces
+from recon.rbf import MIN_SEEDS, Surface, fit_surface
 from recon.registration import Registration, look_up, register
 from recon.segment import segment_face, window_of_box
 from recon.settings import Settings
@@ -108,12 +108,11 @@ def _version() -> str:
 
 def _fit(
     points: NDArray[np.float32], spacing: float, settings: Settings
-) -> Surface | AdaptiveSurface:
-    fits = [(settings.r0_factor * spacing, settings.smoothing)]
-    if settings.coarse_r0_factor is not None:
-        fits.append((settings.coarse_r0_factor * spacing, settings.coarse_smoothing))
-    fine, *coarser = fit_surfaces(points, fits)
-    return blend_surfaces(fine, coarser[0], points, spacing) if coarser else fine
+) -> Surface | DetailedSurface:
+    surface = fit_surface(points, settings.r0_factor * spacing, settings.smoothing)
+    if settings.detail_factor is None:
+        return surface
+    return add_detail(surface, points, spacing, settings.detail_factor * spacing)
 
 
 def _warnings(frame: RgbdFrame, seeds: int) -> tuple[str, ...]:

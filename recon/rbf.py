@@ -17,7 +17,6 @@ loop over pairs:  g(x - t) g(x - t') = exp(-|t - t'|^2 / R0^2) exp(-4 |x - (t + 
 The sums over seeds that are left are products of thin matrices too, see `recon._gridding`.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -29,7 +28,7 @@ from recon._kernels import conjugate_gradients
 from recon._trend import Trend, polynomial
 from recon.errors import TooLittleDepthError
 
-__all__ = ["MIN_SEEDS", "Surface", "fit_surface", "fit_surfaces"]
+__all__ = ["MIN_SEEDS", "Surface", "fit_surface"]
 
 MIN_SEEDS = 50
 """Fewer seeds than this are no face, and leave the polynomial without support."""
@@ -168,33 +167,13 @@ def fit_surface(
     ValueError
         Where an argument is out of its range, or a coordinate is not finite.
     """
-    return fit_surfaces(points, ((r0, smoothing),), weights)[0]
-
-
-def fit_surfaces(
-    points: NDArray[np.floating],
-    fits: Sequence[tuple[float, float]],
-    weights: NDArray[np.floating] | None = None,
-) -> list[Surface]:
-    """Fit several surfaces to the same points, which are gone through only once.
-
-    Parameters
-    ----------
-    points, weights : as of `fit_surface`
-    fits : R0, mm, and lambda of each
-
-    Raises
-    ------
-    TooLittleDepthError, ValueError
-        As `fit_surface`.
-    """
-    x, y, z, W = _checked(points, fits, weights)
+    x, y, z, W = _checked(points, r0, smoothing, weights)
     # The polynomial is eliminated: what it explains by itself is taken off first, and the node
     # weights are sought beside it. In single precision, which the small rest allows.
     trend = Trend.of(x, y, z, W)
-    charges = Charges.of(x, y, (W, trend.rest), max(_DENSITY / r0**2 for r0, _ in fits))
+    charges = Charges.of(x, y, (W, trend.rest), _DENSITY / r0**2)
     extent = (float(x.min()), float(x.max())), (float(y.min()), float(y.max()))
-    return [_fit(trend, charges, extent, float(W.sum()), r0, smoothing) for r0, smoothing in fits]
+    return _fit(trend, charges, extent, float(W.sum()), r0, smoothing)
 
 
 def _fit(
@@ -309,7 +288,8 @@ def _decay(q: float, reach: int) -> NDArray[np.float32]:
 
 def _checked(
     points: NDArray[np.floating],
-    fits: Sequence[tuple[float, float]],
+    r0: float,
+    smoothing: float,
     weights: NDArray[np.floating] | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Give x, y, z and W, each contiguous."""
@@ -318,10 +298,9 @@ def _checked(
     checked: NDArray[np.float64] = np.array(np.transpose(points), np.float64, order="C")
     if not np.isfinite(checked).all():
         raise ValueError("points must be finite")
-    for fit in fits:
-        for name, value in zip(("r0", "smoothing"), fit, strict=True):
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be positive and finite, got {value}")
+    for name, value in (("r0", r0), ("smoothing", smoothing)):
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"{name} must be positive and finite, got {value}")
     W: NDArray[np.float64] = np.ones(len(points)) if weights is None else np.array(weights, float)
     if W.shape != (len(points),) or not np.isfinite(W).all() or (W <= 0).any():
         raise ValueError(f"weights must be ({len(points)},), positive and finite")

@@ -34,7 +34,7 @@ _PRESETS: dict[Preset, dict[str, Any]] = {
     Preset.PAPER: {"r0_factor": 6.0, "smoothing": 0.1, "neighbors": Neighbors.RANDOMIZED,
                    "depth_offset_mm": 0.0},
     Preset.FAITHFUL: {"r0_factor": 6.0, "smoothing": 3.0, "neighbors": Neighbors.RANDOMIZED},
-    Preset.BEST: {"r0_factor": 8.0, "smoothing": 3.0, "coarse_r0_factor": 14.0,
+    Preset.BEST: {"r0_factor": 14.0, "smoothing": 20.0, "detail_factor": 1.6,
                   "neighbors": Neighbors.LATTICE},
 }
 
@@ -49,10 +49,9 @@ class Settings(BaseModel):
     """R0 of Eq. (3) in units of the seeds' mean spacing."""
     smoothing: Annotated[float, Field(ge=0.05, le=1000)] = 0.0
     """lambda: weight of the squared norm against the squared residuals (unitless)."""
-    coarse_r0_factor: Annotated[float, Field(ge=2, le=40)] | None = None
-    """R0 of a second, coarser fit that takes over where the face is smooth; None: one fit."""
-    coarse_smoothing: Annotated[float, Field(ge=0.05, le=1000)] = 20.0
-    """lambda of the coarser fit."""
+    detail_factor: Annotated[float, Field(ge=0.5, le=10)] | None = None
+    """Radius of the averages that give back what the fit smooths away, in mean spacings; None:
+    the fit alone."""
     neighbors: Neighbors = Neighbors.LATTICE
     """How the mean spacing is measured."""
     depth_offset_mm: Annotated[float, Field(ge=-10, le=10)] = 0.5

@@ -26,14 +26,15 @@ from numpy.typing import NDArray
 from recon._uncertainty_kernels import coarsen, interpolate
 from recon.settings import Settings
 
-__all__ = ["Sources", "cutoff", "noise_share", "sources_of_error", "standard_error"]
+__all__ = ["Sources", "average_cutoff", "cutoff", "noise_share", "sources_of_error",
+           "standard_error"]
 
 # From bench/calibration.py: H, S, E above, and those of `noise_share`.
 _HOLE = 0.51
 _SLOPE = 0.07
 _RIM = 2.6
 _SHARE = 93.0
-_FINE_PART = 0.67
+_DETAIL_PART = 0.24
 
 # Over what radius (standard deviation) residuals and slopes count as local, spacings.
 _WINDOW = 2.5
@@ -67,25 +68,25 @@ class Sources:
 def noise_share(settings: Settings) -> float:
     """Give k: how much of the residuals' variance is the error left in the surface.
 
-    A fit lets pass what is longer than L = pi R0 / sqrt(ln(pi (R0/h)^2 / lambda)), where signal
-    and smoothing weigh the same: of noise, a share in proportion to (h / L)^2. Two fits that are
-    blended have the mean of their shares, weighted by what the blend takes of each.
+    A smoother lets pass what is longer than some L, where signal and smoothing weigh the same: of
+    noise, a share in proportion to (h / L)^2. Detail that is added to the fit brings back a part
+    of the share of its own average.
     """
-    fine = _share(settings.r0_factor, settings.smoothing)
-    if settings.coarse_r0_factor is None:
-        return fine
-    coarse = _share(settings.coarse_r0_factor, settings.coarse_smoothing)
-    return _FINE_PART * fine + (1 - _FINE_PART) * coarse
+    share = _SHARE * cutoff(settings.r0_factor, settings.smoothing) ** 2
+    if settings.detail_factor is not None:
+        share += _DETAIL_PART * _SHARE * average_cutoff(settings.detail_factor) ** 2
+    return share
 
 
 def cutoff(r0_factor: float, smoothing: float) -> float:
-    """Give h / L of a fit, see `noise_share`."""
+    """Give h / L of a fit, L = pi R0 / sqrt(ln(pi (R0/h)^2 / lambda))."""
     weight = max(math.pi * r0_factor**2 / smoothing, math.e)
     return math.sqrt(math.log(weight)) / (math.pi * r0_factor)
 
 
-def _share(r0_factor: float, smoothing: float) -> float:
-    return _SHARE * cutoff(r0_factor, smoothing) ** 2
+def average_cutoff(detail_factor: float) -> float:
+    """Give h / L of a Gaussian average: of a wave of length L, half is left."""
+    return math.sqrt(math.log(2) / 2) / (math.pi * detail_factor)
 
 
 def sources_of_error(

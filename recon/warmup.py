@@ -7,12 +7,12 @@ import numpy as np
 
 from capture.frame import Calibration, CameraModel, RgbdFrame
 from recon._heap import keep_freed_memory
-from recon.adapt import blend_surfaces
 from recon.densify import densify
+from recon.detail import add_detail
 from recon.detect import detect_face
 from recon.errors import NoFaceError
 from recon.neighbors import mean_spacing
-from recon.rbf import fit_surfaces
+from recon.rbf import fit_surface
 from recon.registration import register
 from recon.segment import segment_face
 from recon.settings import Settings
@@ -38,9 +38,8 @@ def warm() -> None:
         detect_face(frame.color, registered, _FOCAL_PX)
     seeds = segment_face(registered, _BOX, _FOCAL_PX)
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
-    fine, coarse = fit_surfaces(seeds.points, [
-        (factor * settings.r0_factor * spacing, settings.smoothing) for factor in (1, 2)])
-    surface = blend_surfaces(fine, coarse, seeds.points, spacing)
+    fit = fit_surface(seeds.points, settings.r0_factor * spacing, settings.smoothing)
+    surface = add_detail(fit, seeds.points, spacing, spacing)
     densify(seeds, surface, spacing, settings.ratio, share=1.0)
 
 

@@ -4,10 +4,10 @@ import pytest
 from bench.calibration_samples import Samples
 from bench.sigma_fit import fitted
 from recon import Preset, Settings
-from recon.uncertainty import cutoff, noise_share
+from recon.uncertainty import average_cutoff, cutoff, noise_share
 
 COUNT = 60_000
-HOLE, SLOPE, RIM, SHARE, FINE_PART = 0.8, 0.1, 2.0, 50.0, 0.6
+HOLE, SLOPE, RIM, SHARE, DETAIL_PART = 0.8, 0.1, 2.0, 50.0, 0.6
 
 
 def made_up(preset: Preset, seed: int) -> Samples:
@@ -16,9 +16,8 @@ def made_up(preset: Preset, seed: int) -> Samples:
     sources = rng.gamma(1.0, [1.0, 0.5, 3.0, 0.2], (COUNT, 4))
     settings = Settings.of(preset)
     share = SHARE * cutoff(settings.r0_factor, settings.smoothing) ** 2
-    if settings.coarse_r0_factor is not None:
-        coarse = SHARE * cutoff(settings.coarse_r0_factor, settings.coarse_smoothing) ** 2
-        share = FINE_PART * share + (1 - FINE_PART) * coarse
+    if settings.detail_factor is not None:
+        share += DETAIL_PART * SHARE * average_cutoff(settings.detail_factor) ** 2
     sigma = np.sqrt(sources @ [share, share * HOLE, SLOPE, RIM])
     everything = np.ones(COUNT, bool)
     return Samples(error=rng.normal(0, sigma), distance=np.full(COUNT, np.nan), sigma=sigma,
@@ -29,7 +28,7 @@ def made_up(preset: Preset, seed: int) -> Samples:
 def test_the_coefficients_that_made_the_errors_are_found():
     found = fitted({preset: made_up(preset, seed) for seed, preset in enumerate(Preset)})
     expected = {"_HOLE": HOLE, "_SLOPE": SLOPE, "_RIM": RIM, "_SHARE": SHARE,
-                "_FINE_PART": FINE_PART}
+                "_DETAIL_PART": DETAIL_PART}
     assert found.keys() == expected.keys()
     for name, value in expected.items():
         assert found[name] == pytest.approx(value, rel=0.12), name

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from recon._image_kernels import blend, blur, collect, divide, fill, halve, scatter
+from recon._image_kernels import add_between, blur, collect, divide, fill, halve, scatter
 
 
 @pytest.mark.parametrize("shape", [(40, 60), (3, 5), (1, 1), (200, 2)])
@@ -80,15 +80,14 @@ def test_what_is_missing_is_filled_from_half_the_size():
     np.testing.assert_array_equal(mean[~missing], ramp[~missing])
 
 
-def test_the_blend_is_by_the_gain_between_its_points():
-    fine, coarse = np.random.default_rng(0).normal(size=(2, 9, 13)).astype(np.float32)
-    gain = np.add.outer(0.2 * np.arange(4), 0.05 * np.arange(5)).astype(np.float32)
+def test_what_is_added_is_read_between_its_points():
+    image = np.random.default_rng(0).normal(size=(9, 13)).astype(np.float32)
+    ramp = np.add.outer(0.2 * np.arange(4), 0.05 * np.arange(5)).astype(np.float32)
     rows, columns = (np.linspace(0, last, count).astype(np.float32)
                      for last, count in ((3, 9), (4, 13)))
-    here = np.add.outer(0.2 * rows, 0.05 * columns)
-    expected = coarse + here * (fine - coarse)
-    blend(fine, coarse, gain, rows, columns)
-    np.testing.assert_allclose(fine, expected, atol=1e-5)
+    expected = image + np.add.outer(0.2 * rows, 0.05 * columns)
+    add_between(image, ramp, rows, columns)
+    np.testing.assert_allclose(image, expected, atol=1e-5)
 
 
 def test_a_colour_is_shared_among_the_pixels_around_it():

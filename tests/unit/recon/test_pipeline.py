@@ -113,7 +113,7 @@ def test_the_report_says_what_was_done(face, shot):
     assert report.candidates[0].verdict == "chosen"
     assert report.candidates[0].box == report.face_box
     assert 1.0 < report.mean_spacing_mm < 1.5
-    assert report.r0_mm == pytest.approx(8 * report.mean_spacing_mm)
+    assert report.r0_mm == pytest.approx(14 * report.mean_spacing_mm)
     assert 0.5 < report.noise_mm < 2
     assert list(report.timings_ms) == STAGES
     assert all(value >= 0 for value in report.timings_ms.values())

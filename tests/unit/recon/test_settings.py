@@ -8,8 +8,8 @@ from recon.settings import Neighbors, Preset, Settings
 
 def test_best_is_the_default():
     assert Settings() == Settings(preset=Preset.BEST) == Settings.of("best")
-    assert Settings().r0_factor == 8
-    assert Settings().coarse_r0_factor == 14
+    assert Settings().r0_factor == 14
+    assert Settings().detail_factor == 1.6
     assert Settings().neighbors is Neighbors.LATTICE
 
 
@@ -19,7 +19,7 @@ def test_the_papers_presets_have_its_r0_and_its_trees(preset):
     assert settings.preset is preset
     assert settings.r0_factor == 6
     assert settings.neighbors is Neighbors.RANDOMIZED
-    assert settings.coarse_r0_factor is None
+    assert settings.detail_factor is None
     assert settings.ratio == 10
 
 
@@ -40,12 +40,12 @@ def test_what_is_given_wins():
     settings = Settings.of("paper", r0_factor=9, ratio=5)
     assert (settings.r0_factor, settings.ratio) == (9, 5)
     assert settings.smoothing == Settings.of("paper").smoothing
-    assert Settings(coarse_r0_factor=None).coarse_r0_factor is None
+    assert Settings(detail_factor=None).detail_factor is None
     assert Settings(preset="faithful", neighbors="exact").neighbors is Neighbors.EXACT
 
 
 @pytest.mark.parametrize("settings", [Settings(), Settings.of("paper", smoothing=2),
-                                      Settings(coarse_r0_factor=None)])
+                                      Settings(detail_factor=None)])
 def test_json_and_back(settings):
     assert Settings.model_validate_json(settings.model_dump_json()) == settings
 
@@ -69,8 +69,8 @@ def test_settings_do_not_change():
     ({"r0_factor": 0.0}, "r0_factor", "greater than or equal to 2"),
     ({"smoothing": 0}, "smoothing", "0.05"),
     ({"smoothing": float("inf")}, "smoothing", "1000"),
-    ({"coarse_r0_factor": 1}, "coarse_r0_factor", "2"),
-    ({"coarse_smoothing": -1}, "coarse_smoothing", "0.05"),
+    ({"detail_factor": 0.4}, "detail_factor", "0.5"),
+    ({"detail_factor": 11}, "detail_factor", "10"),
     ({"neighbors": "guessed"}, "neighbors", "'randomized', 'exact' or 'lattice'"),
     ({"depth_offset_mm": 11}, "depth_offset_mm", "10"),
     ({"ratio": 0}, "ratio", "1"),

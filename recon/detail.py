@@ -1,0 +1,187 @@
+"""Stage 5, `best` preset: what a broad fit smooths away, given back where it is more than noise.
+
+One smoothing for the whole face is a compromise: cheeks and forehead could bear more of it, lips
+and eyelids less. So the fit is broad, and what it leaves of the seeds is averaged around each
+place by a narrow Gaussian. Of this detail the local Wiener gain of Lee, 1980,
+doi:10.1109/TPAMI.1980.4766994, keeps what stands above noise.
+"""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from recon._image_kernels import add_between
+from recon._scatter_kernels import read_between, share_out
+from recon.rbf import Surface
+from recon.support import support_on_grid
+
+__all__ = ["DetailedSurface", "add_detail"]
+
+Image = NDArray[np.float32]
+
+# Points of the detail's grid for each spacing.
+_FINENESS = 2
+# Below this share of the usual weight lies a hole, or the rim.
+_FULL = 0.4
+# There a wider average is taken, and again of what it leaves: like a fit, that carries the slope
+# of farther seeds on into the hole. Radius in units of the narrow one's.
+_WIDER = 1.6
+_PASSES = 4
+# An average fades where the seeds within reach weigh less than this share of what is usual.
+_FADING = 0.005
+_FADING_WIDE = 0.05
+# Over what radius detail counts as local (standard deviation), and how coarsely that is told.
+_WINDOW_MM = 8.0
+_COARSER = 4
+# The smoothest part of a face shows what noise alone adds to the detail.
+_NOISE_PERCENTILE = 20
+# Variance, in squared pixels, that bilinear weights add on average.
+_BILINEAR = 1 / 6
+
+
+@dataclass(frozen=True, eq=False)
+class DetailedSurface:
+    """A fit and what is added to it: z = base + detail.
+
+    Attributes
+    ----------
+    base : the fit, mm, depth camera frame
+    detail : (3, rows, columns) float32: height, mm, and its slopes along x and y, on a grid that
+        begins at `origin`
+    origin : (x, y) of that grid's first point, mm
+    step : distance of its points, mm
+    noise : standard deviation of the seeds about the surface, mm
+    """
+
+    base: Surface
+    detail: Image
+    origin: tuple[float, float]
+    step: float
+    noise: float
+
+    def on_grid(self, xs: NDArray[np.float64], ys: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Evaluate on an axis-aligned grid: (k,), (m,) mm -> (m, k) mm."""
+        found = self.base.on_grid(xs, ys)
+        added = np.zeros(found.shape, np.float32)
+        add_between(added, self.detail[0], self._places(ys, 1), self._places(xs, 0))
+        return found + added
+
+    def sampled(
+        self, xs: NDArray[np.float64], ys: NDArray[np.float64]
+    ) -> tuple[Image, Image, Image]:
+        """Give f, df/dx, df/dy on an axis-aligned grid at once, in single precision.
+
+        As `Surface.sampled`: (k,), (m,) mm -> (m, k) each.
+        """
+        found = self.base.sampled(xs, ys)
+        rows, columns = self._places(ys, 1), self._places(xs, 0)
+        for one, added in zip(found, self.detail, strict=True):
+            add_between(one, added, rows, columns)
+        return found
+
+    def _places(self, values: NDArray[np.float64], axis: int) -> Image:
+        """Where on the detail's grid, in its points, kept inside it."""
+        places = (values - self.origin[axis]) / self.step
+        return np.clip(places, 0, self.detail.shape[2 - axis] - 1).astype(np.float32)
+
+
+def add_detail(
+    base: Surface, points: NDArray[np.float32], spacing: float, radius: float
+) -> DetailedSurface:
+    """Add to a broad fit what its seeds show besides.
+
+    Parameters
+    ----------
+    base : a fit of `points`
+    points : (n, 3) float32, mm, depth camera frame
+    spacing : mean spacing of the points, mm
+    radius : of the average (standard deviation), mm
+    """
+    step = spacing / _FINENESS
+    xs, ys, support = support_on_grid(points, spacing, step)
+    columns, rows = (((points[:, axis] - low) / step).astype(np.float32)
+                     for axis, low in ((0, xs[0]), (1, ys[0])))
+    grid = _Seeded(columns, rows, support.shape)
+    rest = points[:, 2] - grid.at_seeds(base.on_grid(xs, ys).astype(np.float32))
+    usual = np.float32(_FINENESS**-2)
+    weight = grid.spread(None, radius / step)
+    detail = grid.spread(rest, radius / step) / (weight + usual * np.float32(_FADING))
+    missing = 1 - np.minimum(weight / (usual * np.float32(_FULL)), 1)
+    missing *= missing * (3 - 2 * missing)
+    wide = cv2.resize(_extended(grid.halved(), rest, _WIDER * radius / (2 * step), 4 * usual),
+                      None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
+    detail += missing * (wide[:detail.shape[0], :detail.shape[1]] - detail)
+    detail *= _gain(detail, support, step)
+    slopes = [cv2.Sobel(detail, cv2.CV_32F, right, 1 - right, ksize=1, scale=0.5 / step,
+                        borderType=cv2.BORDER_REPLICATE) for right in (1, 0)]
+    return DetailedSurface(
+        base, np.stack([detail, *slopes]).astype(np.float32, copy=False),
+        (float(xs[0]), float(ys[0])), step, noise=float((rest - grid.at_seeds(detail)).std()))
+
+
+class _Seeded:
+    """Seeds over an image.
+
+    Parameters
+    ----------
+    columns, rows : (n,) float32, where they are, pixels, inside the image and off its last row
+        and column
+    shape : (rows, columns) of the image
+    """
+
+    def __init__(self, columns: Image, rows: Image, shape: tuple[int, ...]) -> None:
+        self.columns, self.rows, self.shape = columns, rows, shape
+
+    def halved(self) -> "_Seeded":
+        """The same over an image of which each pixel is four of these."""
+        columns, rows = ((one - np.float32(0.5)) / 2 for one in (self.columns, self.rows))
+        return _Seeded(columns, rows, ((self.shape[0] + 1) // 2, (self.shape[1] + 1) // 2))
+
+    def spread(self, values: Image | None, sigma: float) -> Image:
+        """Sum the seeds' values, or the seeds, weighted by a Gaussian."""
+        sums = np.zeros(self.shape, np.float32)
+        given = np.ones_like(self.columns) if values is None else values
+        share_out(self.columns, self.rows, given, sums)
+        # Sharing a value among four pixels blurs by as much already.
+        return _blur(sums, math.sqrt(sigma * sigma - _BILINEAR))
+
+    def at_seeds(self, image: Image) -> Image:
+        """Interpolate an image, (n,)."""
+        return read_between(image, self.columns, self.rows)
+
+
+def _extended(grid: _Seeded, rest: Image, sigma: float, usual: np.float32) -> Image:
+    """Average what the seeds show, then what that leaves of them, and so on."""
+    weight = grid.spread(None, sigma) + usual * np.float32(_FADING_WIDE)
+    total = np.zeros(grid.shape, np.float32)
+    for _ in range(_PASSES):
+        more = grid.spread(rest, sigma) / weight
+        rest = rest - grid.at_seeds(more)
+        total += more
+    return total
+
+
+def _gain(detail: Image, support: NDArray[np.bool_], step: float) -> Image:
+    """How much of the detail is not noise, 0-1, place by place."""
+    inside = support.astype(np.float32)
+    energy = detail * detail
+    energy *= inside
+    small = (-(-detail.shape[1] // _COARSER), -(-detail.shape[0] // _COARSER))
+    sigma = _WINDOW_MM / (_COARSER * step)
+    local, covered = (
+        _blur(np.asarray(cv2.resize(one, small, interpolation=cv2.INTER_AREA), np.float32), sigma)
+        for one in (energy, inside))
+    local /= np.maximum(covered, np.float32(1e-6))
+    seen = cv2.resize(inside, small, interpolation=cv2.INTER_NEAREST) > 0
+    noise = np.float32(np.percentile(local[seen], _NOISE_PERCENTILE) if seen.any() else 0)
+    gain = np.clip(1 - noise / np.maximum(local, np.float32(1e-12)), 0, 1)
+    return np.asarray(cv2.resize(gain, detail.shape[::-1], interpolation=cv2.INTER_LINEAR),
+                      np.float32)
+
+
+def _blur(image: Image, sigma: float) -> Image:
+    return np.asarray(
+        cv2.GaussianBlur(image, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT), np.float32)
