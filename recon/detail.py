@@ -137,7 +137,8 @@ class _Seeded:
 
     def halved(self) -> "_Seeded":
         """The same over an image of which each pixel is four of these."""
-        columns, rows = ((one - np.float32(0.5)) / 2 for one in (self.columns, self.rows))
+        half = np.float32(0.5)
+        columns, rows = (half * (one - half) for one in (self.columns, self.rows))
         return _Seeded(columns, rows, ((self.shape[0] + 1) // 2, (self.shape[1] + 1) // 2))
 
     def spread(self, values: Image | None, sigma: float) -> Image:

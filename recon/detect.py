@@ -1,53 +1,58 @@
 """Stage 2: the face in the colour image, by Haar cascades, confirmed by its depth."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
-from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon.errors import FaceWithoutDepthError, NoDepthError, NoFaceError
+from recon._cascades import Look, look_for_faces
+from recon._regions import Region, regions_by_depth
+from recon._relief import bulge_mm
+from recon.errors import FaceWithoutDepthError, NoFaceError
 from recon.face import Box, FaceCandidate
 from recon.registration import Registration
 
-__all__ = ["FACE_WIDTH_MM", "Detection", "detect_face", "find_boxes"]
+__all__ = ["FACE_WIDTH_MM", "Detection", "detect_face"]
 
 FACE_WIDTH_MM = (110.0, 210.0)
 """How wide a cascade's box around a face is, child to large adult, hair included."""
 
+_ORDINARY_MM = 160.0
+# What bulges less, from the middle of its box to the sides, is flat: the least of 120 simulated
+# faces has 9 mm (a hand at its cheek), the next 14; cupboards and walls up to 6.6.
+_LEAST_BULGE_MM = 7.5
+
 # Viola and Jones, 2001, doi:10.1109/CVPR.2001.990517.
 _ALT2 = "haarcascade_frontalface_alt2"
 _DEFAULT = "haarcascade_frontalface_default"
-_ALT = "haarcascade_frontalface_alt"
+_PROFILE = "haarcascade_profileface"
+# The profile cascade's box is so much wider than the frontal ones' around the same head.
+_PROFILE_WIDER = 1.09
 
-
-class _Rung(NamedTuple):
-    """One way to look for faces."""
-
-    shrink: int
-    """The image is searched at one part in so many of its width."""
-    cascade: str
-    scale_step: float = 1.1
-    min_neighbors: int = 5
-
-
-# The first rung on which depth confirms a face ends the search: most faces are found on the first,
-# the others see those that it misses (far, turned, lit from the side).
-_LADDER = (_Rung(3, _ALT2, 1.2, 3), _Rung(2, _ALT2), _Rung(1, _ALT2), _Rung(1, _DEFAULT),
-           _Rung(1, _ALT))
+# A third of the resolution for a face at 0.8 m, half of it, then whatever there is.
+_THIRD, _HALF, _FULL = 28.0, 42.0, 96.0
+_ROLLED_PX = 32.0
+_FIRST = Look(_ALT2, _THIRD, 1.2, 3)
+_SECOND = Look(_ALT2, _HALF)
+_ROLLED = tuple(Look(_ALT2, _ROLLED_PX, 1.2, 3, roll=degrees) for degrees in (-30, 30, -15, 15))
+_PROFILES = tuple(Look(_PROFILE, _HALF, mirrored=mirrored) for mirrored in (False, True))
+# The first look by which depth confirms a face ends the search: most faces are found by the first,
+# the others see those that it misses (turned, tipped, lit from the side).
+_LADDER = (_FIRST, _SECOND, *_ROLLED, *_PROFILES, Look(_DEFAULT, _HALF, 1.1, 4), Look(_ALT2, _FULL))
+# With the contrast evened out, for faces in the dark or lit aslant. The profile cascade takes the
+# back of an ear for a face there.
+_EVENED_LADDER = (_FIRST, _SECOND)
+# What stands this much nearer than the face found is searched once more, by so many looks.
+_NEARER_MM = 100.0
+_NEARER_LOOKS = (_SECOND, *_ROLLED[:2])
 # The box found small is sought again at full size, around itself and of about its own size.
-_REFINED = _Rung(1, _ALT2, 1.05, 3)
-_REFINE_AROUND = 0.3
-_REFINE_SIZES = (0.75, 1.25)
+_REFINED_STEP, _REFINED_NEIGHBORS = 1.05, 3
+_REFINE_AROUND = 0.2
+_REFINE_SIZES = (0.78, 1.2)
 # The cascades were trained on 20-24 pixel faces and gain nothing beyond this width of the image.
 _WIDEST = 640
-# A face farther away has too few depth pixels to be worth a search.
-_FARTHEST_MM = 3000.0
-_NEAREST_MM = 300.0
 # The middle of a box, where a face has depth: half of it each way.
 _MIDDLE = 0.5
 _LEAST_MIDDLE_SHARE = 0.1
@@ -59,7 +64,8 @@ class Detection:
 
     Attributes
     ----------
-    box : x, y, width, height; pixels of the colour image
+    box : x, y, width, height; pixels of the colour image; upright, about the middle of the face,
+        however the head is tipped
     depth_mm : median z, in the colour camera's frame, in the middle of the box
     candidates : every box, the chosen one first, then by depth
     """
@@ -72,122 +78,165 @@ class Detection:
 def detect_face(
     color: NDArray[np.uint8], registered: Registration, focal_px: float
 ) -> Detection:
-    """Find the nearest face whose size fits its depth.
+    """Find the nearest face whose size and shape fit its depth.
+
+    The scene is searched from the nearest layer of depth to the farthest, and no further than to
+    the first face.
 
     Parameters
     ----------
     color : (H', W', 3) uint8, RGB
-    registered : the depth tied to that image
+    registered : the depth tied to that image; every k-th pixel is enough
     focal_px : focal length of the colour camera, pixels
 
     Raises
     ------
     NoFaceError
-        Where no box was found, or none is a face's size at its depth.
+        Where no box was found, or none is a face's size and shape at its depth.
     FaceWithoutDepthError
         Where faces were seen but nothing was measured on them.
     NoDepthError
         Where nothing measured lies before the colour camera.
     """
-    smallest, largest = _box_sizes(registered, focal_px)
-    seen: list[FaceCandidate] = []
-    for gray in _grays(color):
-        to_color = color.shape[1] / gray.shape[1]
-        for rung in _LADDER:
-            boxes = _search(gray, rung, smallest / to_color, largest / to_color)
-            weighed = [_weigh(_scaled(box, to_color), registered, focal_px) for box in boxes]
-            seen += weighed
+    search = _Search(color, registered, focal_px)
+    for gray, ladder in ((search.gray, _LADDER), (None, _EVENED_LADDER)):
+        searched = search.evened() if gray is None else gray
+        for look in ladder:
+            found = search.nearest(searched, look, search.regions)
+            if found:
+                nearer = search.nearer_than(found)
+                return search.detection(*(nearer or (searched, look, found)))
+    search.anywhere()
+    raise search.failure()
+
+
+class _Search:
+    """One frame's search: the image, where to look, and what was seen."""
+
+    def __init__(
+        self, color: NDArray[np.uint8], registered: Registration, focal_px: float
+    ) -> None:
+        self.registered = registered
+        self.focal_px = focal_px
+        self.seen: list[FaceCandidate] = []
+        gray = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY)
+        shrink = min(1.0, _WIDEST / color.shape[1])
+        if shrink < 1:
+            gray = cv2.resize(gray, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
+        self.gray = np.asarray(gray, np.uint8)
+        self.to_color = color.shape[1] / gray.shape[1]
+        self.regions = regions_by_depth(registered, color.shape[:2], focal_px)
+
+    def evened(self) -> NDArray[np.uint8]:
+        """Give the image with its contrast evened out."""
+        return np.asarray(
+            cv2.createCLAHE(clipLimit=4.0, tileGridSize=(8, 8)).apply(self.gray), np.uint8)
+
+    def nearest(
+        self, gray: NDArray[np.uint8], look: Look, regions: Iterable[Region]
+    ) -> FaceCandidate | None:
+        """Give the nearest face of the nearest region that has any."""
+        for region in regions:
+            small, large = FACE_WIDTH_MM
+            ordinary = self.focal_px * _ORDINARY_MM / np.sqrt(region.near_mm * region.far_mm)
+            sizes = (self.focal_px * small / region.far_mm, self.focal_px * large / region.near_mm)
+            weighed = self._look(gray, region.part, look, ordinary, sizes)
+            self.seen += weighed
             faces = [c for c in weighed if c.verdict == "face"]
             if faces:
-                chosen = _choose(faces, seen)
-                if rung.shrink == 1:
-                    return chosen
-                refined = _weigh(
-                    _scaled(_refine(gray, _scaled(chosen.box, 1 / to_color)), to_color),
-                    registered, focal_px)
-                if refined.verdict != "face" or refined.depth_mm is None:
-                    return chosen
-                return Detection(refined.box, refined.depth_mm, (
-                    refined.model_copy(update={"verdict": "chosen"}), *chosen.candidates[1:]))
-    if not seen:
-        raise NoFaceError("no face found in the colour image")
-    if all(c.depth_mm is None for c in seen):
-        raise FaceWithoutDepthError(
-            f"face seen at {seen[0].box}, but no depth was measured on it")
-    measured = next(c for c in seen if c.depth_mm is not None)
-    raise NoFaceError(
-        f"no face found: the box at {measured.box} is {measured.width_mm:.0f} mm wide at its "
-        f"depth, a face is {FACE_WIDTH_MM[0]:.0f}-{FACE_WIDTH_MM[1]:.0f} mm")
+                return min(faces, key=_depth)
+        return None
+
+    def nearer_than(
+        self, found: FaceCandidate
+    ) -> tuple[NDArray[np.uint8], Look, FaceCandidate] | None:
+        """Look again, in other ways, at what stands well before a face."""
+        nearer = [r for r in self.regions if r.far_mm < _depth(found) - _NEARER_MM]
+        for look in _NEARER_LOOKS if nearer else ():
+            missed = self.nearest(self.gray, look, nearer)
+            if missed:
+                return self.gray, look, missed
+        return None
+
+    def detection(
+        self, gray: NDArray[np.uint8], look: Look, found: FaceCandidate
+    ) -> Detection:
+        """Give the result, with the box sought again with less rounding."""
+        x, y, w, h = _scaled(found.box, 1 / self.to_color)
+        around = round(_REFINE_AROUND * w)
+        left, top = max(x - around, 0), max(y - around, 0)
+        right, bottom = (min(far + around, side) for far, side in
+                         zip((x + w, y + h), gray.shape[::-1], strict=True))
+        part = _scaled((left, top, right - left, bottom - top), self.to_color)
+        again = look._replace(face_px=np.inf, scale_step=_REFINED_STEP,
+                              min_neighbors=_REFINED_NEIGHBORS)
+        wide = found.box[2] * (_PROFILE_WIDER if look.cascade == _PROFILE else 1.0)
+        refined = [c for c in self._look(
+            gray, part, again, wide,
+            (_REFINE_SIZES[0] * wide, _REFINE_SIZES[1] * wide)) if c.verdict == "face"]
+        chosen = max(refined, key=lambda c: c.box[2]) if refined else found
+        others = sorted((c for c in self.seen if c is not found), key=_depth)
+        candidates = (chosen.model_copy(update={"verdict": "chosen"}), *(
+            c.model_copy(update={"verdict": "farther"}) if c.verdict == "face" else c
+            for c in others))
+        return Detection(chosen.box, _depth(chosen), candidates)
+
+    def anywhere(self) -> None:
+        """Look at the whole image, so that what is no face at its depth can be named."""
+        height, width = (round(side * self.to_color) for side in self.gray.shape)
+        self.seen += self._look(self.gray, (0, 0, width, height), _FIRST,
+                                3 * _FIRST.face_px * self.to_color, (0.0, float(height)))
+
+    def failure(self) -> NoFaceError | FaceWithoutDepthError:
+        """Say why there is no face."""
+        measured = [c for c in self.seen if c.depth_mm is not None]
+        if not self.seen:
+            return NoFaceError("no face found in the colour image")
+        if not measured:
+            return FaceWithoutDepthError(
+                f"face seen at {self.seen[0].box}, but no depth was measured on it")
+        return NoFaceError(f"no face found: {_why_not(measured[-1])}")
+
+    def _look(
+        self, gray: NDArray[np.uint8], part: Box, look: Look, ordinary: float,
+        sizes: tuple[float, float],
+    ) -> list[FaceCandidate]:
+        """Look at a part of the colour image and weigh what is there."""
+        shrink = 1 / self.to_color
+        found = look_for_faces(gray, _scaled(part, shrink), look, ordinary * shrink,
+                               (sizes[0] * shrink, sizes[1] * shrink))
+        narrower = 1 / _PROFILE_WIDER if look.cascade == _PROFILE else 1.0
+        return [self._weigh(_about_middle(_scaled(box, self.to_color), narrower)) for box in found]
+
+    def _weigh(self, box: Box) -> FaceCandidate:
+        """Judge a box by the depth in it."""
+        x, y, w, h = box
+        registered = self.registered
+        u, v = registered.pixels[..., 0], registered.pixels[..., 1]
+        middle = registered.visible & (np.abs(u - (x + w / 2)) < _MIDDLE / 2 * w) & (
+            np.abs(v - (y + h / 2)) < _MIDDLE / 2 * h)
+        z = registered.color_depth[middle]
+        if len(z) < _LEAST_MIDDLE_SHARE * _expected(registered, w * h * _MIDDLE**2):
+            return FaceCandidate(box=box, depth_mm=None, width_mm=None, verdict="no depth")
+        depth = float(np.median(z))
+        width = w * depth / self.focal_px
+        verdict = "face"
+        if not FACE_WIDTH_MM[0] <= width <= FACE_WIDTH_MM[1]:
+            verdict = "not a face's size at its depth"
+        elif bulge_mm(registered, box, depth) < _LEAST_BULGE_MM:
+            verdict = "flat"
+        return FaceCandidate(box=box, depth_mm=depth, width_mm=width, verdict=verdict)
 
 
-def find_boxes(
-    gray: NDArray[np.uint8],
-    cascade: str,
-    smallest: float,
-    largest: float,
-    scale_step: float = 1.1,
-    min_neighbors: int = 5,
-) -> list[Box]:
-    """Run one cascade over a (H, W) uint8 image for boxes between two widths, pixels."""
-    widest = max(gray.shape)  # and beyond it may be more than OpenCV's integers hold
-    low, high = int(min(smallest, widest)), int(np.ceil(min(largest, widest)))
-    found = _cascade(cascade).detectMultiScale(
-        gray, scaleFactor=scale_step, minNeighbors=min_neighbors,
-        minSize=(low, low), maxSize=(high, high))
-    return [(int(x), int(y), int(w), int(h)) for x, y, w, h in found]
+def _depth(candidate: FaceCandidate) -> float:
+    return np.inf if candidate.depth_mm is None else candidate.depth_mm
 
 
-def _search(gray: NDArray[np.uint8], rung: _Rung, smallest: float, largest: float) -> list[Box]:
-    k = rung.shrink
-    if k > 1:
-        gray = np.asarray(cv2.resize(gray, None, fx=1 / k, fy=1 / k, interpolation=cv2.INTER_AREA),
-                          np.uint8)
-    found = find_boxes(gray, rung.cascade, smallest / k, largest / k, rung.scale_step,
-                       rung.min_neighbors)
-    return [_scaled(box, k) for box in found]
-
-
-def _refine(gray: NDArray[np.uint8], box: Box) -> Box:
-    """Find a box again with less rounding; the same one where it is not found again."""
-    x, y, w, h = box
-    around = round(_REFINE_AROUND * w)
-    left, top = max(x - around, 0), max(y - around, 0)
-    near = np.ascontiguousarray(gray[top:y + h + around, left:x + w + around])
-    found = _search(near, _REFINED, _REFINE_SIZES[0] * w, _REFINE_SIZES[1] * w)
-    if not found:
-        return box
-    x, y, w, h = max(found, key=lambda b: b[2])
-    return x + left, y + top, w, h
-
-
-@cache
-def _cascade(name: str) -> cv2.CascadeClassifier:
-    path = Path(cv2.__file__).parent / "data" / f"{name}.xml"
-    classifier = cv2.CascadeClassifier(str(path))
-    if classifier.empty():
-        raise RuntimeError(f"{path}: OpenCV ships no such cascade (version 5 has none)")
-    return classifier
-
-
-def _grays(color: NDArray[np.uint8]) -> Iterator[NDArray[np.uint8]]:
-    """The image as it is, then with its contrast evened out for faces in the dark or lit aslant."""
-    gray = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY)
-    scale = _WIDEST / color.shape[1]
-    if scale < 1:
-        gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    yield np.asarray(gray, np.uint8)
-    yield np.asarray(cv2.createCLAHE(clipLimit=4.0, tileGridSize=(8, 8)).apply(gray), np.uint8)
-
-
-def _box_sizes(registered: Registration, focal_px: float) -> tuple[float, float]:
-    """Bound a face's width in pixels by the depths in the scene."""
-    z = registered.color_depth[registered.color_depth > 0]
-    if not len(z):
-        raise NoDepthError("no depth lies before the colour camera: is the calibration right?")
-    nearest, farthest = (float(value) for value in np.percentile(z, (1, 99)))
-    farthest = min(farthest, _FARTHEST_MM)
-    nearest = min(max(nearest, _NEAREST_MM), farthest)
-    return focal_px * FACE_WIDTH_MM[0] / farthest, focal_px * FACE_WIDTH_MM[1] / nearest
+def _why_not(candidate: FaceCandidate) -> str:
+    if candidate.verdict == "flat":
+        return f"what the box at {candidate.box} shows is flat"
+    return (f"the box at {candidate.box} is {candidate.width_mm:.0f} mm wide at its depth, a face "
+            f"is {FACE_WIDTH_MM[0]:.0f}-{FACE_WIDTH_MM[1]:.0f} mm")
 
 
 def _scaled(box: Box, factor: float) -> Box:
@@ -195,22 +244,11 @@ def _scaled(box: Box, factor: float) -> Box:
     return x, y, w, h
 
 
-def _weigh(
-    box: Box, registered: Registration, focal_px: float
-) -> FaceCandidate:
-    """Judge a box by the depth in its middle."""
+def _about_middle(box: Box, factor: float) -> Box:
+    """The same box, wider or narrower about its middle."""
     x, y, w, h = box
-    u, v = registered.pixels[..., 0], registered.pixels[..., 1]
-    middle = registered.visible & (np.abs(u - (x + w / 2)) < _MIDDLE / 2 * w) & (
-        np.abs(v - (y + h / 2)) < _MIDDLE / 2 * h)
-    z = registered.color_depth[middle]
-    if len(z) < _LEAST_MIDDLE_SHARE * _expected(registered, w * h * _MIDDLE**2):
-        return FaceCandidate(box=box, depth_mm=None, width_mm=None, verdict="no depth")
-    depth = float(np.median(z))
-    width = w * depth / focal_px
-    fits = FACE_WIDTH_MM[0] <= width <= FACE_WIDTH_MM[1]
-    verdict = "face" if fits else "not a face's size at its depth"
-    return FaceCandidate(box=box, depth_mm=depth, width_mm=width, verdict=verdict)
+    wide, high = round(w * factor), round(h * factor)
+    return x + round((w - wide) / 2), y + round((h - high) / 2), wide, high
 
 
 def _expected(registered: Registration, color_area: float) -> float:
@@ -222,11 +260,3 @@ def _expected(registered: Registration, color_area: float) -> float:
         return color_area
     covered = max(1.0, float(np.ptp(u)) * float(np.ptp(v)))
     return color_area * min(1.0, float(height * width) / covered)
-
-
-def _choose(faces: list[FaceCandidate], seen: list[FaceCandidate]) -> Detection:
-    nearest = min(faces, key=lambda c: c.depth_mm or np.inf)
-    others = sorted((c for c in seen if c is not nearest), key=lambda c: c.depth_mm or np.inf)
-    candidates = [nearest.model_copy(update={"verdict": "chosen"})] + [
-        c.model_copy(update={"verdict": "farther"}) if c.verdict == "face" else c for c in others]
-    return Detection(nearest.box, nearest.depth_mm or 0.0, tuple(candidates))

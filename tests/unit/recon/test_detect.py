@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from capture.frame import DepthToColor
-from recon.detect import FACE_WIDTH_MM, detect_face, find_boxes
+from recon.detect import FACE_WIDTH_MM, detect_face
 from recon.errors import FaceWithoutDepthError, NoDepthError, NoFaceError
 from recon.registration import register
 from tests.simulator import Person, Scene, simulate
@@ -48,14 +48,13 @@ def test_the_face_is_found_where_the_head_is(shot):
     assert chosen.width_mm == pytest.approx(w * chosen.depth_mm / calib.color.fx)
 
 
-def test_the_nearest_of_two_wins_and_the_other_is_named(pair):
+def test_the_nearest_of_two_wins_and_nothing_behind_it_is_looked_at(pair):
     found = detected(pair.frame)
-    near, far = found.candidates
-    assert (near.verdict, far.verdict) == ("chosen", "farther")
+    near, = found.candidates
+    assert near.verdict == "chosen"
     assert near.box == found.box
     assert near.depth_mm == found.depth_mm
-    assert near.depth_mm < 830 < 1100 < far.depth_mm
-    assert near.box[0] < far.box[0]
+    assert near.depth_mm < 830
 
 
 def test_the_farther_one_is_found_when_the_nearer_has_no_depth(pair):
@@ -75,12 +74,86 @@ def test_a_picture_of_a_wrong_size_for_its_depth_is_refused(shot, millimetres, w
         detected(seen_at(shot.frame, millimetres))
 
 
-def test_a_poster_beside_a_face_is_named_and_not_chosen(pair):
+def slanted(depth, distance):
+    """A plane, at one distance in the middle, farther to the right and below."""
+    v, u = np.mgrid[:depth.shape[0], :depth.shape[1]]
+    plane = distance + 0.4 * (u - depth.shape[1] / 2) + 0.2 * (v - depth.shape[0] / 2)
+    return np.rint(plane).astype(depth.dtype)
+
+
+def test_a_photograph_of_a_faces_size_is_refused_because_it_is_flat(shot):
+    assert detected(shot.frame).depth_mm == pytest.approx(720, abs=40)
+    with pytest.raises(NoFaceError, match=r"the box at \(\d+, .* shows is flat"):
+        detected(replace(shot.frame, depth=slanted(shot.frame.depth, 720)))
+
+
+def test_a_photograph_before_a_face_is_named_and_not_chosen(pair):
     depth = pair.frame.depth.copy()
-    depth[:, 340:] = 2900  # where the farther head is
+    photograph = np.s_[:, :340]  # where the nearer head is
+    depth[photograph] = slanted(depth, 850)[photograph]
     found = detected(replace(pair.frame, depth=depth))
-    assert found.depth_mm < 830
-    assert [c.verdict for c in found.candidates] == ["chosen", "not a face's size at its depth"]
+    assert found.depth_mm > 1100
+    chosen, *others = found.candidates
+    assert chosen.verdict == "chosen"
+    assert {c.verdict for c in others} == {"flat"}
+
+
+def middle_off(found, shot):
+    """How far the box's middle is from the true face's, in widths of the box."""
+    calib = shot.frame.calibration
+    pixels = calib.color.project(calib.depth_to_color.apply(shot.truth.face_points()))
+    x, y, w, h = found.box
+    away = (x + w / 2, y + h / 2) - (pixels.min(axis=0) + pixels.max(axis=0)) / 2
+    return float(np.hypot(*away)) / w
+
+
+@pytest.mark.parametrize(("turn", "off"), [
+    ({"roll": 25.0}, 0.15), ({"roll": -35.0}, 0.15), ({"yaw": 60.0}, 0.28), ({"yaw": -60.0}, 0.28)])
+def test_a_face_tipped_aside_or_in_profile_is_found_in_its_middle(turn, off):
+    shot, = simulate(Scene((Person(distance_mm=750, **turn),)), seed=3)
+    found = detected(shot.frame)
+    assert middle_off(found, shot) < off
+    assert 130 < found.candidates[0].width_mm < 205
+    _, _, w, h = found.box
+    assert abs(w - h) <= 1
+
+
+def test_the_middle_stays_when_the_images_are_turned(shot):
+    """The same head, both images turned about the same place, off the middle of the image."""
+    known = shot.frame.calibration
+    one = known.color
+    frame = replace(shot.frame, calibration=calibration(
+        depth=known.depth, color=one, depth_to_color=DepthToColor()))
+    straight = detected(frame)
+    x, y, w, h = straight.box
+    turn = cv2.getRotationMatrix2D((x + w / 2, y + h / 2), -25, 1)
+    size = one.width, one.height
+    tipped = replace(
+        frame, color=cv2.warpAffine(frame.color, turn, size),
+        depth=cv2.warpAffine(frame.depth, turn, size, flags=cv2.INTER_NEAREST))
+    u, v, wide, high = detected(tipped).box
+    assert abs(u + wide / 2 - (x + w / 2)) < 0.1 * w
+    assert abs(v + high / 2 - (y + h / 2)) < 0.1 * w
+    assert wide == pytest.approx(w, rel=0.15)
+
+
+def test_a_nearer_face_wins_though_the_first_look_sees_only_the_farther():
+    shot, = simulate(Scene((Person(distance_mm=1150, offset_mm=(230, -30)),
+                            Person(distance_mm=700, offset_mm=(-110, 10), roll=33))), seed=1)
+    alone, = simulate(Scene((Person(distance_mm=700, offset_mm=(-110, 10), roll=33),)), seed=1)
+    found = detected(shot.frame)
+    assert found.depth_mm < 800
+    assert [c.verdict for c in found.candidates] == ["chosen", "farther"]
+    assert [c.verdict for c in detected(alone.frame).candidates] == ["chosen"]
+
+
+@pytest.mark.parametrize("nobody", [
+    Scene(()), Scene((), wall_mm=800), Scene((Person(yaw=180),)), Scene((Person(yaw=140),)),
+    Scene((Person(offset_mm=(0, -470)),))])
+def test_no_face_is_seen_where_there_is_none(nobody):
+    shot, = simulate(nobody, seed=2)
+    with pytest.raises(NoFaceError):
+        detected(shot.frame)
 
 
 def test_a_face_without_depth_is_named(shot):
@@ -112,17 +185,3 @@ def test_a_dark_picture_is_evened_out(shot):
     x, y, w, _ = detected(replace(shot.frame, color=dark)).box
     bright = detected(shot.frame).box
     assert np.hypot(x - bright[0], y - bright[1]) < 0.2 * w
-
-
-def test_boxes_keep_to_their_bounds(shot):
-    gray = cv2.cvtColor(shot.frame.color, cv2.COLOR_RGB2GRAY)
-    for smallest, largest in ((90, 140), (20, 400)):
-        boxes = find_boxes(gray, "haarcascade_frontalface_alt2", smallest, largest)
-        assert boxes
-        assert all(smallest <= w <= largest and w == h for _, _, w, h in boxes)
-    assert find_boxes(gray, "haarcascade_frontalface_alt2", 200, 300) == []
-
-
-def test_a_cascade_that_is_not_shipped_is_named(shot):
-    with pytest.raises(RuntimeError, match="nothing_at_all"):
-        find_boxes(shot.frame.color[..., 0], "nothing_at_all", 40, 80)

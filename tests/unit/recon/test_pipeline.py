@@ -227,7 +227,7 @@ def test_readings_that_drop_out_at_random(face, shot, missing):
 
 
 def test_few_seeds_are_warned_of():
-    far = simulate(Scene((Person(distance_mm=2200),)), seed=6)[0]
+    far = simulate(Scene((Person(distance_mm=1900, scale=0.88),)), seed=6)[0]
     one = reconstruct(far.frame)
     check_sound(one)
     assert len(one.initial) < 2000

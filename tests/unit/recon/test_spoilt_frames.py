@@ -99,7 +99,8 @@ def test_pieces_out_of_place(small, changes):
 def test_the_same_depth_everywhere(small, value, preset):
     frame = replace(small, depth=np.full_like(small.depth, value))
     found = outcome(frame, Settings.of(preset))
-    assert found == {0: "NoDepthError", 700: "Face"}.get(value, "NoFaceError")
+    # At 700 mm it is the size of a face, but flat: a photograph.
+    assert found == {0: "NoDepthError", 1: "FaceWithoutDepthError"}.get(value, "NoFaceError")
 
 
 @pytest.mark.parametrize("value", [0, 1, DEEPEST])

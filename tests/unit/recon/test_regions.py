@@ -1,0 +1,72 @@
+"""Where a face can be, by depth."""
+
+import numpy as np
+import pytest
+
+from recon._regions import regions_by_depth
+from recon.registration import register
+from tests.unit.frames import calibration, camera, frame
+
+SIZE = 480, 640
+FOCAL_PX = 520.0
+
+
+def regions(depth, every=1):
+    one = camera(640, 480, FOCAL_PX)
+    shown = frame(depth.astype(np.uint16), np.zeros((*SIZE, 3), np.uint8),
+                  calibration(depth=one, color=one), registered=True)
+    part = slice(None, None, every)
+    return regions_by_depth(register(shown, 0.0, part, part), SIZE, FOCAL_PX)
+
+
+@pytest.fixture
+def two():
+    """A near thing on the left, a farther one on the right, before a wall out of reach."""
+    depth = np.full(SIZE, 2600.0)
+    depth[200:320, 100:220] = 700
+    depth[150:260, 400:500] = 1300
+    return depth
+
+
+def covers(region, left, top, right, bottom):
+    x, y, w, h = region.part
+    return x <= left and y <= top and x + w >= right and y + h >= bottom
+
+
+@pytest.mark.parametrize("every", [1, 4])
+def test_the_nearest_comes_first_and_the_wall_not_at_all(two, every):
+    near, far = regions(two, every)
+    assert near.near_mm <= 700 < near.far_mm <= far.near_mm <= 1300 < far.far_mm
+    assert covers(near, 100, 200, 220, 320)
+    assert covers(far, 400, 150, 500, 260)
+
+
+def test_a_region_holds_a_face_whose_sides_are_in_the_next_layer(two):
+    near, far = regions(two)
+    around = 80 * FOCAL_PX / 1300
+    assert covers(far, 400 - around, 150 - around, 500 + around, 260 + around)
+    x, y, w, h = near.part
+    assert (x, y) >= (0, 0)
+    assert w * h < 0.3 * 640 * 480
+
+
+def test_what_is_smaller_than_a_face_is_left_out(two):
+    two[200:320, 100:220] = 2600
+    two[200:240, 100:140] = 700
+    assert [r.near_mm > 1000 for r in regions(two)] == [True]
+
+
+def test_small_gaps_do_not_cut_a_thing_in_two(two):
+    two[200:320, 155:160] = 0
+    assert len(regions(two)) == 2
+
+
+def test_each_region_lies_inside_the_image(two):
+    two[:, :60] = 400
+    two[430:, :] = 900
+    for region in regions(two):
+        x, y, w, h = region.part
+        assert x >= 0
+        assert y >= 0
+        assert x + w <= 640
+        assert y + h <= 480
