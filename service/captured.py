@@ -17,6 +17,7 @@ import structlog
 from capture import CaptureError, RgbdFrame, Source, open_source
 from capture.errors import SensorError, UnreadableSourceError
 from service.background import Background
+from service.failpoints import failpoint
 from service.link import HubLink
 from service.messages import (
     Announce,
@@ -133,6 +134,7 @@ class _Capture:
                 if self._open:
                     self._ready()
             case Take(capture_id=capture_id):
+                failpoint("capture.take.received")
                 if capture_id in self._unsafe:
                     self._send(capture_id, self._unsafe[capture_id][0])
                 elif capture_id not in self._asked:
@@ -163,6 +165,7 @@ class _Capture:
             if isinstance(error, SensorError):
                 raise
         else:
+            failpoint("capture.frame.taken")
             if frame is not None:
                 self._log.info("taken", capture_id=capture_id, skew_us=frame.skew_us)
                 self._send(capture_id, frame)
@@ -171,6 +174,7 @@ class _Capture:
         header, arrays = FrameHeader.of(frame)
         self._unsafe[capture_id] = frame, time.monotonic() + self._settings.resend_s
         self._link.send(Frame(capture_id=capture_id, frame=header), arrays)
+        failpoint("capture.frame.sent")
 
     def _send_again(self) -> None:
         """Repeat what got no answer: the hub accepts it, or says that nobody waits any more."""

@@ -141,6 +141,8 @@ class Hub:
                 if not self._roster.heartbeat(peer, holding, now):
                     yield send(peer, messages.Announce())
             case messages.Goodbye():
+                if worker := self._roster.workers.get(peer):
+                    self._jobs.handed_back(worker)
                 yield from self._gone(peer, "goodbye")
             case messages.Frame() as message:
                 yield from self._frame(peer, message, packet)

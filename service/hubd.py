@@ -14,8 +14,9 @@ from service.counters import Counters
 from service.doors import Incoming
 from service.entrance import Entrance
 from service.errors import RemoteProtocolError
+from service.failpoints import failpoint
 from service.hub import Hub
-from service.outputs import Output, Publish, send
+from service.outputs import Output, Publish, Topic, send
 from service.pressed import Pressed
 from service.refusals import Refusals
 from service.settings import ServiceSettings
@@ -26,6 +27,9 @@ from service.wire import decode_to_hub, encode
 __all__ = ["run"]
 
 _TICK_S = 0.25
+_SENT = {"take": "hub.take.sent", "frame_accepted": "hub.frame.acknowledged",
+         "press_accepted": "hub.press.acknowledged", "job": "hub.job.sent"}
+"""Failpoints after a kind of message was sent."""
 
 
 def run(settings: ServiceSettings, recon: Settings) -> int:
@@ -103,9 +107,18 @@ class _Loop:
         for output in outputs:
             parts = encode(output.packet)
             if isinstance(output, Publish):
-                self._entrance.publish(output.topic, parts)
+                self._publish(output.topic, parts)
             elif not self._entrance.send(output.peer, parts):
                 self._give_out(self._hub.unreachable(output.peer))
+            elif step := _SENT.get(output.packet.message.kind):
+                failpoint(step)
+
+    def _publish(self, topic: Topic, parts: list[bytes]) -> None:
+        if topic is Topic.FACES:
+            failpoint("hub.outcome.publishing")
+        self._entrance.publish(topic, parts)
+        if topic is Topic.FACES:
+            failpoint("hub.outcome.published")
 
 
 def _denied(incoming: Incoming, message: messages.Message, lacks: str) -> Output:

@@ -8,6 +8,7 @@ import structlog
 from recon.settings import Settings
 from service import messages
 from service.errors import StoreError
+from service.failpoints import failpoint
 from service.outputs import Output, send
 from service.roster import Roster
 from service.settings import ServiceSettings
@@ -87,6 +88,7 @@ class Intake:
 
     def frame(self, peer: bytes, message: messages.Frame, packet: Packet) -> Iterator[Output]:
         """Keep a frame, then say so: to the sensor and to all who pressed."""
+        failpoint("hub.frame.received")
         capture_id = message.capture_id
         state = self._state(capture_id)
         if advance(state, CaptureEvent.STORED) is None:

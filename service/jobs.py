@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from recon.settings import Settings
 from service import messages
 from service.errors import CorruptFileError, ProtocolError, StoreError
+from service.failpoints import failpoint
 from service.outputs import Output, send
 from service.roster import Roster, Worker
 from service.states import CaptureEvent, CaptureState, advance
@@ -120,6 +121,7 @@ class Jobs:
         self, now: float, peer: bytes, message: messages.Result, packet: Packet
     ) -> Iterator[Output]:
         """Keep and announce a face, unless this capture has its outcome."""
+        failpoint("hub.result.received")
         capture_id = message.capture_id
         if not self._expected(peer, message, CaptureEvent.RESULT):
             return
@@ -160,6 +162,13 @@ class Jobs:
         capture_id, worker.job = worker.job, None
         if capture_id and self._state(capture_id) is CaptureState.ACCEPTED:
             self._retry(capture_id, *_LOST)
+
+    def handed_back(self, worker: Worker) -> None:
+        """Take back what a worker held that was told to stop; as an attempt it does not count."""
+        capture_id, worker.job = worker.job, None
+        if capture_id and self._state(capture_id) is CaptureState.ACCEPTED:
+            self._store.take_back_attempt(capture_id)
+            self._retry(capture_id, "HandedBack", "the worker that held it was stopped")
 
     def _give(
         self, now: float, capture_id: str, stored: Stored, worker: Worker

@@ -66,7 +66,8 @@ class KeptFace:
 
 def write_kept(path: Path, about: FrameAbout | FaceAbout, packet: Packet) -> str:
     """Write a file durably and give its checksum; errors as `write_parts`."""
-    return write_parts(path, [about.model_dump_json().encode(), *encode(packet)])
+    steps = "hub.frame" if isinstance(about, FrameAbout) else "hub.face"
+    return write_parts(path, [about.model_dump_json().encode(), *encode(packet)], steps=steps)
 
 
 def read_frame(path: Path, checksum: str | None = None) -> KeptFrame:

@@ -236,7 +236,7 @@ class Heartbeat(BaseMessage):
 
 
 class Goodbye(BaseMessage):
-    """A sensor or worker leaves in order, holding nothing."""
+    """A sensor or worker leaves in order; a job that it did not answer is handed back."""
 
     kind: Literal["goodbye"] = "goodbye"
 

@@ -13,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from service.errors import CorruptFileError, DiskFullError, StoreError
+from service.failpoints import failpoint
 
 __all__ = ["read_parts", "store_error", "sync_folder", "write_atomically", "write_parts"]
 
@@ -20,12 +21,14 @@ _MAGIC = b"denseface spool 2\n"
 _DIGEST_BYTES = hashlib.sha256().digest_size
 
 
-def write_atomically(path: Path, chunks: Sequence[bytes], *, durable: bool = True,
-                     mode: int = 0o666) -> None:
+def write_atomically(
+    path: Path, chunks: Sequence[bytes], *, durable: bool = True, mode: int = 0o666,
+    steps: str = "",
+) -> None:
     """Write a file so that `path` is ever either the old contents or all of the new.
 
     With `durable`, it is on the disk, and so is its name, when this returns. `mode`, less the
-    umask, is that of the file.
+    umask, is that of the file. `steps` begins the names of this write's failpoints.
 
     Raises
     ------
@@ -39,9 +42,12 @@ def write_atomically(path: Path, chunks: Sequence[bytes], *, durable: bool = Tru
             for chunk in chunks:
                 file.write(chunk)
             file.flush()
+            failpoint(f"{steps}.written")
             if durable:
                 os.fsync(file.fileno())
+                failpoint(f"{steps}.synced")
         temporary.replace(path)
+        failpoint(f"{steps}.renamed")
     except BaseException:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
@@ -50,8 +56,8 @@ def write_atomically(path: Path, chunks: Sequence[bytes], *, durable: bool = Tru
         sync_folder(path.parent)
 
 
-def write_parts(path: Path, parts: Sequence[bytes]) -> str:
-    """Write parts durably and give their checksum, hexadecimal.
+def write_parts(path: Path, parts: Sequence[bytes], *, steps: str = "") -> str:
+    """Write parts durably and give their checksum, hexadecimal; `steps` as `write_atomically`.
 
     Raises
     ------
@@ -65,7 +71,8 @@ def write_parts(path: Path, parts: Sequence[bytes]) -> str:
     for part in parts:
         digest.update(part)
     try:
-        write_atomically(path, [_MAGIC, digest.digest(), index, *parts], mode=0o600)
+        write_atomically(
+            path, [_MAGIC, digest.digest(), index, *parts], mode=0o600, steps=steps)
     except OSError as error:
         raise store_error(path, error) from error
     return digest.hexdigest()

@@ -39,6 +39,8 @@ class CaptureEvent(StrEnum):
     """The worker went silent or stumbled; attempts remain."""
     EXHAUSTED = "exhausted"
     """As LOST, but no attempt remains; or the stored frame cannot be read."""
+    HANDED_BACK = "handed back"
+    """The worker was told to stop before it was through; counts for no attempt."""
     RESULT = "result"
     REJECTED = "rejected"
     """A worker says that no attempt would find a face."""
@@ -66,6 +68,7 @@ TRANSITIONS: dict[tuple[CaptureState, CaptureEvent], CaptureState] = {
     (_S.WORKING, _E.REJECTED): _S.FAILED,
     (_S.WORKING, _E.LOST): _S.ACCEPTED,
     (_S.WORKING, _E.EXHAUSTED): _S.DEAD,
+    (_S.WORKING, _E.HANDED_BACK): _S.ACCEPTED,
     # The outcome is withdrawn, its sequence number used up; the next one gets a new number. So
     # exactly one outcome stands for an id, the one with the highest number seen.
     (_S.DONE, _E.DAMAGED): _S.ACCEPTED,

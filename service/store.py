@@ -21,6 +21,7 @@ from service.errors import (
     HubRunningError,
     StoreError,
 )
+from service.failpoints import failpoint
 from service.kept import FaceAbout, FrameAbout, KeptFrame, read_face, read_frame, write_kept
 from service.layout import Layout
 from service.messages import CaptureFailed, DeadLetter, FaceDone, Frame, Result
@@ -109,6 +110,7 @@ class FolderStore:
             with suppress(OSError):  # at worst it is taken in at the next start
                 path.unlink(missing_ok=True)
             raise
+        failpoint("hub.frame.stored")
 
     def find(self, capture_id: str) -> Stored | None:
         """Give a capture's row."""
@@ -131,7 +133,13 @@ class FolderStore:
             capture_id)
         if not rows:
             raise StoreError(f"capture {capture_id} is not in the store")
+        failpoint("hub.attempt.counted")
         return int(rows[0]["attempts"])
+
+    def take_back_attempt(self, capture_id: str) -> None:
+        """Count an attempt no more that was not made to its end."""
+        self._database.all(
+            "UPDATE captures SET attempts = max(attempts - 1, 0) WHERE capture_id = ?", capture_id)
 
     def frame(self, capture_id: str) -> KeptFrame:
         """Give the frame back; CorruptFileError where it is damaged, which quarantines it."""
@@ -304,6 +312,7 @@ class FolderStore:
                     " finished_at, finished_age_s) VALUES (?, ?, ?, ?, ?, ?, ?)",
                     (capture_id, face_sha256, error, message, state is CaptureState.DEAD, now,
                      self._account.now()))
+        failpoint("hub.outcome.stored")
 
     def _outcome(self, which: str, *values: str | int) -> Packet | None:
         row = self._database.one(

@@ -51,6 +51,9 @@ class Store(Protocol):
     def start_attempt(self, capture_id: str) -> int:
         """Count an attempt before it is made and give its number, from 1."""
 
+    def take_back_attempt(self, capture_id: str) -> None:
+        """Count an attempt no more that was not made to its end."""
+
     def frame(self, capture_id: str) -> KeptFrame:
         """Give the frame back; CorruptFileError where it is damaged, which quarantines it."""
 

@@ -2,6 +2,7 @@
 
 import os
 import socket
+import time
 from collections.abc import Callable
 
 import cv2
@@ -10,9 +11,10 @@ import structlog
 from recon import ReconstructionError, reconstruct, warm
 from recon.face import Face
 from service.background import Background
+from service.failpoints import failpoint
 from service.link import HubLink
-from service.messages import Announce, Job, JobFailed, Result, WorkerReady
-from service.payload import FaceHeader
+from service.messages import Announce, Heartbeat, Job, JobFailed, Result, WorkerReady
+from service.payload import Arrays, FaceHeader
 from service.settings import ServiceSettings
 from service.stopping import StopSignal
 from service.wire import Packet
@@ -20,15 +22,25 @@ from service.wire import Packet
 __all__ = ["run"]
 
 
+_FINISH_S = 3.0
+"""Time for the job under way once told to stop, seconds; the supervisor kills after 5."""
+
+
 def run(settings: ServiceSettings) -> int:
-    """Work until SIGINT or SIGTERM, finish the job under way and give the exit status."""
+    """Work until SIGINT or SIGTERM and give the exit status.
+
+    The job under way is finished, or handed back to the hub where that takes too long.
+    """
     cv2.setNumThreads(1)  # one worker for each core; more threads would only fight
     with StopSignal() as stop:
         warm()
-        with Background[Face]("recon") as compute, HubLink(settings, "worker") as link:
-            worker = _Worker(settings, link, compute)
-            worker.serve(stop)
-            worker.finish()
+        with Background[Face]("recon") as compute:
+            with HubLink(settings, "worker") as link:
+                worker = _Worker(settings, link, compute)
+                worker.serve(stop)
+                worker.finish()
+            if compute:
+                os._exit(stop.exit_status)  # handed back, but its thread would go on to the end
         return stop.exit_status
 
 
@@ -55,12 +67,20 @@ class _Worker:
                                 seconds=self._compute.elapsed_s)
                 os._exit(1)
             if self._answer and self._answer():  # kept until the hub is there to take it
+                failpoint("worker.result.sent")
                 self._answer = self._job = None
                 self._credit += 1
                 self._ready()
 
     def finish(self) -> None:
-        """End the job under way and deliver it."""
+        """End the job under way and deliver it; where that takes too long, leave it."""
+        deadline = time.monotonic() + _FINISH_S
+        while not self._compute.ends_within(self._settings.heartbeat_s):
+            if time.monotonic() >= deadline:
+                self._log.warning("job handed back", capture_id=self._holding(),
+                                  seconds=round(self._compute.elapsed_s, 1))
+                return
+            self._link.send(Heartbeat(holding=self._holding()))
         if self._compute:
             self._answer = self._computed()
         if self._answer:
@@ -84,8 +104,8 @@ class _Worker:
                     return
                 self._job = job
                 self._log.info("job", capture_id=job.capture_id, attempt=job.attempt)
-                self._compute.start(
-                    lambda: reconstruct(job.frame.join(packet.arrays), job.settings))
+                failpoint("worker.job.received")
+                self._compute.start(lambda: _face_of(job, packet.arrays))
 
     def _computed(self) -> Callable[[], bool]:
         """Give what sends the answer to the present job."""
@@ -94,6 +114,7 @@ class _Worker:
             raise RuntimeError("a computation without a job ended")
         try:
             face = self._compute.take()
+            failpoint("worker.job.computed")
             report = face.report.model_copy(update={"capture_id": job.capture_id})
             header, arrays = FaceHeader.of(Face(face.initial, face.dense, report))
             result = Result(
@@ -112,3 +133,8 @@ class _Worker:
         self._log.info("face", capture_id=job.capture_id, points=report.dense_points,
                        total_ms=round(report.timings_ms.get("total", 0.0)))
         return lambda: self._link.send(result, arrays)
+
+
+def _face_of(job: Job, arrays: Arrays) -> Face:
+    failpoint("worker.job.computing")
+    return reconstruct(job.frame.join(arrays), job.settings)

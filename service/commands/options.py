@@ -151,11 +151,13 @@ def operator(args: argparse.Namespace) -> "Operator":
 
 def start_daemon(args: argparse.Namespace, name: str) -> None:
     """Do what every process of the service does first."""
+    from service import failpoints
     from service.log import configure
     from service.stopping import die_with_parent
 
     die_with_parent()
     configure(args.log, name)
+    failpoints.arm(os.environ)
 
 
 def use_one_thread() -> None:
