@@ -1,6 +1,6 @@
-"""Places where a test lets a process die, hang or find its disk full. Off unless the environment
-says otherwise; for tests alone.
+"""Places where a test lets a process die, hang or find its disk full. For tests alone.
 
+Nothing happens at any of them unless the environment asks for it.
 `DENSEFACE_FAILPOINTS` is a list with commas of `NAME=ACTION`, or `NAME=ACTION@N` for the N-th time
 alone. `DENSEFACE_FAILPOINTS_TOKENS` may name a folder: then a failpoint acts only where a file of
 its name is there, which it removes first, so it acts once, whoever starts the process again.

@@ -19,6 +19,7 @@ from service.errors import (
     DamagedDatabaseError,
     DamagedFaceError,
     HubRunningError,
+    SettingsError,
     StoreError,
 )
 from service.failpoints import failpoint
@@ -32,7 +33,7 @@ from service.states import CaptureState
 from service.stored import Stored
 from service.wire import Packet
 
-__all__ = ["FolderStore"]
+__all__ = ["FolderStore", "check_folder"]
 
 _SHOWN = 300
 """Characters of an error that a list shows."""
@@ -48,6 +49,8 @@ class FolderStore:
 
     Raises
     ------
+    SettingsError
+        Where it cannot be had.
     HubRunningError
         Where another hub has this folder open.
     StoreError
@@ -346,11 +349,24 @@ def _naming(path: Path) -> Iterator[None]:
         raise store_error(path, error) from error
 
 
+def check_folder(folder: Path) -> None:
+    """Create a data folder, or check that a hub could have it.
+
+    Raises
+    ------
+    SettingsError
+        Where it cannot be had.
+    HubRunningError
+        Where a hub has it open.
+    """
+    os.close(_lock(private_folder(folder) / "lock"))
+
+
 def _lock(path: Path) -> int:
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
     except OSError as error:
-        raise StoreError(f"{path}: {error.strerror or error}") from error
+        raise SettingsError(f"{path}: {error.strerror or error}") from error
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:

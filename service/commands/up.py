@@ -27,6 +27,7 @@ def run(args: argparse.Namespace) -> int:
     from service.addresses import check_bindable, is_local
     from service.entrance import guard
     from service.errors import AddressError
+    from service.store import check_folder
     from service.supervisor import Supervisor, processes
 
     settings = options.service_settings(args)
@@ -35,6 +36,7 @@ def run(args: argparse.Namespace) -> int:
             f"{settings.address}: the processes of `denseface up` meet at a local address; "
             f"--listen {settings.address} lets other machines in, with CURVE keys")
     check_bindable(settings.address)
+    check_folder(settings.data)  # the hub would say so too, but later, among others
     if settings.listen:
         guard(settings)  # the hub would say so too, but later
     changed = options.recon_arguments(args)

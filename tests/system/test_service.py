@@ -190,6 +190,24 @@ def test_up_with_an_unreadable_source_ends_with_one_line(tmp_path):
         assert sockets(up) == []
 
 
+@pytest.mark.parametrize("folder", ["/dev/null", "/dev/null/data", "/proc/data"])
+def test_up_with_an_impossible_data_folder_ends_at_once_with_one_line(folder, tmp_path):
+    ended = denseface("up", "--data", folder, "--address", f"ipc://{tmp_path}/hub",
+                      "--source", RECORDINGS / "frontal_700.oni")
+    assert (ended.returncode, ended.stdout) == (2, "")
+    (line,) = ended.stderr.splitlines()
+    assert line.startswith(f"denseface up: {folder}: ")
+
+
+def test_up_with_the_data_folder_of_another_ends_at_once(running, tmp_path):
+    ended = denseface("up", "--data", running.data, "--address", f"ipc://{tmp_path}/hub",
+                      "--source", RECORDINGS / "frontal_700.oni")
+    assert ended.returncode == 1
+    (line,) = ended.stderr.splitlines()
+    assert "another hub has this data folder open" in line
+    assert running.status().ready
+
+
 def test_without_a_hub_the_client_says_so(tmp_path):
     address = f"ipc://{tmp_path}/none"[:90]
     with Client(address) as client, pytest.raises(ClientTimeoutError, match="denseface up"):

@@ -239,6 +239,19 @@ def test_after_the_last_attempt_a_dead_letter(bench):
     assert len(bench.published) == 1
 
 
+def test_a_worker_that_takes_its_leave_hands_back_its_job_and_no_attempt_is_lost(bench):
+    bench.accepted("a")
+    for credit in range(5):
+        (job,) = bench.worker(credit=credit)
+        assert (job[1].kind, job[1].attempt) == ("job", 1)
+        assert bench.say(WORKER, messages.Goodbye()) == []
+    assert bench.worker(OTHER)[0][1].attempt == 1
+    bench.result(peer=OTHER)
+    assert [one.kind for one in bench.published] == ["face_done"]
+    assert bench.say(OTHER, messages.Goodbye()) == []
+    assert bench.store.find("a").attempts == 1
+
+
 def test_an_unreachable_worker_s_job_is_given_out_again(bench):
     bench.accepted("a")
     bench.worker()
