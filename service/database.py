@@ -13,6 +13,7 @@ from service.errors import DamagedDatabaseError, DiskFullError, StoreError
 __all__ = ["Database"]
 
 _VERSION = 2
+_ABSURD = 2**53
 _BUSY_S = 1.0
 """Longest wait for someone who looks into the database with a tool, seconds."""
 
@@ -58,6 +59,9 @@ class Database:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        log = path.with_name(f"{path.name}-wal")
+        self.left_open = log.exists() and log.stat().st_size > 0
+        """The last hub was killed: of its last rows, some may be lost."""
         with self._named():
             self._connection = sqlite3.connect(path, isolation_level=None, timeout=_BUSY_S)
         try:
@@ -84,8 +88,11 @@ class Database:
         if found != ["ok"]:
             reason = " ".join("; ".join(found).split())
             raise DamagedDatabaseError(f"{self.path}: {reason}"[:500])
-        for table in ("meta", "captures", "outcomes"):
-            connection.execute(f"SELECT * FROM {table} LIMIT 1")  # noqa: S608
+        last, highest = connection.execute(
+            "SELECT coalesce((SELECT seq FROM sqlite_sequence WHERE name = 'outcomes'), 0),"
+            " coalesce((SELECT max(sequence) FROM outcomes), 0)").fetchone()
+        if not highest <= last < _ABSURD:
+            raise DamagedDatabaseError(f"{self.path}: the last number is {last}, found {highest}")
         connection.execute(
             "INSERT OR IGNORE INTO meta VALUES ('epoch', ?)", (secrets.token_hex(8),))
 
@@ -139,6 +146,15 @@ class Database:
         """Keep a value by name."""
         self.all("INSERT INTO meta VALUES (?, ?)"
                  " ON CONFLICT (name) DO UPDATE SET value = excluded.value", name, value)
+
+    def jump(self, numbers: int) -> None:
+        """Leave out sequence numbers."""
+        with self.transaction() as connection:
+            connection.execute(
+                "INSERT INTO sqlite_sequence SELECT 'outcomes', 0 WHERE NOT EXISTS"
+                " (SELECT * FROM sqlite_sequence WHERE name = 'outcomes')")
+            connection.execute(
+                "UPDATE sqlite_sequence SET seq = seq + ? WHERE name = 'outcomes'", (numbers,))
 
     def truncate_log(self) -> None:
         """Empty the write-ahead log, so that what was deleted is in it no more."""

@@ -29,6 +29,7 @@ class Layout:
         self.quarantine = private_folder(root / "quarantine")
         self.database = root / "captures.sqlite3"
         self.lock = root / "lock"
+        self.ballast = root / "ballast"
         self.root = root
         sync_folder(root)
         sync_folder(root.absolute().parent)
@@ -61,7 +62,8 @@ class Layout:
 
     def unknown(self) -> Iterator[Path]:
         """Give what is not ours."""
-        ours = {self.frames, self.faces, self.quarantine, self.lock, *self.database_files()}
+        ours = {self.frames, self.faces, self.quarantine, self.lock, self.ballast,
+                *self.database_files()}
         yield from (path for path in self.root.iterdir() if path not in ours)
         for folder, name in ((self.frames, _FRAME), (self.faces, _FACE)):
             yield from (path for path in folder.iterdir() if not name.fullmatch(path.name))

@@ -15,6 +15,7 @@ from typing import TypeVar
 import structlog
 
 from service.ages import Account, Clock, stamp
+from service.ballast import Ballast
 from service.database import Database
 from service.errors import CorruptFileError, DamagedDatabaseError, StoreError
 from service.kept import KeptFace, KeptFrame, read_face, read_frame
@@ -28,7 +29,7 @@ _KeptT = TypeVar("_KeptT", KeptFrame, KeptFace)
 
 _SHOWN = 5
 _JUMP = 1000
-"""Sequence numbers left out where rows may have been lost after their outcomes were published."""
+"""Numbers left out after a kill: rows may be lost whose outcomes were published already."""
 
 _NO_SETTINGS, _NO_CHECKSUM = "0", "0" * 64
 """Of a capture whose frame cannot be read, for which there is neither."""
@@ -46,7 +47,10 @@ def recover(layout: Layout, clock: Clock) -> tuple[Database, Account, Quarantine
         path.unlink()
     database, account, quarantine = _open(layout, clock)
     try:
-        _Adoption(layout, database, account, quarantine).run()
+        ballast = Ballast(layout.ballast)
+        if database.left_open:
+            ballast.overboard(lambda: database.jump(_JUMP))
+        ballast.overboard(_Adoption(layout, database, account, quarantine).run)
         if unknown := [path.name for path in islice(layout.unknown(), _SHOWN)]:
             _log().warning("unknown files, left alone", folder=str(layout.root), files=unknown)
     except BaseException:
@@ -193,12 +197,6 @@ class _Adoption:
 
     def _write(self) -> None:
         with self._database.transaction() as database:
-            if self._known:
-                database.execute(
-                    "INSERT INTO sqlite_sequence SELECT 'outcomes', 0 WHERE NOT EXISTS"
-                    " (SELECT * FROM sqlite_sequence WHERE name = 'outcomes')")
-                database.execute(
-                    "UPDATE sqlite_sequence SET seq = seq + ? WHERE name = 'outcomes'", (_JUMP,))
             for capture_id, one in sorted(
                     self._captures.items(), key=lambda item: item[1].accepted_at):
                 database.execute(

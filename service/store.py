@@ -14,6 +14,7 @@ from typing import Self
 
 from recon.settings import Settings
 from service.ages import Clock, SystemClock, stamp
+from service.ballast import Ballast
 from service.errors import (
     CorruptFileError,
     DamagedDatabaseError,
@@ -64,6 +65,8 @@ class FolderStore:
             self._database, self._account, self._quarantine = recover(
                 self._layout, clock or SystemClock())
             self._epoch = self._database.meta("epoch") or ""
+            self._ballast = Ballast(self._layout.ballast)
+            self._ballast.take_in()
         except OSError as error:
             os.close(self._lock)
             if isinstance(error, StoreError):
@@ -254,16 +257,13 @@ class FolderStore:
 
     def remove(self, capture_ids: Sequence[str]) -> None:
         """Remove frames, faces, reports and rows, so that nothing of them can be read again."""
-        with self._database.transaction() as database:
-            for capture_id in capture_ids:
-                database.execute("DELETE FROM outcomes WHERE capture_id = ?", (capture_id,))
-                database.execute("UPDATE captures SET state = ? WHERE capture_id = ?",
-                                 (CaptureState.REMOVED, capture_id))
-        self._finish_removal(capture_ids)
+        self._ballast.overboard(lambda: self._mark_removed(capture_ids))
+        self._ballast.overboard(lambda: self._finish_removal(capture_ids))
 
     def sweep(self, retention_s: float | None) -> None:
         """Finish what `remove` began; remove what is in quarantine for longer than that."""
-        self._finish_removal(self._ids("state = ?", CaptureState.REMOVED))
+        self._ballast.overboard(lambda: self._finish_removal(
+            self._ids("state = ?", CaptureState.REMOVED)))
         self._database.set_meta("clock", self._account.save())
         if retention_s is not None and self._account.settled(retention_s):
             with _naming(self._layout.quarantine):
@@ -276,6 +276,13 @@ class FolderStore:
 
     def _removed(self, capture_id: str) -> list[str]:
         return self._ids("state = ? AND capture_id = ?", CaptureState.REMOVED, capture_id)
+
+    def _mark_removed(self, capture_ids: Sequence[str]) -> None:
+        with self._database.transaction() as database:
+            for capture_id in capture_ids:
+                database.execute("DELETE FROM outcomes WHERE capture_id = ?", (capture_id,))
+                database.execute("UPDATE captures SET state = ? WHERE capture_id = ?",
+                                 (CaptureState.REMOVED, capture_id))
 
     def _finish_removal(self, capture_ids: Sequence[str]) -> None:
         """Remove the files, then the rows: a row of a file that is gone says so in its state."""

@@ -1,19 +1,22 @@
 """Any order of events: what was accepted ends once, nothing appears that was not pressed.
 
-An operator who purges, retries and drops, the retention, damaged files and a damaged database are
-among the events.
+An operator who purges, retries and drops, the retention, damaged files and a damaged database, a
+full disk and a hub that is killed between two steps are among the events.
 """
 
 import shutil
 import tempfile
 from pathlib import Path
+from unittest.mock import patch
 
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
+import service.store
 from recon.settings import Settings
 from service import messages
+from service.errors import DiskFullError
 from service.hub import Hub, settings_hash
 from service.outputs import Publish, Topic
 from service.settings import ServiceSettings
@@ -32,14 +35,51 @@ ids = st.sampled_from("abcd")
 workers = st.sampled_from([b"w1", b"w2"])
 
 
+class _KilledError(BaseException):
+    """The hub ends here."""
+
+
+class _Store(FolderStore):
+    """Has no room where it is told so."""
+
+    full = False
+
+    def _room(self):
+        if self.full:
+            raise DiskFullError("no room on the disk")
+
+    def accept(self, *arguments):
+        self._room()
+        super().accept(*arguments)
+
+    def start_attempt(self, capture_id):
+        self._room()
+        return super().start_attempt(capture_id)
+
+    def finish(self, result):
+        self._room()
+        super().finish(result)
+
+    def fail(self, *arguments, **more):
+        self._room()
+        super().fail(*arguments, **more)
+
+
 class AnyOrder(RuleBasedStateMachine):
     """A hub between a sensor, two workers and a client that all misbehave."""
 
     @initialize()
     def start(self):
+        self.dies_after: str | None = None
+        self.killed = False
+        self.patches = [
+            patch(f"service.store.{name}", self.last_step(name, getattr(service.store, name)))
+            for name in ("write_kept", "sync_folder")]
+        for one in self.patches:
+            one.start()
         self.folder = Path(tempfile.mkdtemp(dir=_MEMORY if _MEMORY.is_dir() else None))
         self.clock = FakeClock()
-        self.store = FolderStore(self.folder / "data", self.clock)
+        self.store = _Store(self.folder / "data", self.clock)
         self.now = 0.0
         self.credit = 0
         self.pressed, self.taken, self.accepted = set(), set(), set()
@@ -51,6 +91,8 @@ class AnyOrder(RuleBasedStateMachine):
         if not hasattr(self, "store"):
             return
         try:
+            self.dies_after = None
+            self.store.full = False
             self.jobs.clear()  # those workers died; two good ones finish
             self.work()
             self.read_all()  # finds what is damaged
@@ -58,6 +100,8 @@ class AnyOrder(RuleBasedStateMachine):
             assert sorted(self.read_all()) == sorted(self.accepted)
             self.ids_are_known()
         finally:
+            for one in self.patches:
+                one.stop()
             self.store.__exit__()
             shutil.rmtree(self.folder)
 
@@ -99,8 +143,19 @@ class AnyOrder(RuleBasedStateMachine):
         return {"capture_id": job.capture_id, "settings_hash": job.settings_hash,
                 "frame_sha256": job.frame_sha256}
 
+    def last_step(self, name, step):
+        def done(*arguments):
+            result = step(*arguments)
+            if self.dies_after == name:
+                raise _KilledError
+            return result
+        return done
+
     def say(self, peer, message, arrays=None):
-        self.give(self.hub.receive(self.now, peer, Packet(message, arrays or {})))
+        try:
+            self.give(self.hub.receive(self.now, peer, Packet(message, arrays or {})))
+        except _KilledError:
+            self.kill()
 
     @rule()
     def restart(self):
@@ -110,7 +165,13 @@ class AnyOrder(RuleBasedStateMachine):
     def pass_time(self, seconds):
         self.now += seconds
         self.clock.pass_time(seconds)
-        self.give(self.hub.tick(self.now))
+        self.tick()
+
+    def tick(self):
+        try:
+            self.give(self.hub.tick(self.now))
+        except _KilledError:
+            self.kill()
 
     @rule()
     def sensor(self):
@@ -182,13 +243,21 @@ class AnyOrder(RuleBasedStateMachine):
             self.clock.pass_time(3700.0)
             self.now += 3700.0
             for _ in range(3):
-                self.give(self.hub.tick(self.now))
+                self.tick()
                 self.now += 600.0
         self.accepted &= set(self.store.unfinished())
-        assert self.store.last_sequence() == 0 or not self.store.outcome_after(0)
+        assert not self.store.outcome_after(0)
 
     def operate(self, message):
-        outputs = self.hub.receive(self.now, b"o", Packet(message))
+        self.killed = False
+        return self.answer(message)
+
+    def answer(self, message):
+        try:
+            outputs = self.hub.receive(self.now, b"o", Packet(message))
+        except _KilledError:
+            self.kill()
+            return self.answer(message)
         answers = [one.packet.message for one in outputs if getattr(one, "peer", None) == b"o"]
         self.give(outputs)
         (answer,) = answers
@@ -197,7 +266,8 @@ class AnyOrder(RuleBasedStateMachine):
     @rule(capture_id=ids)
     def purge(self, capture_id):
         answer = self.operate(messages.Purge(request=1, capture_id=capture_id))
-        assert answer.removed == (capture_id in self.accepted)
+        assert self.killed or answer.removed == (capture_id in self.accepted)
+        self.tick()
         self.accepted.discard(capture_id)
         self.taken.discard(capture_id)
         assert not list((self.folder / "data").rglob(f"*{capture_id}.*f*"))
@@ -205,10 +275,12 @@ class AnyOrder(RuleBasedStateMachine):
     @rule()
     def purge_all(self):
         answer = self.operate(messages.Purge(request=1, everything=True))
-        assert (answer.removed, answer.left) == (len(self.accepted), False)
+        assert self.killed or (answer.removed, answer.left) == (len(self.accepted), False)
+        self.tick()
         self.accepted.clear()
         self.taken.clear()
-        assert not [path for path in (self.folder / "data").rglob("*/*") if path.is_file()]
+        assert not [path for folder in ("frames", "faces", "quarantine")
+                    for path in (self.folder / "data" / folder).iterdir()]
 
     @rule(drop=st.booleans())
     def dead_letter(self, drop):
@@ -218,7 +290,7 @@ class AnyOrder(RuleBasedStateMachine):
             if drop:
                 answer = self.operate(
                     messages.DropDead(request=1, capture_id=letter.capture_id))
-                assert answer.removed == 1
+                assert self.killed or answer.removed == 1
                 self.accepted.discard(letter.capture_id)
             else:
                 self.operate(messages.RetryDead(request=1, capture_id=letter.capture_id))
@@ -237,12 +309,23 @@ class AnyOrder(RuleBasedStateMachine):
         content[data.draw(st.integers(0, len(content) - 1))] ^= 1
         path.write_bytes(content)
 
+    @rule(full=st.booleans())
+    def disk(self, full):
+        self.store.full = full
+
+    @rule(step=st.sampled_from(["write_kept", "sync_folder", None]))
+    def will_die(self, step):
+        self.dies_after = step
+
     @rule()
     def kill(self):
+        self.dies_after = None
+        self.killed = True
         self.store.__exit__()
-        self.store = FolderStore(self.folder / "data", self.clock)
+        self.store = _Store(self.folder / "data", self.clock)
         self.restart()
-        self.ids_are_known()
+        # What was safe and not yet acknowledged may be there.
+        self.accepted |= self.rows() & self.taken
 
     @rule(damage=st.sampled_from(["gone", "empty", "cut", "garbage"]))
     def damage_the_database(self, damage):
@@ -260,17 +343,19 @@ class AnyOrder(RuleBasedStateMachine):
                 path.write_bytes(content[:5000] + b"\xff" * 4000 + content[9000:])
         known = {path.name.partition(".")[0] for folder in ("frames", "faces")
                  for path in (self.folder / "data" / folder).iterdir()}
-        self.store = FolderStore(self.folder / "data", self.clock)
+        self.store = _Store(self.folder / "data", self.clock)
         self.restart()
         self.published.clear()  # another epoch
         self.accepted &= known  # a dead letter whose frame is gone is known to the rows alone
         self.ids_are_known()
 
+    def rows(self):
+        return {capture_id for capture_id in "abcd" if self.store.find(capture_id)}
+
     @invariant()
     def ids_are_known(self):
         """What was accepted is there; what is there was accepted."""
-        rows = {capture_id for capture_id in "abcd" if self.store.find(capture_id)}
-        assert rows == self.accepted
+        assert self.rows() == self.accepted
 
     @invariant()
     def numbers_only_rise(self):

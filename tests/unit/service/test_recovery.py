@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import sqlite3
 
 import pytest
@@ -96,6 +97,30 @@ def test_a_database_with_a_flipped_bit_is_read_or_made_again(data):
         path.write_bytes(content)
 
 
+def test_a_log_with_a_flipped_bit_loses_nothing_that_was_accepted(data, tmp_path):
+    killed = tmp_path / "killed"
+    with FolderStore(data, FakeClock()) as store:
+        last = store.last_sequence()
+        for name in ("x", "y"):
+            store.accept(frame(name), Settings(), "0f")
+        store.finish(result("x", store))
+        shutil.copytree(data, killed)
+    log = killed / "captures.sqlite3-wal"
+    size = log.stat().st_size
+    assert size > 10_000
+    for position in range(0, size, 997):
+        again = tmp_path / str(position)
+        shutil.copytree(killed, again)
+        _flip(again / log.name, position)
+        with FolderStore(again, FakeClock()) as store:
+            assert store.find("x").state is CaptureState.DONE
+            assert store.find("y").state is CaptureState.ACCEPTED
+            assert store.outcome("x").message.sequence > last
+            store.finish(result("y", store))
+            assert store.outcome("y").message.sequence > last + 1
+        shutil.rmtree(again)
+
+
 def test_what_was_kept_is_as_old_after_a_rebuild(data):
     clock = FakeClock()
     clock.pass_time(DAY - 10)
@@ -109,13 +134,10 @@ def test_what_was_kept_is_as_old_after_a_rebuild(data):
 
 
 def test_a_frame_without_a_row_is_taken_in(data):
-    with FolderStore(data, FakeClock()) as store:
-        last = store.last_sequence()
     _forget(data, "waits")
     with FolderStore(data, FakeClock()) as store:
         assert states(store)["waits"] is CaptureState.ACCEPTED
         store.finish(result("waits", store))
-        assert store.outcome("waits").message.sequence > last + 1
 
 
 def test_a_face_without_a_row_is_taken_in(data):
@@ -268,6 +290,22 @@ def test_a_full_database_leaves_no_frame(data):
         assert store.find("waits").state is CaptureState.ACCEPTED
 
 
+def test_a_purge_makes_room_on_a_full_disk(data, monkeypatch):
+    with FolderStore(data, FakeClock()) as store:
+        real = store._mark_removed
+
+        def full(capture_ids):
+            if (data / "ballast").exists():
+                raise DiskFullError("no room on the disk")
+            real(capture_ids)
+
+        monkeypatch.setattr(store, "_mark_removed", full)
+        assert (data / "ballast").stat().st_size == 2**20
+        store.remove(["waits"])
+        assert store.find("waits") is None
+        assert (data / "ballast").stat().st_size == 2**20
+
+
 def test_damage_while_serving_ends_the_hub(data):
     with FolderStore(data, FakeClock()) as store:
         store._database.truncate_log()
@@ -285,7 +323,7 @@ def _forget(data, capture_id):
     database.close()
 
 
-def _flip(path):
+def _flip(path, position=None):
     content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
+    content[len(content) // 2 if position is None else position] ^= 1
     path.write_bytes(content)
