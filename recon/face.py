@@ -1,11 +1,11 @@
 """The result: initial cloud, dense cloud, report."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, FailFast
 
 from recon.settings import Settings
 
@@ -97,7 +97,8 @@ class Report(_Model):
     capture_id: str = ""
     face_box: Box
     """x, y, width, height; pixels of the colour image."""
-    candidates: tuple[FaceCandidate, ...]
+    # One complaint is enough: a thousand bytes of memory for each of a hundred thousand is not.
+    candidates: Annotated[tuple[FaceCandidate, ...], FailFast()]
     """Every box the detector gave, the chosen one first."""
     initial_points: int
     dense_points: int
@@ -113,7 +114,7 @@ class Report(_Model):
     skew_us: int
     """Depth time stamp less colour time stamp, microseconds."""
     version: str
-    warnings: tuple[str, ...] = ()
+    warnings: Annotated[tuple[str, ...], FailFast()] = ()
 
 
 @dataclass(frozen=True, eq=False)

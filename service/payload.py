@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, FailFast, Field, model_validator
 
 from capture import Calibration, CaptureError, RgbdFrame
 from recon.face import DenseCloud, Face, PointCloud, Report
@@ -49,7 +49,7 @@ class ArrayInfo(_Model):
 
 
 class _PayloadHeader(_Model):
-    arrays: Annotated[tuple[ArrayInfo, ...], Field(max_length=16)] = ()
+    arrays: Annotated[tuple[ArrayInfo, ...], Field(max_length=16), FailFast()] = ()
     """The buffers that follow, in order; filled in from `layout` where not given."""
 
     def layout(self) -> tuple[ArrayInfo, ...]:

@@ -16,9 +16,12 @@ from service.errors import LocalProtocolError, RemoteProtocolError
 from service.messages import FromHub, Message, ToHub
 from service.payload import Arrays
 
-__all__ = ["MAX_HEADER_BYTES", "MAX_PARTS", "Packet", "decode_from_hub", "decode_to_hub", "encode"]
+__all__ = ["MAX_HEADER_BYTES", "MAX_HEADER_BYTES_TO_HUB", "MAX_PARTS", "Packet", "decode_from_hub",
+           "decode_to_hub", "encode"]
 
 MAX_HEADER_BYTES = 256 * 1024
+MAX_HEADER_BYTES_TO_HUB = 64 * 1024
+"""Smaller, for what the hub takes it must be able to write again: `1e15` becomes eighteen bytes."""
 MAX_PARTS = 1 + 16
 
 _TO_HUB: TypeAdapter[ToHub] = TypeAdapter(Annotated[ToHub, Field(discriminator="kind")])
@@ -73,24 +76,24 @@ def decode_to_hub(parts: Sequence[bytes]) -> Packet:
     RemoteProtocolError
         Where a limit, a field, a dtype, a shape or a size is not as it must be.
     """
-    return _decode(parts, _TO_HUB)
+    return _decode(parts, _TO_HUB, MAX_HEADER_BYTES_TO_HUB)
 
 
 def decode_from_hub(parts: Sequence[bytes]) -> Packet:
     """Read a message that only the hub may send; otherwise as `decode_to_hub`."""
-    return _decode(parts, _FROM_HUB)
+    return _decode(parts, _FROM_HUB, MAX_HEADER_BYTES)
 
 
 def _decode(
-    parts: Sequence[bytes], adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub]
+    parts: Sequence[bytes], adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub], most: int
 ) -> Packet:
     if not 1 <= len(parts) <= MAX_PARTS:
         raise RemoteProtocolError(f"message has {len(parts)} parts, 1 to {MAX_PARTS} expected",
                                   "oversized" if parts else "truncated")
     header, *buffers = parts
-    if len(header) > MAX_HEADER_BYTES:
+    if len(header) > most:
         raise RemoteProtocolError(
-            f"header has {len(header)} bytes, at most {MAX_HEADER_BYTES} allowed", "oversized")
+            f"header has {len(header)} bytes, at most {most} allowed", "oversized")
     message = _header(header, adapter)
     infos = message.payload.arrays if message.payload else ()
     if len(buffers) != len(infos):
@@ -114,7 +117,13 @@ def _header(header: bytes, adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub]) -
         first = error.errors(include_url=False, include_input=False, include_context=False)[0]
         where = ".".join(str(part) for part in first["loc"]) or "header"
         reason = "version" if first["loc"][-1:] == ("version",) else "malformed"
-        raise RemoteProtocolError(f"{where}: {first['msg']}"[:500], reason) from error
+        raise RemoteProtocolError(
+            _printable(f"{where}: {first['msg']}"[:500]), reason) from error
     if "version" not in message.model_fields_set:
         raise RemoteProtocolError(f"{message.kind}: no version given", "version")
     return message
+
+
+def _printable(text: str) -> str:
+    """Escape what could forge a line of a log or command a terminal: the sender chose part of it."""
+    return "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)

@@ -1,0 +1,1 @@
+"""Inputs that nobody sends by mistake: valid messages, broken in ways that know their structure."""

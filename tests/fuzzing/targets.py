@@ -1,0 +1,89 @@
+"""What must hold of every input, and what each cost."""
+
+import resource
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from service.errors import LocalProtocolError, ProtocolError
+from service.wire import Packet, decode_from_hub, decode_to_hub, encode
+from tests.fuzzing.corpus import Parts
+
+__all__ = ["DECODERS", "Cost", "Unexpected", "check"]
+
+Decoder = Callable[[Parts], Packet]
+DECODERS: tuple[Decoder, ...] = (decode_to_hub, decode_from_hub)
+
+_LONGEST_REASON = 1000
+
+
+class Unexpected(Exception):
+    """A decoder did what it must not."""
+
+
+def check(decode: Decoder, parts: Parts) -> bool:
+    """Decode an input; True where it is a message.
+
+    Raises
+    ------
+    Unexpected
+        Where the reason of a refusal is not one line, or what was read cannot be passed on.
+    Exception
+        Whatever escapes the decoder besides ProtocolError.
+    """
+    try:
+        packet = decode(parts)
+    except ProtocolError as error:
+        reason = str(error)
+        if not reason.isprintable() or len(reason) > _LONGEST_REASON:
+            raise Unexpected(f"the reason is not one short line: {reason!r}") from error
+        return False
+    try:
+        again = decode_from_hub(encode(packet)) if decode is decode_from_hub else _kept(packet)
+    except LocalProtocolError as error:
+        raise Unexpected(f"what was read cannot be passed on: {error}") from error
+    if again.message != packet.message or any(
+            again.arrays[name].tobytes() != array.tobytes()
+            for name, array in packet.arrays.items()):
+        raise Unexpected(f"what is passed on is not what was read: {packet.message!r}")
+    try:
+        if payload := packet.message.payload:
+            payload.join(packet.arrays)
+    except ProtocolError:
+        pass
+    return True
+
+
+def _kept(packet: Packet) -> Packet:
+    """Give what the hub makes of a message that it keeps: the file holds it as it was sent."""
+    return decode_to_hub(encode(packet))
+
+
+@dataclass
+class Cost:
+    """What the inputs of a run cost."""
+
+    inputs: int = 0
+    messages: int = 0
+    """Inputs that a decoder took for a message."""
+    slowest_s: float = 0.0
+    """Processor time of one input through both decoders."""
+    slowest: bytes = b""
+    grown_bytes: int = 0
+    """The most that the process grew in one input."""
+
+    def run(self, parts: Parts) -> None:
+        """Check one input with every decoder; raises as `check`."""
+        size = _peak_bytes()
+        start = time.thread_time()
+        found = [check(decode, parts) for decode in DECODERS]
+        took = time.thread_time() - start
+        self.inputs += 1
+        self.messages += any(found)
+        if took > self.slowest_s:
+            self.slowest_s, self.slowest = took, b" ".join(parts)
+        self.grown_bytes = max(self.grown_bytes, _peak_bytes() - size)
+
+
+def _peak_bytes() -> int:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
