@@ -97,7 +97,7 @@ class Report(_Model):
     capture_id: str = ""
     face_box: Box
     """x, y, width, height; pixels of the colour image."""
-    # One complaint is enough: a thousand bytes of memory for each of a hundred thousand is not.
+    # Of a face from elsewhere: one complaint is enough, each costs a thousand bytes.
     candidates: Annotated[tuple[FaceCandidate, ...], FailFast()]
     """Every box the detector gave, the chosen one first."""
     initial_points: int

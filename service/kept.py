@@ -14,7 +14,7 @@ from service.errors import CorruptFileError, ProtocolError
 from service.messages import Frame, Result
 from service.payload import Arrays
 from service.spool import read_parts, write_parts
-from service.wire import Packet, decode_to_hub, encode
+from service.wire import Packet, decode_kept, encode
 
 __all__ = ["FaceAbout", "FrameAbout", "KeptFace", "KeptFrame", "read_face", "read_frame",
            "write_kept"]
@@ -99,7 +99,7 @@ def _read(path: Path, checksum: str | None, kind: type[_A]) -> tuple[Packet, _A,
     parts, found = read_parts(path, checksum)
     try:
         about = kind.model_validate_json(parts[0] if parts else b"")
-        return decode_to_hub(parts[1:]), about, found
+        return decode_kept(parts[1:]), about, found
     except (ProtocolError, ValidationError) as error:
         # Whole, so written by another version.
         raise CorruptFileError(f"{path}: {error}") from error

@@ -2,17 +2,19 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, FailFast, Field
 
 from service.payload import Payload
 
-__all__ = ["BaseAnswer", "BaseMessage", "BaseRequest", "CaptureId", "Digest", "Name", "Number",
-           "Seconds", "Text", "Token"]
+__all__ = ["BaseAnswer", "BaseMessage", "BaseRequest", "CaptureId", "Digest", "Name", "Names",
+           "Number", "Seconds", "Text", "Token"]
 
 CaptureId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
 """Chosen by whoever pressed; also part of file names, hence no dots and no slashes."""
 
 Name = Annotated[str, Field(max_length=200)]
+Names = Annotated[tuple[Name, ...], FailFast()]
+"""One complaint is enough: each of a hundred thousand would cost a thousand bytes of memory."""
 Text = Annotated[str, Field(max_length=4000)]
 Token = Annotated[str, Field(pattern=r"^[0-9a-f]{1,64}$")]
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]

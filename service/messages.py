@@ -15,6 +15,7 @@ from service.message_base import (
     CaptureId,
     Digest,
     Name,
+    Names,
     Number,
     Seconds,
     Text,
@@ -190,8 +191,8 @@ class Status(BaseAnswer):
     sequence: Number
     """Of the last outcome."""
     hub_version: Name
-    sensors: tuple[Name, ...]
-    workers: tuple[Name, ...]
+    sensors: Names
+    workers: Names
     pressed: Number
     """Presses that wait for their frame."""
     queued: Number

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AwareDatetime, BaseModel, ConfigDict, FailFast, Field, model_validator
 
 from service.message_base import BaseAnswer, BaseRequest, CaptureId, Name, Number
 
@@ -67,7 +67,7 @@ class DeadLetters(BaseAnswer):
     """The answer to `ListDead`."""
 
     kind: Literal["dead_letters"] = "dead_letters"
-    letters: Annotated[tuple[DeadLetter, ...], Field(max_length=50)]
+    letters: Annotated[tuple[DeadLetter, ...], Field(max_length=50), FailFast()]
     """None where there are no more."""
 
 

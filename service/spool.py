@@ -19,6 +19,8 @@ __all__ = ["read_parts", "store_error", "sync_folder", "write_atomically", "writ
 
 _MAGIC = b"denseface spool 2\n"
 _DIGEST_BYTES = hashlib.sha256().digest_size
+_MOST_BYTES = 128 * 2**20
+"""Of a file that is read: more than any message."""
 
 
 def write_atomically(
@@ -93,24 +95,41 @@ def read_parts(path: Path, checksum: str | None = None) -> tuple[list[bytes], st
         Where this process may not read it, or has no means to.
     """
     try:
-        data = memoryview(path.read_bytes())
+        with path.open("rb") as file:
+            data = memoryview(file.read(_MOST_BYTES + 1))
     except OSError as error:
         lost = error.errno in (errno.ENOENT, errno.EIO, errno.EISDIR)
         raise (CorruptFileError if lost else StoreError)(
             f"{path}: {error.strerror or error}") from error
+    if len(data) > _MOST_BYTES:
+        raise CorruptFileError(f"{path}: has more than {_MOST_BYTES} bytes")
     start = len(_MAGIC) + _DIGEST_BYTES
     found = hashlib.sha256(data[start:]).hexdigest()
     stated = bytes(data[len(_MAGIC):start]).hex()
     if data[:len(_MAGIC)] != _MAGIC or found != stated or found != (checksum or found):
         raise CorruptFileError(
             f"{path}: contents do not have the checksum {(checksum or stated)[:12]}...")
-    (count,) = struct.unpack_from("<I", data, start)
-    lengths = struct.unpack_from(f"<{count}Q", data, start + 4)
-    parts, start = [], start + 4 + 8 * count
+    parts = _split(data[start:])
+    if parts is None:
+        raise CorruptFileError(f"{path}: its parts are not those that its index names")
+    return parts, found
+
+
+def _split(data: memoryview) -> list[bytes] | None:
+    """Give the parts behind their index; None where they do not fill the data exactly."""
+    try:
+        (count,) = struct.unpack_from("<I", data)
+        lengths = struct.unpack_from(f"<{count}Q", data, 4)
+    except struct.error:
+        return None
+    start = 4 + 8 * count
+    if start + sum(lengths) != len(data):
+        return None
+    parts = []
     for length in lengths:
         parts.append(bytes(data[start:start + length]))
         start += length
-    return parts, found
+    return parts
 
 
 def store_error(path: Path, error: OSError) -> StoreError:

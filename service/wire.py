@@ -17,11 +17,11 @@ from service.messages import FromHub, Message, ToHub
 from service.payload import Arrays
 
 __all__ = ["MAX_HEADER_BYTES", "MAX_HEADER_BYTES_TO_HUB", "MAX_PARTS", "Packet", "decode_from_hub",
-           "decode_to_hub", "encode"]
+           "decode_kept", "decode_to_hub", "encode"]
 
 MAX_HEADER_BYTES = 256 * 1024
 MAX_HEADER_BYTES_TO_HUB = 64 * 1024
-"""Smaller, for what the hub takes it must be able to write again: `1e15` becomes eighteen bytes."""
+"""A quarter: what the hub takes it must be able to write, and `1e15` is written with 18 bytes."""
 MAX_PARTS = 1 + 16
 
 _TO_HUB: TypeAdapter[ToHub] = TypeAdapter(Annotated[ToHub, Field(discriminator="kind")])
@@ -79,6 +79,11 @@ def decode_to_hub(parts: Sequence[bytes]) -> Packet:
     return _decode(parts, _TO_HUB, MAX_HEADER_BYTES_TO_HUB)
 
 
+def decode_kept(parts: Sequence[bytes]) -> Packet:
+    """Read again what `encode` wrote of a message that the hub received; as `decode_to_hub`."""
+    return _decode(parts, _TO_HUB, MAX_HEADER_BYTES)
+
+
 def decode_from_hub(parts: Sequence[bytes]) -> Packet:
     """Read a message that only the hub may send; otherwise as `decode_to_hub`."""
     return _decode(parts, _FROM_HUB, MAX_HEADER_BYTES)
@@ -125,5 +130,5 @@ def _header(header: bytes, adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub]) -
 
 
 def _printable(text: str) -> str:
-    """Escape what could forge a line of a log or command a terminal: the sender chose part of it."""
+    """Escape what could forge a line of a log or command a terminal."""
     return "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)

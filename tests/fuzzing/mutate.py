@@ -108,9 +108,10 @@ def _another_size(rng: Random, tree: Any, corpus: Sequence[Parts]) -> bytes:
     if isinstance(face, dict):
         face[rng.choice(("initial_points", "dense_points"))] = size
         face.pop("arrays", None)
-    if isinstance(frame, dict):
-        camera = frame.get("calibration", {}).get(rng.choice(("depth", "color")), {})
-        camera |= {"width": size, "height": rng.choice((1, size)), "cx": 0.0, "cy": 0.0}
+    if isinstance(frame, dict) and isinstance(frame.get("calibration"), dict):
+        frame["calibration"][rng.choice(("depth", "color"))] = {
+            "width": size, "height": rng.choice((1, size)), "fx": 9.0, "fy": 9.0, "cx": 0.0,
+            "cy": 0.0}
         frame.pop("arrays", None)
     return b""
 

@@ -5,19 +5,21 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from service.errors import LocalProtocolError, ProtocolError
-from service.wire import Packet, decode_from_hub, decode_to_hub, encode
+from service.errors import ProtocolError
+from service.wire import Packet, decode_from_hub, decode_kept, decode_to_hub, encode
 from tests.fuzzing.corpus import Parts
 
-__all__ = ["DECODERS", "Cost", "Unexpected", "check"]
+__all__ = ["DECODERS", "Cost", "UnexpectedError", "check"]
 
 Decoder = Callable[[Parts], Packet]
 DECODERS: tuple[Decoder, ...] = (decode_to_hub, decode_from_hub)
 
+_AGAIN = {decode_to_hub: decode_kept, decode_from_hub: decode_from_hub}
+"""How each end reads what it took before: the hub its files, others nothing else."""
 _LONGEST_REASON = 1000
 
 
-class Unexpected(Exception):
+class UnexpectedError(Exception):
     """A decoder did what it must not."""
 
 
@@ -26,7 +28,7 @@ def check(decode: Decoder, parts: Parts) -> bool:
 
     Raises
     ------
-    Unexpected
+    UnexpectedError
         Where the reason of a refusal is not one line, or what was read cannot be passed on.
     Exception
         Whatever escapes the decoder besides ProtocolError.
@@ -36,27 +38,22 @@ def check(decode: Decoder, parts: Parts) -> bool:
     except ProtocolError as error:
         reason = str(error)
         if not reason.isprintable() or len(reason) > _LONGEST_REASON:
-            raise Unexpected(f"the reason is not one short line: {reason!r}") from error
+            raise UnexpectedError(f"the reason is not one short line: {reason!r}") from error
         return False
     try:
-        again = decode_from_hub(encode(packet)) if decode is decode_from_hub else _kept(packet)
-    except LocalProtocolError as error:
-        raise Unexpected(f"what was read cannot be passed on: {error}") from error
+        again = _AGAIN[decode](encode(packet))
+    except ProtocolError as error:
+        raise UnexpectedError(f"what was read cannot be passed on: {error}") from error
     if again.message != packet.message or any(
             again.arrays[name].tobytes() != array.tobytes()
             for name, array in packet.arrays.items()):
-        raise Unexpected(f"what is passed on is not what was read: {packet.message!r}")
+        raise UnexpectedError(f"what is passed on is not what was read: {packet.message!r}")
     try:
         if payload := packet.message.payload:
             payload.join(packet.arrays)
     except ProtocolError:
         pass
     return True
-
-
-def _kept(packet: Packet) -> Packet:
-    """Give what the hub makes of a message that it keeps: the file holds it as it was sent."""
-    return decode_to_hub(encode(packet))
 
 
 @dataclass

@@ -180,7 +180,7 @@ def header(**changes) -> bytes:
     ([WIRES[0][0], b""], "1 arrays follow, 0 announced"),
     (WIRES[1][:2], "1 arrays follow, 2 announced"),
     ([WIRES[1][0], WIRES[1][1][:-1], WIRES[1][2]], "depth has 95 bytes, 96 announced"),
-    ([b" " * (wire.MAX_HEADER_BYTES + 1)], "header has"),
+    ([b" " * (wire.MAX_HEADER_BYTES_TO_HUB + 1)], "header has"),
     ([b""] * (wire.MAX_PARTS + 1), "parts"),
 ])
 def test_what_is_wrong_is_named(parts, message):
