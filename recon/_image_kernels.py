@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["add_between", "blur", "collect", "divide", "fill", "halve", "scatter"]
+__all__ = ["add_between", "blur", "box_sums", "collect", "divide", "fill", "halve", "scatter"]
 
 
 @compiled
@@ -30,6 +30,40 @@ def add_between(
         for j in range(len(columns)):
             left = int(columns[j])
             own[j] += line[left] + (columns[j] - np.float32(left)) * (line[left + 1] - line[left])
+
+
+@compiled
+def box_sums(
+    colors: NDArray[np.uint8], among: NDArray[np.bool_], wanted: NDArray[np.bool_], reach: int
+) -> NDArray[np.int32]:
+    """Sum the colours `among` those at most `reach` rows and columns from each wanted pixel.
+
+    Gives (n, 4), the fourth is their number; n wanted pixels, row by row.
+    """
+    rows, columns = among.shape
+    # Sums of all that is above and left: any box is then four of them.
+    total = np.zeros((rows + 1, columns + 1, 4), np.int32)
+    for row in range(rows):
+        line = np.zeros(4, np.int32)
+        for column in range(columns):
+            if among[row, column]:
+                for c in range(3):
+                    line[c] += colors[row, column, c]
+                line[3] += 1
+            for c in range(4):
+                total[row + 1, column + 1, c] = total[row, column + 1, c] + line[c]
+    out = np.empty((np.count_nonzero(wanted), 4), np.int32)
+    i = 0
+    for row in range(rows):
+        for column in range(columns):
+            if wanted[row, column]:
+                top, bottom = max(row - reach, 0), min(row + reach + 1, rows)
+                left, right = max(column - reach, 0), min(column + reach + 1, columns)
+                for c in range(4):
+                    out[i, c] = (total[bottom, right, c] - total[top, right, c]
+                                 - total[bottom, left, c] + total[top, left, c])
+                i += 1
+    return out
 
 
 @compiled

@@ -68,7 +68,8 @@ def densify(
     points, normals, colors, cells = collect(
         support, xs, ys, heights, slopes_x, slopes_y, colors, every)
     if look_up is not None:
-        hole = _far_from_seeds(seeds, (xs[0], ys[0]), step, support, _HOLE * spacing)
+        hole = _far_from_seeds(
+            seeds, (xs[0], ys[0]), step, support, _HOLE * spacing)
         if hole.any():
             own, seen = look_up(points[hole])
             colors[hole] = np.where(seen[:, None], own, colors[hole])
@@ -90,12 +91,13 @@ def _far_from_seeds(
     seeds: Seeds, origin: tuple[float, float], step: float, support: NDArray[np.bool_],
     radius: float,
 ) -> NDArray[np.bool_]:
-    """Which of the supported points have no seed within a radius, mm."""
-    empty = np.ones(support.shape, np.uint8)
-    columns, rows = np.rint((seeds.points[:, :2] - origin) / step).astype(np.intp).T
+    """Which of the supported points have no seed within a radius, mm, to a grid point."""
+    empty = np.ones([side // 2 + 1 for side in support.shape], np.uint8)
+    columns, rows = np.rint((seeds.points[:, :2] - origin) / step).astype(np.intp).T // 2
     empty[rows, columns] = 0
-    distance = cv2.distanceTransform(empty, cv2.DIST_L2, cv2.DIST_MASK_3)
-    return np.asarray(distance[support] * step > radius)
+    far = cv2.distanceTransform(empty, cv2.DIST_L2, cv2.DIST_MASK_3) * (2 * step) > radius
+    rows, columns = support.shape
+    return np.asarray(far.repeat(2, axis=0)[:rows].repeat(2, axis=1)[:, :columns][support])
 
 
 def _colors(

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from recon._image_kernels import box_sums
 from recon.colors import average_neighbors
 from recon.registration import Registration
 
@@ -49,17 +50,19 @@ def seed_colors(
     face : (H, W) bool
     solid : (H, W) uint8, 0 or 1, the same with its holes filled: holes have no outline
     """
-    seen = face & registered.visible
+    if not face.any():
+        return registered.colors[face]
+    window = _window(face)
+    face, solid = face[window], solid[window]
+    colors = registered.colors[window].copy()
+    seen = registered.visible[window] & face
     inner = seen & (cv2.erode(solid, _RIM) > 0)
     inner = inner if inner.any() else seen
     if not inner.any():
-        return registered.colors[face]
+        return colors[face]
     deep = inner & (cv2.erode(solid, _FRAYED) > 0)
-    window = _window(face)
-    behind = _behind(registered, window, face[window], solid[window])
-    colors = registered.colors[window].copy()
-    face, seen, inner, deep = (
-        mask[window] for mask in (face, seen, inner, deep if deep.any() else inner))
+    deep = deep if deep.any() else inner
+    behind = _behind(registered, window, face, solid)
     own = inner.copy()
     edge = seen & ~deep
     near, some = _local_mean(colors, deep, edge, _INSIDE)
@@ -95,10 +98,8 @@ def _local_mean(
     colors: NDArray[np.uint8], among: NDArray[np.bool_], wanted: NDArray[np.bool_], width: int
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """The mean colour of the pixels `among` those near each wanted one, (n, 3), if any, (n,)."""
-    sums = np.dstack([colors, np.full(among.shape, 255, np.uint8)]) * among[..., None]
-    total = cv2.boxFilter(sums, cv2.CV_32F, (width, width), normalize=False,
-                          borderType=cv2.BORDER_CONSTANT)[wanted]
-    count = total[:, 3:] / 255
+    total = box_sums(colors, among, wanted, width // 2).astype(np.float32)
+    count = total[:, 3:]
     return np.asarray(total[:, :3] / np.maximum(count, 1), np.float32), count[:, 0] > 0
 
 
