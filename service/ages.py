@@ -34,13 +34,16 @@ class Clock(Protocol):
 class SystemClock:
     """The clocks of this machine."""
 
+    def __init__(self) -> None:
+        self._boot_id = _BOOT_ID.read_text().strip()
+
     def wall(self) -> datetime:
         """Give the time of day, UTC."""
         return datetime.now(UTC)
 
     def boot(self) -> tuple[str, float]:
         """Give the kernel's name of this start and the seconds since then."""
-        return _BOOT_ID.read_text().strip(), time.clock_gettime(time.CLOCK_BOOTTIME)
+        return self._boot_id, time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
 def stamp(moment: datetime) -> str:

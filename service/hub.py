@@ -14,7 +14,7 @@ import structlog
 from recon.settings import Settings
 from service import messages
 from service.counters import Counters
-from service.errors import DamagedDatabaseError, DamagedFaceError, ServiceError
+from service.errors import DamagedDatabaseError, DamagedFaceError, ServiceError, StoreError
 from service.intake import Intake
 from service.jobs import Jobs
 from service.keeper import Keeper
@@ -56,7 +56,8 @@ class Hub:
         self._outcomes = Outcomes(store, self._remake)
         self._intake = Intake(store, self._roster, settings, recon, settings_hash(recon))
         self._jobs = Jobs(store, self._roster, settings.attempts, self._outcomes.concluded)
-        self._keeper = Keeper(store, settings, self._intake, self._jobs, self._outcomes)
+        self._keeper = Keeper(
+            store, settings, self._intake, self._jobs, self._outcomes, self._counters)
         self._status_due = 0.0
         self._log = structlog.get_logger("hub")
 
@@ -112,6 +113,13 @@ class Hub:
     def unreachable(self, peer: bytes, reason: str = "unreachable") -> list[Output]:
         """Take note that a message to a peer could not be delivered, nor could the next."""
         return list(self._gone(peer, reason))
+
+    def knows(self, capture_id: str) -> bool:
+        """Say whether there may be a capture of this id; raises DamagedDatabaseError."""
+        try:
+            return self._intake.knows(capture_id)
+        except StoreError:
+            return True
 
     def peers(self) -> list[bytes]:
         """Give the sensors and workers that are known."""

@@ -100,7 +100,8 @@ class _Loop:
             self._give_out([_denied(incoming, message, lacks)])
             return
         if isinstance(message, messages.Press):
-            self._pressed.note(message.capture_id, sender.fingerprint)
+            self._pressed.note(message.capture_id, sender.fingerprint,
+                               anew=not self._hub.knows(message.capture_id))
         self._give_out(self._hub.receive(time.monotonic(), incoming.peer, packet))
 
     def _give_out(self, outputs: list[Output]) -> None:

@@ -49,6 +49,10 @@ class Intake:
     def __len__(self) -> int:
         return len(self._presses)
 
+    def knows(self, capture_id: str) -> bool:
+        """Say whether an id was pressed and its capture is there, or its frame awaited."""
+        return self._state(capture_id) is not None
+
     def press(
         self, now: float, peer: bytes, message: messages.Press, queued: int
     ) -> Iterator[Output]:

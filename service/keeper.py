@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import structlog
 
 from service import messages
+from service.counters import Counters
 from service.errors import StoreError
 from service.intake import Intake
 from service.jobs import Jobs
@@ -30,7 +31,7 @@ class Keeper:
 
     def __init__(
         self, store: Store, settings: ServiceSettings, intake: Intake, jobs: Jobs,
-        outcomes: Outcomes,
+        outcomes: Outcomes, counters: Counters,
     ) -> None:
         self._store = store
         self._retention_s = settings.retention
@@ -38,6 +39,7 @@ class Keeper:
         self._intake = intake
         self._jobs = jobs
         self._outcomes = outcomes
+        self._counters = counters
         self._due = 0.0
         self._log = structlog.get_logger("hub")
 
@@ -53,6 +55,7 @@ class Keeper:
             old = self._store.expired(self._retention_s, _BATCH)
             if old:
                 self._store.remove(old)
+                self._counters.add("removed", "retention", len(old))
                 self._log.info("removed after the retention", captures=len(old))
         except StoreError as error:
             self._log.error("not removed", reason=str(error))
@@ -122,6 +125,7 @@ class Keeper:
             self._store.remove(capture_ids)
         finally:  # where files resist, the captures are gone all the same
             self._jobs.forget([one for one in capture_ids if self._store.find(one) is None])
+        self._counters.add("removed", "operator", len(capture_ids))
         self._log.info("removed by an operator", captures=len(capture_ids))
         yield from self._outcomes.removed(capture_ids)
 

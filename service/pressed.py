@@ -11,8 +11,15 @@ class Pressed:
     def __init__(self) -> None:
         self._keys: dict[str, str] = {}
 
-    def note(self, capture_id: str, key: str) -> None:
-        """Note a press with the fingerprint of its key."""
+    def note(self, capture_id: str, key: str, *, anew: bool) -> None:
+        """Note a press with the fingerprint of its key.
+
+        Parameters
+        ----------
+        anew : the hub knows no capture of this id, any more: it is not the one pressed before
+        """
+        if anew:
+            self._keys.pop(capture_id, None)
         self._keys.setdefault(capture_id, key)
         if len(self._keys) > _MOST:
             del self._keys[next(iter(self._keys))]

@@ -90,16 +90,16 @@ def read_parts(path: Path, checksum: str | None = None) -> tuple[list[bytes], st
     Raises
     ------
     CorruptFileError
-        Where the file is missing, cannot be read from the disk or is not what had the checksum.
+        Where the file is missing, cannot be read or is not what had the checksum.
     StoreError
-        Where this process may not read it, or has no means to.
+        Where this process has no means to read anything now.
     """
     try:
         with path.open("rb") as file:
             data = memoryview(file.read(_MOST_BYTES + 1))
     except OSError as error:
-        lost = error.errno in (errno.ENOENT, errno.EIO, errno.EISDIR)
-        raise (CorruptFileError if lost else StoreError)(
+        passing = error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
+        raise (StoreError if passing else CorruptFileError)(
             f"{path}: {error.strerror or error}") from error
     if len(data) > _MOST_BYTES:
         raise CorruptFileError(f"{path}: has more than {_MOST_BYTES} bytes")

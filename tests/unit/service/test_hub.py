@@ -357,47 +357,6 @@ def test_status_counts(bench):
     assert not restarted(bench).say(CLIENT, messages.GetStatus(request=3))[0][1].ready
 
 
-def test_a_store_that_fails_answers_the_request(bench, monkeypatch):
-    def broken(_):
-        raise StoreError("disk on fire")
-
-    monkeypatch.setattr(bench.store, "outcome", broken)
-    (answer,) = bench.say(CLIENT, messages.GetFace(request=3, capture_id="a"))
-    assert (answer[1].kind, answer[1].message) == ("request_failed", "disk on fire")
-
-
-def test_a_result_waits_for_room(bench, monkeypatch):
-    def full(_):
-        raise StoreError("No space left on device")
-
-    bench.accepted("a", "b")
-    bench.worker()
-    monkeypatch.setattr(bench.store, "finish", full)
-    bench.result()
-    assert bench.worker(credit=1) == []
-    assert bench.wait(1.1) == []
-    assert bench.published == []
-    monkeypatch.undo()
-    assert kinds(bench.wait(1.1)) == [(WORKER, "job")]
-    (published,) = bench.published
-    assert (published.kind, published.capture_id) == ("face_done", "a")
-    assert bench.store.find("a").attempts == 1
-
-
-def test_a_failure_that_cannot_be_kept_is_told_again(bench, monkeypatch):
-    def full(*_, **__):
-        raise StoreError("No space left on device")
-
-    bench.accepted("a")
-    bench.worker()
-    monkeypatch.setattr(bench.store, "fail", full)
-    bench.stumble(final=True)
-    monkeypatch.undo()
-    assert kinds(bench.worker(credit=1)) == [(WORKER, "job")]
-    bench.stumble(final=True)
-    assert [message.kind for message in bench.published] == ["capture_failed"]
-
-
 def test_an_answer_to_another_job_does_not_lose_the_capture(bench):
     bench.accepted("a")
     bench.worker()

@@ -16,15 +16,14 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 import service.store
 from recon.settings import Settings
 from service import messages
-from service.errors import DiskFullError
 from service.hub import Hub, settings_hash
 from service.outputs import Publish, Topic
 from service.settings import ServiceSettings
 from service.states import CaptureState
-from service.store import FolderStore
 from service.wire import Packet
 from tests.unit.service.clocks import FakeClock
 from tests.unit.service.test_hub import FACE, FACE_ARRAYS, FRAME, FRAME_ARRAYS
+from tests.unit.service.unkind import KilledError, UnkindStore
 
 HASH = settings_hash(Settings())
 SETTINGS = ServiceSettings(
@@ -33,36 +32,6 @@ _MEMORY = Path("/dev/shm")  # noqa: S108
 """Syncing is not what is tested here."""
 ids = st.sampled_from("abcd")
 workers = st.sampled_from([b"w1", b"w2"])
-
-
-class _KilledError(BaseException):
-    """The hub ends here."""
-
-
-class _Store(FolderStore):
-    """Has no room where it is told so."""
-
-    full = False
-
-    def _room(self):
-        if self.full:
-            raise DiskFullError("no room on the disk")
-
-    def accept(self, *arguments):
-        self._room()
-        super().accept(*arguments)
-
-    def start_attempt(self, capture_id):
-        self._room()
-        return super().start_attempt(capture_id)
-
-    def finish(self, result):
-        self._room()
-        super().finish(result)
-
-    def fail(self, *arguments, **more):
-        self._room()
-        super().fail(*arguments, **more)
 
 
 class AnyOrder(RuleBasedStateMachine):
@@ -79,9 +48,11 @@ class AnyOrder(RuleBasedStateMachine):
             one.start()
         self.folder = Path(tempfile.mkdtemp(dir=_MEMORY if _MEMORY.is_dir() else None))
         self.clock = FakeClock()
-        self.store = _Store(self.folder / "data", self.clock)
+        self.store = UnkindStore(self.folder / "data", self.clock)
         self.now = 0.0
         self.credit = 0
+        self.frames = 0
+        self.shown: dict[str, str] = {}
         self.pressed, self.taken, self.accepted = set(), set(), set()
         self.jobs: dict[bytes, list[messages.Job]] = {}
         self.published: list[messages.FaceDone | messages.CaptureFailed] = []
@@ -99,6 +70,11 @@ class AnyOrder(RuleBasedStateMachine):
             self.work()
             assert sorted(self.read_all()) == sorted(self.accepted)
             self.ids_are_known()
+            self.now += 601  # what resisted is removed later
+            self.tick()
+            left = {path.name.partition(".")[0] for folder in ("frames", "faces")
+                    for path in (self.folder / "data" / folder).iterdir()}
+            assert left <= self.accepted
         finally:
             for one in self.patches:
                 one.stop()
@@ -123,13 +99,19 @@ class AnyOrder(RuleBasedStateMachine):
                 return found
             assert packet.message.sequence > after
             after = packet.message.sequence
+            self.is_of_the_frame_kept(packet.message)
             found.append(packet.message.capture_id)
+
+    def is_of_the_frame_kept(self, outcome):
+        if isinstance(outcome, messages.FaceDone):
+            assert outcome.face.report.calibration == self.shown[outcome.capture_id]
 
     def give(self, outputs):
         for output in outputs:
             message = output.packet.message
             if isinstance(output, Publish):
                 if output.topic is Topic.FACES:
+                    self.is_of_the_frame_kept(message)
                     self.published.append(message)
             elif isinstance(message, messages.Take):
                 self.taken.add(message.capture_id)
@@ -139,22 +121,28 @@ class AnyOrder(RuleBasedStateMachine):
                 self.jobs.setdefault(output.peer, []).append(message)
 
     def answered(self, jobs):
-        job = jobs.pop()
+        self.answering = job = jobs.pop()
         return {"capture_id": job.capture_id, "settings_hash": job.settings_hash,
                 "frame_sha256": job.frame_sha256}
+
+    def face(self):
+        """Says of which frame it was made."""
+        report = FACE.report.model_copy(
+            update={"calibration": self.answering.frame.calibration_origin})
+        return FACE.model_copy(update={"report": report})
 
     def last_step(self, name, step):
         def done(*arguments):
             result = step(*arguments)
             if self.dies_after == name:
-                raise _KilledError
+                raise KilledError
             return result
         return done
 
     def say(self, peer, message, arrays=None):
         try:
             self.give(self.hub.receive(self.now, peer, Packet(message, arrays or {})))
-        except _KilledError:
+        except KilledError:
             self.kill()
 
     @rule()
@@ -170,7 +158,7 @@ class AnyOrder(RuleBasedStateMachine):
     def tick(self):
         try:
             self.give(self.hub.tick(self.now))
-        except _KilledError:
+        except KilledError:
             self.kill()
 
     @rule()
@@ -185,7 +173,12 @@ class AnyOrder(RuleBasedStateMachine):
     @rule(capture_id=ids)
     def frame(self, capture_id):
         if capture_id in self.taken:
-            self.say(b"s", messages.Frame(capture_id=capture_id, frame=FRAME), FRAME_ARRAYS)
+            self.frames += 1
+            frame = FRAME.model_copy(update={"calibration_origin": f"frame {self.frames}"})
+            before = self.rows()
+            self.say(b"s", messages.Frame(capture_id=capture_id, frame=frame), FRAME_ARRAYS)
+            if capture_id in self.rows() - before:
+                self.shown[capture_id] = frame.calibration_origin
 
     @rule(capture_id=ids, worker=workers)
     def all_goes_well_until_the_job(self, capture_id, worker):
@@ -213,13 +206,31 @@ class AnyOrder(RuleBasedStateMachine):
     def result(self, worker):
         if jobs := self.jobs.get(worker):
             self.say(worker, messages.Result(
-                **self.answered(jobs), face=FACE), FACE_ARRAYS)
+                **self.answered(jobs), face=self.face()), FACE_ARRAYS)
 
     @rule(worker=workers, final=st.booleans())
     def failure(self, worker, final):
         if jobs := self.jobs.get(worker):
             self.say(worker, messages.JobFailed(
                 **self.answered(jobs), error="E", message="m", final=final))
+
+    @rule(worker=workers, capture_id=ids, well=st.booleans())
+    def an_answer_finds_the_disk_full(self, worker, capture_id, well):
+        self.all_goes_well_until_the_job(capture_id, worker)
+        self.store.full = True
+        if well:
+            self.result(worker)
+        else:
+            self.failure(worker, final=True)
+        self.store.full = False
+
+    @rule(capture_id=ids, worker=workers)
+    def a_late_face_comes_after_a_purge(self, capture_id, worker):
+        self.all_goes_well_until_the_job(capture_id, worker)
+        self.purge(capture_id)
+        self.press(capture_id)
+        self.frame(capture_id)
+        self.result(worker)
 
     @rule(worker=workers)
     def job_never_arrives(self, worker):
@@ -255,7 +266,7 @@ class AnyOrder(RuleBasedStateMachine):
     def answer(self, message):
         try:
             outputs = self.hub.receive(self.now, b"o", Packet(message))
-        except _KilledError:
+        except KilledError:
             self.kill()
             return self.answer(message)
         answers = [one.packet.message for one in outputs if getattr(one, "peer", None) == b"o"]
@@ -322,7 +333,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.dies_after = None
         self.killed = True
         self.store.__exit__()
-        self.store = _Store(self.folder / "data", self.clock)
+        self.store = UnkindStore(self.folder / "data", self.clock)
         self.restart()
         # What was safe and not yet acknowledged may be there.
         self.accepted |= self.rows() & self.taken
@@ -343,7 +354,7 @@ class AnyOrder(RuleBasedStateMachine):
                 path.write_bytes(content[:5000] + b"\xff" * 4000 + content[9000:])
         known = {path.name.partition(".")[0] for folder in ("frames", "faces")
                  for path in (self.folder / "data" / folder).iterdir()}
-        self.store = _Store(self.folder / "data", self.clock)
+        self.store = UnkindStore(self.folder / "data", self.clock)
         self.restart()
         self.published.clear()  # another epoch
         self.accepted &= known  # a dead letter whose frame is gone is known to the rows alone

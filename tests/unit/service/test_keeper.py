@@ -6,7 +6,6 @@ import pytest
 
 from recon.settings import Settings
 from service import messages
-from service.errors import StoreError
 from service.hub import Hub
 from service.states import CaptureState
 from service.store import FolderStore
@@ -235,6 +234,17 @@ def test_all_are_purged_in_batches(bench, monkeypatch, files):
     assert bench.worker(OTHER) == []
 
 
+def test_an_id_is_known_as_long_as_it_is_kept(bench):
+    assert not bench.hub.knows("a")
+    bench.sensor()
+    bench.press()
+    assert bench.hub.knows("a")
+    bench.frame()
+    assert bench.hub.knows("a")
+    ask(bench, messages.Purge(request=1, capture_id="a"))
+    assert not bench.hub.knows("a")
+
+
 def test_what_is_older_than_a_time_is_purged(bench, clock):
     done(bench, "a")
     clock.pass_time(60)
@@ -260,24 +270,6 @@ def test_a_file_that_resists_is_removed_later(bench, monkeypatch, files):
     assert files("a") == []
 
 
-def test_a_disk_that_is_nearly_full_refuses_the_press(bench):
-    full = Bench(Hub(bench.store, SETTINGS.model_copy(update={"reserve_mib": 2**30}), Settings()),
-                 bench.store)
-    full.sensor()
-    (answer,) = full.press()
-    assert answer[1].kind == "press_refused"
-    assert "no room on the disk" in answer[1].message
-
-
-def test_a_disk_that_does_not_answer_refuses_the_press(bench, monkeypatch):
-    def fails():
-        raise StoreError("the disk fails")
-
-    monkeypatch.setattr(bench.store, "free_bytes", fails)
-    bench.sensor()
-    assert bench.press()[0][1].message == "the disk fails"
-
-
 def test_a_damaged_face_is_made_again(bench, tmp_path):
     done(bench, "a", "b")
     (face,) = (tmp_path / "data" / "faces").glob("a.*")
@@ -300,23 +292,6 @@ def test_a_face_that_is_lost_with_its_frame_is_a_dead_letter(bench, tmp_path):
     assert bench.worker(OTHER) == []
     assert (bench.published[-1].dead, bench.published[-1].error) == (True, "CorruptFileError")
     assert after(bench, 1).dead
-
-
-def test_a_disk_that_damages_every_face_uses_up_the_attempts(bench, monkeypatch):
-    real = bench.store.finish
-
-    def damaging(packet):
-        real(packet)
-        for path in bench.store._layout.faces.iterdir():
-            path.write_bytes(b"damaged")
-
-    monkeypatch.setattr(bench.store, "finish", damaging)
-    bench.accepted("a")
-    for credit in range(SETTINGS.attempts):
-        assert kinds(bench.worker(credit=credit)) == [(WORKER, "job")]
-        bench.result()
-    (published,) = bench.published
-    assert (published.dead, published.error) == (True, "CorruptFileError")
 
 
 def test_a_late_joiner_finds_its_start(bench, clock):
