@@ -20,7 +20,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from capture._chosen import ChosenCalibration
-from capture.errors import FrameError, UnreadableSourceError
+from capture.errors import CaptureError, FrameError, UnreadableSourceError
 from capture.frame import MAX_SIDE, Calibration, RgbdFrame
 
 __all__ = ["NpzSource", "load_frame", "save_frame"]
@@ -94,10 +94,10 @@ def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> Rgb
     try:
         with zipfile.ZipFile(path) as archive:
             arrays = _read_arrays(Path(path), archive, needs_calibration=chosen is None)
+    except CaptureError:
+        raise
     except (OSError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError,
-            RuntimeError, struct.error) as error:
-        if isinstance(error, UnreadableSourceError):
-            raise
+            RuntimeError, ValueError, struct.error) as error:
         why = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise UnreadableSourceError(f"{path}: not a readable .npz file: {why}") from error
     if chosen is None:
@@ -152,12 +152,12 @@ def _read_arrays(
     for member in archive.infolist():
         name = member.filename
         key = name.removesuffix(".npy")
-        if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise UnreadableSourceError(
-                f"{path}: {key}: zip compression {member.compress_type}, expected 0 or 8 (deflate)")
         if key not in _KEYS or key == name or key in arrays:
             raise FrameError(f"{path}: unexpected entry {name!r}; expected keys: "
                              + ", ".join(_KEYS))
+        if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise UnreadableSourceError(
+                f"{path}: {key}: zip compression {member.compress_type}, expected 0 or 8 (deflate)")
         with archive.open(member) as file:
             arrays[key] = _read_array(f"{path}: {key}", file, _KEYS[key])
     for key, kind in _KEYS.items():
@@ -170,7 +170,9 @@ def _read_array(name: str, file: IO[bytes], kind: _Kind) -> NDArray[Any]:
     try:
         version = npy.read_magic(file)
         shape, fortran, dtype = _HEADERS[version](file, max_header_size=_MAX_HEADER)
-    except (ValueError, KeyError) as error:
+    except OSError:
+        raise
+    except Exception as error:  # the text is read as Python is: nobody lists what that can raise
         raise UnreadableSourceError(f"{name}: not a NumPy array") from error
     expected = f"expected {kind.dtype} {kind.shape}"
     found = f"found {dtype} {shape}"

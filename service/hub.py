@@ -20,7 +20,7 @@ from service.jobs import Jobs
 from service.keeper import Keeper
 from service.outcomes import Outcomes
 from service.outputs import Output, Publish, Topic, send
-from service.roster import Roster
+from service.roster import MOST_PEERS, Roster, Sensor, Worker
 from service.settings import ServiceSettings
 from service.states import CaptureState
 from service.stored import Store
@@ -141,10 +141,12 @@ class Hub:
             case messages.GetStatus(request=request):
                 yield send(peer, self._status(request))
             case messages.SensorReady(name=name, source=source):
-                if self._roster.sensor_ready(peer, name, now):
+                if self._has_room(Sensor, peer, name) and self._roster.sensor_ready(
+                        peer, name, now):
                     self._log.info("sensor ready", name=name, source=source)
             case messages.WorkerReady(name=name, credit=credit):
-                self._worker_ready(now, peer, name, credit)
+                if self._has_room(Worker, peer, name):
+                    self._worker_ready(now, peer, name, credit)
             case messages.Heartbeat(holding=holding):
                 if not self._roster.heartbeat(peer, holding, now):
                     yield send(peer, messages.Announce())
@@ -170,6 +172,12 @@ class Hub:
     def _remake(self, error: DamagedFaceError, kept_before: bool) -> None:
         # One that is damaged as soon as it is written has used up an attempt.
         self._jobs.remake(error.capture_id, str(error), attempts_left=kept_before)
+
+    def _has_room(self, kind: type[Sensor | Worker], peer: bytes, name: str) -> bool:
+        room = self._roster.has_room(kind, peer)
+        if not room:
+            self._log.error("too many", kind=kind.__name__.lower(), name=name, most=MOST_PEERS)
+        return room
 
     def _worker_ready(self, now: float, peer: bytes, name: str, credit: int) -> None:
         known = self._roster.workers.get(peer)

@@ -13,7 +13,7 @@ from service.access import missing_role
 from service.counters import Counters
 from service.doors import Incoming
 from service.entrance import Entrance
-from service.errors import RemoteProtocolError
+from service.errors import LocalProtocolError, RemoteProtocolError
 from service.failpoints import failpoint
 from service.hub import Hub
 from service.outputs import Output, Publish, Topic, send
@@ -66,6 +66,7 @@ class _Loop:
         self._hub = hub
         self._refusals = refusals
         self._pressed = Pressed()
+        self._log = structlog.get_logger("hub")
 
     def serve(self, stop: StopSignal) -> None:
         due = 0.0
@@ -106,7 +107,11 @@ class _Loop:
 
     def _give_out(self, outputs: list[Output]) -> None:
         for output in outputs:
-            parts = encode(output.packet)
+            try:
+                parts = encode(output.packet)
+            except LocalProtocolError as error:  # one message less is better than no hub
+                self._log.error("message not sent", reason=str(error))
+                continue
             if isinstance(output, Publish):
                 self._publish(output.topic, parts)
             elif not self._entrance.send(output.peer, parts):

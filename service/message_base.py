@@ -1,13 +1,14 @@
 """What messages are made of."""
 
+from datetime import UTC, datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, FailFast, Field
+from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, FailFast, Field
 
 from service.payload import Payload
 
-__all__ = ["BaseAnswer", "BaseMessage", "BaseRequest", "CaptureId", "Digest", "Name", "Names",
-           "Number", "Seconds", "Text", "Token"]
+__all__ = ["BaseAnswer", "BaseMessage", "BaseRequest", "CaptureId", "Digest", "Moment", "Name",
+           "Names", "Number", "Seconds", "Text", "Token"]
 
 CaptureId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
 """Chosen by whoever pressed; also part of file names, hence no dots and no slashes."""
@@ -20,6 +21,16 @@ Token = Annotated[str, Field(pattern=r"^[0-9a-f]{1,64}$")]
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 Number = Annotated[int, Field(ge=0, lt=2**63)]
 Seconds = Annotated[float, Field(ge=0, le=3600)]
+
+
+def _utc(moment: datetime) -> datetime:
+    try:
+        return moment.astimezone(UTC)
+    except OverflowError as error:
+        raise ValueError("this time does not exist in UTC") from error
+
+
+Moment = Annotated[AwareDatetime, AfterValidator(_utc)]
 
 
 class BaseMessage(BaseModel):

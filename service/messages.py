@@ -5,7 +5,7 @@ Each class is the JSON header of one kind of message; how it is written is in `s
 
 from typing import Annotated, Literal, Self
 
-from pydantic import AwareDatetime, Field, model_validator
+from pydantic import Field, model_validator
 
 from recon.settings import Settings
 from service.message_base import (
@@ -14,6 +14,7 @@ from service.message_base import (
     BaseRequest,
     CaptureId,
     Digest,
+    Moment,
     Name,
     Names,
     Number,
@@ -88,7 +89,7 @@ class FindStart(BaseRequest):
     kind: Literal["find_start"] = "find_start"
     last: Annotated[int, Field(ge=1, lt=2**31)] | None = None
     """The last so many outcomes that are kept."""
-    since: AwareDatetime | None = None
+    since: Moment | None = None
     """Outcomes of this time or later."""
 
     @model_validator(mode="after")

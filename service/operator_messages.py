@@ -2,9 +2,9 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, FailFast, Field, model_validator
+from pydantic import BaseModel, ConfigDict, FailFast, Field, model_validator
 
-from service.message_base import BaseAnswer, BaseRequest, CaptureId, Name, Number
+from service.message_base import BaseAnswer, BaseRequest, CaptureId, Moment, Name, Number
 
 __all__ = ["DeadLetter", "DeadLetters", "DropDead", "ListDead", "Purge", "Removed", "RetryDead"]
 
@@ -35,7 +35,7 @@ class Purge(BaseRequest):
 
     kind: Literal["purge"] = "purge"
     capture_id: CaptureId | None = None
-    before: AwareDatetime | None = None
+    before: Moment | None = None
     """What was accepted before this time."""
     everything: bool = False
     """Also all that is in quarantine."""

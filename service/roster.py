@@ -1,8 +1,12 @@
 """Who is connected to the hub: sensors and workers, and whether they still live."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
-__all__ = ["Roster", "Sensor", "Worker"]
+__all__ = ["MOST_PEERS", "Roster", "Sensor", "Worker"]
+
+MOST_PEERS = 100
+"""Of sensors, and of workers: whoever comes later is not taken, so that all fit into a status."""
 
 
 @dataclass
@@ -32,10 +36,15 @@ class Worker:
 
 @dataclass
 class Roster:
-    """Peers by their ZeroMQ routing id."""
+    """Peers by their connection."""
 
     sensors: dict[bytes, Sensor] = field(default_factory=dict)
     workers: dict[bytes, Worker] = field(default_factory=dict)
+
+    def has_room(self, kind: type[Sensor | Worker], peer: bytes) -> bool:
+        """Say whether a peer is known as such, or can be."""
+        known: Collection[bytes] = self.sensors if kind is Sensor else self.workers
+        return peer in known or len(known) < MOST_PEERS
 
     def sensor_ready(self, peer: bytes, name: str, now: float) -> bool:
         """Note a sensor; True where it is new."""

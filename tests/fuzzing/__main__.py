@@ -44,14 +44,13 @@ def main() -> None:
     options.found.mkdir(parents=True, exist_ok=True)
     corpus = encoded()
     cost = Cost()
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     start = time.monotonic()
 
     def one_input(data: bytes) -> None:
         cost.run(unpack(data))
         if cost.inputs == options.inputs:
-            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-            _report(cost, time.monotonic() - start, before / 1024, peak / 1024)
+            _report(cost, time.monotonic() - start, before)
             (options.found / "slowest").write_bytes(cost.slowest)
             os._exit(0)  # libFuzzer has no other way out
 
@@ -74,13 +73,14 @@ def main() -> None:
             atheris.Fuzz()
 
 
-def _report(cost: Cost, took_s: float, before_mb: float, peak_mb: float) -> None:
+def _report(cost: Cost, took_s: float, before: int) -> None:
     print("| inputs to each decoder | messages among them | other exceptions | slowest input "
           "| most memory for one input | memory, start to peak | inputs / s |")
     print("|" + " --- |" * 7)
     print(f"| {cost.inputs:,} | {cost.messages:,} | 0 | {cost.slowest_s * 1e3:.0f} ms "
           f"({len(cost.slowest):,} bytes) | {cost.grown_bytes / 1e6:.1f} MB "
-          f"| {before_mb:.0f} to {peak_mb:.0f} MB | {cost.inputs / took_s:,.0f} |", flush=True)
+          f"| {before / 1e6:.0f} to {cost.peak_bytes / 1e6:.0f} MB "
+          f"| {cost.inputs / took_s:,.0f} |", flush=True)
 
 
 if __name__ == "__main__":

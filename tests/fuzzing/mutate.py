@@ -81,7 +81,8 @@ def _without(rng: Random, tree: Any, corpus: Sequence[Parts]) -> bytes:
 
 def _repeated(rng: Random, tree: Any, corpus: Sequence[Parts]) -> bytes:
     holder, key = _place(rng, tree)
-    count = rng.choice((2, 3, 20, 2000))
+    size = len(json.dumps(holder[key])) + 1
+    count = min(rng.choice((2, 3, 20, 2000)), _MOST_BYTES // size)
     if isinstance(holder, list):
         holder[key:key] = [holder[key]] * count
     else:

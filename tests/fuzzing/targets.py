@@ -1,9 +1,9 @@
 """What must hold of every input, and what each cost."""
 
-import resource
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 from service.errors import ProtocolError
 from service.wire import Packet, decode_from_hub, decode_kept, decode_to_hub, encode
@@ -16,6 +16,7 @@ DECODERS: tuple[Decoder, ...] = (decode_to_hub, decode_from_hub)
 
 _AGAIN = {decode_to_hub: decode_kept, decode_from_hub: decode_from_hub}
 """How each end reads what it took before: the hub its files, others nothing else."""
+_STATUS, _RESET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 _LONGEST_REASON = 1000
 
 
@@ -68,10 +69,12 @@ class Cost:
     slowest: bytes = b""
     grown_bytes: int = 0
     """The most that the process grew in one input."""
+    peak_bytes: int = 0
+    """The most that it had."""
 
     def run(self, parts: Parts) -> None:
         """Check one input with every decoder; raises as `check`."""
-        size = _peak_bytes()
+        size = _reset_peak()
         start = time.thread_time()
         found = [check(decode, parts) for decode in DECODERS]
         took = time.thread_time() - start
@@ -79,8 +82,17 @@ class Cost:
         self.messages += any(found)
         if took > self.slowest_s:
             self.slowest_s, self.slowest = took, b" ".join(parts)
-        self.grown_bytes = max(self.grown_bytes, _peak_bytes() - size)
+        self.peak_bytes = max(self.peak_bytes, peak := _peak_bytes())
+        self.grown_bytes = max(self.grown_bytes, peak - size)
 
 
 def _peak_bytes() -> int:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    """Give the most memory that this process had since `_reset_peak`."""
+    status = _STATUS.read_bytes()
+    at = status.index(b"VmHWM:")
+    return int(status[at + 6:].split(None, 1)[0]) * 1024
+
+
+def _reset_peak() -> int:
+    _RESET.write_bytes(b"5")
+    return _peak_bytes()

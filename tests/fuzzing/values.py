@@ -9,6 +9,9 @@ _MARK = "@raw@"
 RAW = f'"{_MARK}"'.encode()
 """In a written header: the place of what `json` would not write."""
 
+_LARGE = 5000
+"""Characters of a value that is not repeated any more."""
+
 _NUMBERS: tuple[Any, ...] = (
     0, -1, 1, 2, 255, 2**31 - 1, 2**31, 2**53 + 1, 2**63 - 1, 2**63, -2**63, -2**63 - 1, 2**64,
     10**30, 0.5, -0.0, 1e-320, 1e15, 1e308, -1e308, 700.0)
@@ -35,6 +38,10 @@ _TREES: tuple[Any, ...] = (None, True, False, [], {}, [[]], [None], {"": 1}, {"a
 
 def values(rng: Random, present: Any) -> tuple[Any, bytes]:
     """Give a value to stand in for the present one, and the bytes for `RAW` where it is that."""
+    return _values(rng, present) if len(repr(present)) < _LARGE else ("", b"")
+
+
+def _values(rng: Random, present: Any) -> tuple[Any, bytes]:
     match rng.randrange(6):
         case 0:
             return _MARK, rng.choice(_LITERALS)
