@@ -7,12 +7,14 @@ and `allowed/NAME` (see `service.keyring`) the public half of someone who may co
 import os
 import re
 import stat
+import struct
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Self
 
 import zmq
+import zmq.utils.z85
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from service.errors import KeyFileError
@@ -82,9 +84,18 @@ def check_key(path: Path, key: str) -> str:
     KeyFileError
         Where it is none.
     """
-    if not _Z85.fullmatch(key):
+    if not _is_key(key):
         raise KeyFileError(f"{path}: its key is not 40 characters of Z85")
     return key
+
+
+def _is_key(text: str) -> bool:
+    if not _Z85.fullmatch(text):
+        return False
+    try:
+        return len(zmq.utils.z85.decode(text)) == 32
+    except struct.error:  # five of them can say more than four bytes hold
+        return False
 
 
 def new_pair(folder: Path, name: str) -> tuple[Path, Path]:
@@ -146,7 +157,7 @@ def read_public(given: Path | str) -> str:
     KeyFileError
         Where it is neither.
     """
-    if _Z85.fullmatch(str(given)):
+    if _is_key(str(given)):
         return str(given)
     path = Path(given)
     file = _parse(path, read_private_text(path, 0))

@@ -10,7 +10,8 @@ from random import Random
 import pytest
 
 from service import messages
-from service.errors import CorruptFileError, ProtocolError, RemoteProtocolError
+from service.errors import CorruptFileError, KeyFileError, ProtocolError, RemoteProtocolError
+from service.keys import new_pair, read_pair, read_public
 from service.spool import read_parts
 from service.wire import decode_from_hub, decode_to_hub
 from tests.fuzzing.corpus import encoded, kinds, pack, packets, unpack
@@ -131,6 +132,32 @@ def test_a_file_that_vouches_for_a_wrong_index_is_corrupt(tmp_path, body):
     path = spooled(tmp_path / "x.frame", body)
     with pytest.raises(CorruptFileError, match=r"x\.frame: its parts"):
         read_parts(path)
+
+
+def test_a_broken_key_file_is_named(tmp_path):
+    secret, _ = new_pair(tmp_path, "me")
+    whole, rng = secret.read_bytes(), Random(0)
+    path, said = tmp_path / "broken", []
+    path.touch(mode=0o600)
+    for _ in range(300):
+        path.write_bytes((mutate(rng, [whole], CORPUS) or [b""])[0])
+        for read in (read_pair, read_public):
+            try:
+                read(path)
+            except KeyFileError as error:
+                said.append(str(error))
+    assert len(said) > 300
+    assert all("broken" in one and one.isprintable() for one in said)
+
+
+@pytest.mark.parametrize("half", ["public_key", "secret_key"])
+def test_letters_of_z85_that_are_no_key(tmp_path, half):
+    secret, _ = new_pair(tmp_path, "me")
+    secret.write_text(json.dumps(json.loads(secret.read_text()) | {half: "#" * 40}))
+    with pytest.raises(KeyFileError, match=r"me\.secret: its"):
+        read_pair(secret)
+    with pytest.raises(KeyFileError):
+        read_public("#" * 40)
 
 
 def test_a_file_larger_than_any_message_is_not_read_whole(tmp_path, monkeypatch):
