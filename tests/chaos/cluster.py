@@ -1,0 +1,233 @@
+"""Hub, capture process and workers as real processes, restarted at once when they end."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from service.client import Client
+from service.errors import ServiceError
+from service.failpoints import NAMES, TOKENS, VARIABLE
+
+__all__ = ["Cluster", "Nursery", "Part", "until"]
+
+_REPOSITORY = Path(__file__).resolve().parents[2]
+_WATCH_S = 0.01
+_STOPPING_S = 15.0
+
+PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_RESEND_S": "0.3",
+        "DENSEFACE_TAKE_TIMEOUT_S": "3", "DENSEFACE_JOB_TIMEOUT_S": "10",
+        "DENSEFACE_RETENTION": "off"}
+"""Settings of the service that let a fault show in tenths of seconds."""
+
+
+def until(true: Callable[[], bool], what: str, within_s: float = 60.0) -> None:
+    """Look again and again until something is so."""
+    deadline = time.monotonic() + within_s
+    while not true():
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"{what}: did not come about within {within_s:g} s")
+        time.sleep(_WATCH_S)
+
+
+class Nursery:
+    """Forks processes; see `tests.chaos.nursery`."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "tests.chaos.nursery"], cwd=_REPOSITORY, text=True,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
+            env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
+        self._lock = threading.Lock()
+        self._answer()
+
+    def fork(self, wanted: dict[str, Any]) -> int:
+        """Start a process and give its id."""
+        with self._lock:
+            if self._process.stdin is None:
+                raise RuntimeError("the nursery has no stdin")
+            self._process.stdin.write(json.dumps(wanted) + "\n")
+            self._process.stdin.flush()
+            return int(self._answer())
+
+    def _answer(self) -> str:
+        line = self._process.stdout.readline() if self._process.stdout else ""
+        if not line:
+            raise RuntimeError("the nursery died")
+        return line
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.kill()  # and with it all that it forked
+        self._process.communicate()
+
+
+class Part:
+    """One process of the service and what is to be done to it."""
+
+    def __init__(
+        self, nursery: Nursery, name: str, arguments: Sequence[str], log: Path,
+        environment: dict[str, str],
+    ) -> None:
+        self.name = name
+        self.log = log
+        self.starts = 0
+        self.wanted = True
+        """False: is not started again."""
+        self._nursery = nursery
+        self._spec = {"arguments": [*arguments], "log": str(log), "environment": environment}
+        self._handle = -1
+        self._lock = threading.Lock()
+
+    def start(self) -> None:
+        """Start, unless it runs."""
+        with self._lock:
+            if self._handle == -1:
+                self.starts += 1
+                self._handle = os.pidfd_open(self._nursery.fork(self._spec))
+
+    def running(self) -> bool:
+        """Say whether it runs, stopped or not."""
+        with self._lock:
+            if self._handle == -1:
+                return False
+            try:
+                signal.pidfd_send_signal(self._handle, 0)
+            except ProcessLookupError:
+                os.close(self._handle)
+                self._handle = -1
+                return False
+            return True
+
+    def send(self, number: signal.Signals) -> bool:
+        """Send a signal; False where there is no process."""
+        with self._lock:
+            if self._handle == -1:
+                return False
+            try:
+                signal.pidfd_send_signal(self._handle, number)
+            except ProcessLookupError:
+                return False
+            return True
+
+    def end(self, number: signal.Signals = signal.SIGTERM) -> None:
+        """Stop for good and wait for it."""
+        self.wanted = False
+        self.send(signal.SIGCONT)
+        self.send(number)
+        until(lambda: not self.running(), f"end of {self.name}", _STOPPING_S)
+
+
+class Cluster:
+    """Runs the service's parts until the `with` block ends.
+
+    Parameters
+    ----------
+    folder : of data, logs and tokens; stays
+    source : what the capture process opens
+    recon : further arguments of the hub
+    daemons_at : where daemons connect, given the hub's address; by default there
+    """
+
+    def __init__(
+        self, nursery: Nursery, folder: Path, source: Path, *, workers: int = 1,
+        recon: Sequence[str] = (), environment: dict[str, str] | None = None,
+        actions: dict[str, str] | None = None,
+        daemons_at: Callable[[str], str] = lambda address: address,
+    ) -> None:
+        self.data = folder / "data"
+        self.logs = folder
+        self._tokens = folder / "tokens"
+        self._tokens.mkdir(parents=True)
+        self._sockets = tempfile.TemporaryDirectory(prefix="df-")  # their paths must be short
+        self.address = f"ipc://{self._sockets.name}/hub"
+        self.fired: Counter[str] = Counter()
+        points = dict.fromkeys(NAMES, "kill") | (actions or {})
+        settings = PACE | (environment or {}) | {
+            VARIABLE: ",".join(f"{name}={action}" for name, action in points.items()),
+            TOKENS: str(self._tokens)}
+
+        def part(name: str, command: str, address: str, *arguments: str) -> Part:
+            return Part(nursery, name, [command, "--address", address, *arguments],
+                        folder / f"{name}.log", settings)
+
+        elsewhere = daemons_at(self.address)
+        self.hub = part("hub", "hub", self.address, "--data", str(self.data), *recon)
+        self.capture = part("capture", "capture", elsewhere, "--source", str(source))
+        self.workers = [part(f"worker-{number}", "worker", elsewhere)
+                        for number in range(1, workers + 1)]
+        self.parts = [self.hub, self.capture, *self.workers]
+        self._ended = threading.Event()
+        self._watcher = threading.Thread(target=self._watch, daemon=True)
+
+    def __enter__(self) -> Self:
+        self._watcher.start()
+        self.ready()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        try:
+            self.stop(signal.SIGTERM if error is None else signal.SIGKILL)
+        finally:
+            self._sockets.cleanup()
+
+    def stop(self, number: signal.Signals = signal.SIGTERM) -> None:
+        """End all, the hub last; harmless when repeated."""
+        self._ended.set()
+        self._watcher.join()
+        for part in reversed(self.parts):
+            part.end(number)
+
+    def ready(self) -> None:
+        """Wait until sensor and workers are there."""
+        with Client(self.address) as client:
+            def there() -> bool:
+                try:
+                    status = client.status(timeout=2)
+                except ServiceError:
+                    return False
+                return bool(status.sensors) and len(status.workers) >= len(self.workers)
+
+            until(there, "sensor and workers")
+
+    def token(self, failpoint: str) -> Path:
+        """Give the file that lets a failpoint act once."""
+        return self._tokens / failpoint
+
+    def let_fail(self, failpoint: str) -> None:
+        """Let a failpoint act the next time that it is passed."""
+        self.token(failpoint).touch()
+        self.fired[failpoint] += 1
+
+    def restarts(self) -> int:
+        """Give how often a part was started again."""
+        return sum(part.starts - 1 for part in self.parts if part.starts)
+
+    def tracebacks(self) -> list[str]:
+        """Give what ended a part by a fault of its own, or was logged as one."""
+        found = []
+        for part in self.parts:
+            text = part.log.read_text(errors="replace") if part.log.exists() else ""
+            if "Traceback" in text:
+                found.append(f"{part.name}: {text[text.index('Traceback'):][-600:]}")
+        return found
+
+    def _watch(self) -> None:
+        while not self._ended.wait(_WATCH_S):
+            for part in self.parts:
+                if part.wanted and not part.running():
+                    part.start()

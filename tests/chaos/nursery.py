@@ -1,0 +1,72 @@
+"""A process with everything imported and compiled that forks the service's processes.
+
+A worker starts in seconds and is forked in milliseconds: a crash harness starts thousands. Lines
+of JSON come in by stdin, one for each process; its id goes out by stdout.
+"""
+
+import ctypes
+import json
+import os
+import signal
+import sys
+import traceback
+from typing import NoReturn
+
+__all__: list[str] = []
+
+_PR_SET_PDEATHSIG = 1
+
+
+def _main() -> None:
+    import cv2
+
+    from recon import warm
+    from service import captured, hubd, workerd  # noqa: F401
+    from service.commands import COMMANDS, load
+
+    cv2.setNumThreads(1)  # a thread would not live on in what is forked
+    warm()
+    for name in COMMANDS:
+        load(name)
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # the kernel buries them
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    print("ready", flush=True)
+    for line in sys.stdin:
+        wanted = json.loads(line)
+        child = os.fork()
+        if child == 0:
+            _become(wanted)
+        print(child, flush=True)
+
+
+def _become(wanted: dict[str, object]) -> NoReturn:
+    """Be `denseface ARGUMENTS` in a group of its own, until the nursery dies."""
+    status = 1
+    try:
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        os.setpgid(0, 0)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        log = os.open(str(wanted["log"]), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+        null = os.open(os.devnull, os.O_RDONLY)
+        for source, target in ((null, 0), (log, 1), (log, 2)):
+            os.dup2(source, target)
+        os.closerange(3, 256)
+        environment, arguments = wanted["environment"], wanted["arguments"]
+        if not isinstance(environment, dict) or not isinstance(arguments, list):
+            raise TypeError("expected environment and arguments")  # noqa: TRY301
+        os.environ.update(environment)
+        from service.cli import main
+
+        status = main(arguments)
+    except SystemExit as end:
+        status = end.code if isinstance(end.code, int) else 1
+    except BaseException:  # noqa: BLE001
+        traceback.print_exc()
+    finally:
+        print(f"ended with status {status}", file=sys.stderr, flush=True)
+        os._exit(status)
+
+
+if __name__ == "__main__":
+    _main()
