@@ -110,6 +110,11 @@ class Hub:
             self._log.error("tick failed", reason=str(error))
         return outputs
 
+    def was_away(self, seconds: float) -> None:
+        """Take note that the hub could not listen for a while: stopped, or waiting for its disk."""
+        self._log.warning("was away", seconds=round(seconds, 1))
+        self._roster.forgive(seconds)
+
     def unreachable(self, peer: bytes, reason: str = "unreachable") -> list[Output]:
         """Take note that a message to a peer could not be delivered, nor could the next."""
         return list(self._gone(peer, reason))

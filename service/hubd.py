@@ -27,6 +27,8 @@ from service.wire import decode_to_hub, encode
 __all__ = ["run"]
 
 _TICK_S = 0.25
+_AWAY_S = 0.25
+"""A tick that is later than this: what was said meanwhile has not been heard yet, seconds."""
 _SENT = {"take": "hub.take.sent", "frame_accepted": "hub.frame.acknowledged",
          "press_accepted": "hub.press.acknowledged", "job": "hub.job.sent"}
 """Failpoints after a kind of message was sent."""
@@ -69,9 +71,11 @@ class _Loop:
         self._log = structlog.get_logger("hub")
 
     def serve(self, stop: StopSignal) -> None:
-        due = 0.0
+        due = time.monotonic()
         while not stop:
             if (now := time.monotonic()) >= due:
+                if now - due > _AWAY_S:
+                    self._hub.was_away(now - due)
                 due = now + _TICK_S
                 if self._entrance.tick():
                     self._drop_revoked()

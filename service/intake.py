@@ -19,6 +19,7 @@ from service.wire import Packet
 __all__ = ["Intake"]
 
 _MIB = 2**20
+_REFUSALS = 1000
 
 
 @dataclass
@@ -44,6 +45,8 @@ class Intake:
         self._recon = recon
         self._recon_hash = recon_hash
         self._presses: dict[str, _Press] = {}
+        self._refused: dict[tuple[bytes, str, int], str] = {}
+        """Why the last requests were refused, so that a repeat of one gets the same answer."""
         self._log = structlog.get_logger("hub")
 
     def __len__(self) -> int:
@@ -58,6 +61,11 @@ class Intake:
     ) -> Iterator[Output]:
         """Ask a sensor for a frame, unless this id is known already."""
         capture_id, request = message.capture_id, message.request
+        if reason := self._refused.get((peer, capture_id, request)):
+            # A repeat that was under way when the client had its answer: it has told its user.
+            yield send(peer, messages.PressRefused(
+                request=request, capture_id=capture_id, message=reason))
+            return
         state = self._state(capture_id)
         if state is CaptureState.PRESSED:
             self._presses[capture_id].pressers[peer] = request
@@ -70,8 +78,7 @@ class Intake:
         if sensor is None or reason:
             reason = reason or "no sensor is connected"
             self._log.warning("press refused", capture_id=capture_id, reason=reason)
-            yield send(peer, messages.PressRefused(
-                request=request, capture_id=capture_id, message=reason))
+            yield self._refusal(peer, capture_id, request, reason)
             return
         self._log.info("pressed", capture_id=capture_id, sensor=sensor.name)
         deadline = now + self._settings.take_timeout_s
@@ -115,8 +122,14 @@ class Intake:
         if press := self._presses.pop(capture_id, None):
             self._log.warning("press refused", capture_id=capture_id, reason=reason)
             for presser, request in press.pressers.items():
-                yield send(presser, messages.PressRefused(
-                    request=request, capture_id=capture_id, message=reason))
+                yield self._refusal(presser, capture_id, request, reason)
+
+    def _refusal(self, peer: bytes, capture_id: str, request: int, reason: str) -> Output:
+        self._refused[peer, capture_id, request] = reason
+        if len(self._refused) > _REFUSALS:
+            del self._refused[next(iter(self._refused))]
+        return send(peer, messages.PressRefused(
+            request=request, capture_id=capture_id, message=reason))
 
     def purge(self, capture_id: str | None) -> Iterator[Output]:
         """Refuse one press, or all where None, whose frame is no longer wanted."""

@@ -60,16 +60,26 @@ class Roster:
         return worker
 
     def heartbeat(self, peer: bytes, holding: str | None, now: float) -> bool:
-        """Note a sign of life; False where nobody of this id is known."""
+        """Note a sign of life; False where the hub cannot do with it what it might.
+
+        That is so where nobody of this id is known, and where a worker has nothing to do and its
+        `WorkerReady` never came.
+        """
         if sensor := self.sensors.get(peer):
             sensor.seen = now
         elif worker := self.workers.get(peer):
             # A worker that lives without the job it was given never got it: let it go silent.
             if worker.job is None or worker.job == holding:
                 worker.seen = now
+            return worker.free or worker.job is not None or holding is not None
         else:
             return False
         return True
+
+    def forgive(self, seconds: float) -> None:
+        """Hold no silence against anyone that the hub could not have heard."""
+        for one in self._everyone():
+            one.seen += seconds
 
     def free_worker(self) -> Worker | None:
         """Give the free worker that has been known longest."""
@@ -81,5 +91,7 @@ class Roster:
 
     def silent(self, before: float) -> list[bytes]:
         """Give the peers that were last heard before a time."""
-        everyone: list[Sensor | Worker] = [*self.sensors.values(), *self.workers.values()]
-        return [one.peer for one in everyone if one.seen < before]
+        return [one.peer for one in self._everyone() if one.seen < before]
+
+    def _everyone(self) -> list[Sensor | Worker]:
+        return [*self.sensors.values(), *self.workers.values()]

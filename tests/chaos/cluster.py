@@ -83,6 +83,7 @@ class Part:
         self.name = name
         self.log = log
         self.starts = 0
+        self.pid = -1
         self.wanted = True
         """False: is not started again."""
         self._nursery = nursery
@@ -95,7 +96,8 @@ class Part:
         with self._lock:
             if self._handle == -1:
                 self.starts += 1
-                self._handle = os.pidfd_open(self._nursery.fork(self._spec))
+                self.pid = self._nursery.fork(self._spec)
+                self._handle = os.pidfd_open(self.pid)
 
     def running(self) -> bool:
         """Say whether it runs, stopped or not."""
@@ -162,6 +164,7 @@ class Cluster:
             return Part(nursery, name, [command, "--address", address, *arguments],
                         folder / f"{name}.log", settings)
 
+        self._part = part
         elsewhere = daemons_at(self.address)
         self.hub = part("hub", "hub", self.address, "--data", str(self.data), *recon)
         self.capture = part("capture", "capture", elsewhere, "--source", str(source))
@@ -203,6 +206,12 @@ class Cluster:
                 return bool(status.sensors) and len(status.workers) >= len(self.workers)
 
             until(there, "sensor and workers")
+
+    def add(self, name: str, command: str, *arguments: str) -> Part:
+        """Run one more command beside the service."""
+        added = self._part(name, command, self.address, *arguments)
+        self.parts.append(added)
+        return added
 
     def token(self, failpoint: str) -> Path:
         """Give the file that lets a failpoint act once."""

@@ -61,7 +61,7 @@ def _become(wanted: dict[str, object]) -> NoReturn:
         status = main(arguments)
     except SystemExit as end:
         status = end.code if isinstance(end.code, int) else 1
-    except BaseException:  # noqa: BLE001
+    except BaseException:
         traceback.print_exc()
     finally:
         print(f"ended with status {status}", file=sys.stderr, flush=True)

@@ -48,7 +48,7 @@ class _Person:
     def _run(self) -> None:
         try:
             self._live()
-        except BaseException as error:  # noqa: BLE001
+        except BaseException as error:
             self.error = error
 
     def _live(self) -> None:

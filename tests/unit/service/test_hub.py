@@ -123,7 +123,7 @@ def test_accepted_is_not_said_before_the_frame_is_in_the_store(bench, monkeypatc
     assert kinds(sent) == [(SENSOR, "frame_refused"), (CLIENT, "press_refused")]
     assert "No space" in sent[1][1].message
     monkeypatch.undo()
-    assert kinds(bench.press()) == [(SENSOR, "take")]
+    assert kinds(bench.press(request=8)) == [(SENSOR, "take")]
 
 
 def test_a_press_without_a_sensor_is_refused(bench):
@@ -150,7 +150,7 @@ def test_a_sensor_that_gives_no_frame_refuses_the_press(bench):
     bench.press()
     assert kinds(bench.say(SENSOR, messages.FrameFailed(capture_id="a", message="unplugged"))) == [
         (CLIENT, "press_refused")]
-    bench.press()
+    bench.press(request=8)
     bench.now += SETTINGS.take_timeout_s
     bench.say(SENSOR, messages.Heartbeat())
     (answer,) = bench.wait(0)
@@ -250,6 +250,41 @@ def test_a_worker_that_takes_its_leave_hands_back_its_job_and_no_attempt_is_lost
     assert [one.kind for one in bench.published] == ["face_done"]
     assert bench.say(OTHER, messages.Goodbye()) == []
     assert bench.store.find("a").attempts == 1
+
+
+def test_a_repeat_of_a_refused_press_is_refused_though_a_sensor_came_meanwhile(bench):
+    (refused,) = bench.press("a", request=7)
+    bench.sensor()
+    assert bench.press("a", request=7) == [refused]
+    assert kinds(bench.press("a", request=8)) == [(SENSOR, "take")]
+    assert bench.wait(11) == [(CLIENT, messages.PressRefused(
+        request=8, capture_id="a", message="no frame from the sensor in 10 s"))]
+    assert kinds(bench.press("a", request=8)) == [(CLIENT, "press_refused")]
+
+
+def test_a_worker_whose_ready_was_lost_is_asked_again(bench):
+    bench.worker()
+    bench.accepted("a")
+    bench.result()
+    # The WorkerReady that follows each answer does not arrive, the heartbeats do.
+    heartbeat = messages.Heartbeat()
+    assert kinds(bench.say(WORKER, heartbeat)) == [(WORKER, "announce")]
+    assert bench.worker(credit=1) == []
+    assert bench.say(WORKER, heartbeat) == []
+    bench.press("b")
+    assert (WORKER, "job") in kinds(bench.frame("b"))
+    assert bench.say(WORKER, messages.Heartbeat(holding="b")) == []
+
+
+def test_silence_while_the_hub_was_away_counts_for_nothing(bench):
+    bench.accepted("a")
+    bench.worker()
+    bench.now += 60
+    bench.hub.was_away(59.9)
+    assert bench.wait(0) == []
+    assert (len(bench.hub.peers()), bench.hub._jobs.working) == (2, 1)
+    bench.wait(4)
+    assert bench.hub.peers() == []
 
 
 def test_an_unreachable_worker_s_job_is_given_out_again(bench):

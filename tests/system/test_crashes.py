@@ -1,0 +1,193 @@
+"""Processes are killed, stopped, cut off and lied to; the history of each run is checked."""
+
+import signal
+from contextlib import ExitStack
+
+import psutil
+import pytest
+import zmq
+
+from service.addresses import publications_of
+from service.failpoints import NAMES
+from service.layout import Layout
+from service.outputs import Topic
+from tests.chaos.cluster import Nursery, Part, until
+from tests.chaos.history import Answer, violations
+from tests.chaos.proxy import Proxy
+from tests.chaos.scene import Scene
+from tests.chaos.source import CHEAP, write_small_frame
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quick_client():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DENSEFACE_RESEND_S", "0.3")
+        yield
+
+
+@pytest.fixture(scope="module")
+def nursery():
+    with Nursery() as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def frame(tmp_path_factory):
+    path = tmp_path_factory.mktemp("source") / "frame.npz"
+    write_small_frame(path)
+    return path
+
+
+@pytest.fixture
+def scene(nursery, frame, tmp_path):
+    with ExitStack() as stack:
+        def start(**options) -> Scene:
+            return stack.enter_context(
+                Scene(nursery, tmp_path / "run", frame, recon=CHEAP, **options))
+        yield start
+
+
+def check(scene: Scene, **states: int) -> None:
+    """No promise was broken, nobody fell over by himself, and captures ended as stated."""
+    history = scene.finish()
+    assert violations(history) == []
+    assert scene.cluster.tracebacks() == []
+    for state, count in states.items():
+        assert [one.state for one in history.kept].count(state) == count
+
+
+def fail_at(scene: Scene, failpoint: str, presses: int = 1) -> None:
+    scene.cluster.let_fail(failpoint)
+    scene.press(failpoint.replace(".", "-"), presses)
+    until(lambda: not scene.cluster.token(failpoint).exists(), failpoint)
+
+
+def is_stopped(part: Part) -> bool:
+    return psutil.Process(part.pid).status() == psutil.STATUS_STOPPED
+
+
+def test_a_kill_at_each_step_of_a_capture_s_life(scene):
+    running = scene()
+    for name in NAMES:
+        fail_at(running, name, presses=2)
+        running.settle()
+    assert running.cluster.restarts() == len(NAMES)
+    check(running)
+
+
+def test_whoever_hangs_is_given_up_and_may_come_back_late(scene):
+    stops = {"worker.job.computed": "stop", "hub.frame.renamed": "stop", "hub.face.synced": "stop",
+             "capture.frame.taken": "stop"}
+    running = scene(workers=2, actions=stops)
+    fail_at(running, "worker.job.computed")
+    running.settle()  # by the other worker
+    (late,) = [one for one in running.cluster.workers if is_stopped(one)]
+    late.send(signal.SIGCONT)
+    until(lambda: "answer dropped" in running.cluster.hub.log.read_text(), "the late result")
+    for name in ("hub.frame.renamed", "hub.face.synced"):
+        fail_at(running, name)
+        until(lambda: is_stopped(running.cluster.hub), "stop of the hub")
+        running.press(f"{name.replace('.', '-')}-meanwhile")
+        with pytest.raises(TimeoutError):
+            running.settle(1.0)  # longer than the liveness of everyone
+        running.cluster.hub.send(signal.SIGCONT)
+        running.settle()
+    fail_at(running, "capture.frame.taken")
+    refused = running.pressers[-1]
+    until(lambda: Answer.REFUSED in refused.answers.copy().values(), "refusal")
+    running.cluster.capture.send(signal.SIGCONT)
+    running.settle()
+    check(running, done=6)
+
+
+def test_a_full_disk_refuses_presses_and_keeps_what_was_accepted(scene):
+    full = {"hub.frame.synced": "raise:ENOSPC", "hub.frame.renamed": "raise:EIO",
+            "hub.face.written": "raise:ENOSPC", "hub.face.renamed": "raise:EIO"}
+    running = scene(actions=full)
+    for name, reason in (("hub.frame.synced", "no room on the disk"),
+                         ("hub.frame.renamed", "the disk fails")):
+        fail_at(running, name)
+        running.settle()
+        (said,) = running.pressers[-1].reasons
+        assert reason in said
+    for name in ("hub.face.written", "hub.face.renamed"):
+        fail_at(running, name, presses=2)
+        running.settle()
+        assert running.pressers[-1].reasons == []
+    check(running, done=6, dead=0)
+    assert not list(Layout(running.cluster.data).half_written())
+
+
+def test_spoiled_frames_end_as_dead_letters_and_the_rest_goes_on(scene):
+    running = scene()
+    running.cluster.workers[0].end()
+    pressed = running.press("p", 3)
+    until(pressed.done, "three accepted presses")
+    running.cluster.hub.end(signal.SIGKILL)
+    first, second, _ = pressed.answers
+    layout = Layout(running.cluster.data)
+    with layout.frame(first).open("r+b") as file:
+        file.truncate(1000)
+    spoiled = bytearray(layout.frame(second).read_bytes())
+    spoiled[5000] ^= 1
+    layout.frame(second).write_bytes(spoiled)
+    running.damaged |= {first, second}
+    for part in running.cluster.parts:
+        part.wanted = True
+    running.settle()
+    check(running, done=1, dead=2)
+    reports = list(layout.quarantine.glob("*.json"))
+    assert len(reports) == 2
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_messages_are_lost_doubled_and_reordered(scene, seed):
+    with ExitStack() as stack:
+        proxies = []
+
+        def between(hub: str) -> str:
+            proxies.append(stack.enter_context(
+                Proxy(hub, seed, lose=0.03, double=0.15, delay=0.15)))
+            return proxies[0].address
+
+        running = scene(workers=2, daemons_at=between)
+        for name in ("a", "b"):
+            running.press(name, 15)
+        running.settle()
+        check(running)
+        assert all(proxies[0].counts[fate] for fate in ("lost", "doubled", "delayed", "passed"))
+
+
+def test_slow_and_dead_subscribers_hurt_only_themselves(scene):
+    running = scene()
+    with zmq.Context() as context, context.socket(zmq.SUB) as deaf:
+        deaf.set(zmq.RCVHWM, 1)
+        deaf.set(zmq.LINGER, 0)
+        deaf.subscribe(Topic.FACES)
+        deaf.connect(publications_of(running.cluster.address))
+        stopped = running.cluster.add("subscriber", "subscribe", "--after", "0")
+        running.press("first")
+        running.settle()
+        until(lambda: "first-1" in stopped.log.read_text(), "the subscriber's first face")
+        stopped.send(signal.SIGSTOP)
+        for name in ("a", "b"):
+            running.press(name, 40)
+        running.settle()
+        stopped.send(signal.SIGCONT)
+        until(lambda: all(f" {one} " in stopped.log.read_text() for presser in running.pressers
+                          for one in presser.answers), "all that it missed")
+        check(running, done=81)
+
+
+def test_a_worker_told_to_stop_hands_back_what_it_cannot_finish(scene):
+    running = scene(actions={"worker.job.computing": "hang"})
+    fail_at(running, "worker.job.computing")
+    (worker,) = running.cluster.workers
+    worker.end()
+    assert "job handed back" in worker.log.read_text()
+    worker.wanted = True
+    running.settle()
+    said = running.cluster.hub.log.read_text()
+    assert said.count("attempt=1") == 2
+    assert "attempt=2" not in said
+    check(running, done=1)
