@@ -31,7 +31,10 @@ def test_a_jump_at_each_step_of_a_capture_s_life(tmp_path, jump_s, restart):
                     store.__exit__()
                     store = FolderStore(data, clock)
                     bench = Bench(Hub(store, settings, Settings()), store, now, published)
-            {"wait": lambda: bench.wait(10.0)}.get(step, getattr(bench, step))()
+            if step == "wait":
+                bench.wait(10.0)
+            else:
+                getattr(bench, step)()
             clock.pass_time(1.0)
             now = bench.now = bench.now + 1.0
         assert [(one.kind, one.sequence) for one in bench.published] == [("face_done", 1)]
