@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from service.settings import private_folder
@@ -32,7 +33,8 @@ class Layout:
         self.ballast = root / "ballast"
         self.root = root
         sync_folder(root)
-        sync_folder(root.absolute().parent)
+        with suppress(PermissionError):  # to sync it, it must be readable
+            sync_folder(root.absolute().parent)
 
     def frame(self, capture_id: str) -> Path:
         """Where a capture's frame is."""

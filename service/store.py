@@ -59,7 +59,8 @@ class FolderStore:
     """
 
     def __init__(self, folder: Path, clock: Clock | None = None) -> None:
-        self._layout = Layout(private_folder(folder))
+        with _naming(folder):
+            self._layout = Layout(private_folder(folder))
         self._lock = _lock(self._layout.lock)
         try:
             self._database, self._account, self._quarantine = recover(

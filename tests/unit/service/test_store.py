@@ -1,6 +1,8 @@
 """The data folder."""
 
 import os
+import stat
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -52,6 +54,32 @@ def test_an_accepted_frame_survives_closing(tmp_path):
         np.testing.assert_array_equal(depth, small_frame().depth)
         assert store.start_attempt("a") == 1
         assert store.start_attempt("a") == 2
+
+
+def test_a_row_comes_after_its_file_is_safe(store, monkeypatch):
+    steps = []
+    sync, rename, insert = os.fsync, Path.replace, store._database.all
+
+    def synced(descriptor):
+        steps.append("folder" if stat.S_ISDIR(os.fstat(descriptor).st_mode) else "file")
+        sync(descriptor)
+
+    def renamed(path, target):
+        steps.append(target.name)
+        return rename(path, target)
+
+    def inserted(statement, *values):
+        if statement.startswith("INSERT"):
+            steps.append("row")
+        return insert(statement, *values)
+
+    monkeypatch.setattr("service.spool.os.fsync", synced)
+    monkeypatch.setattr(Path, "replace", renamed)
+    monkeypatch.setattr(store._database, "all", inserted)
+    store.accept(frame("a"), Settings(), "0f")
+    assert steps == ["file", "a.frame", "folder", "row"]
+    assert store._database.one("PRAGMA synchronous")[0] == 2
+    assert store._database.one("PRAGMA journal_mode")[0] == "wal"
 
 
 def test_outcomes_are_numbered_in_order(store):

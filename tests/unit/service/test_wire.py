@@ -171,6 +171,10 @@ def header(**changes) -> bytes:
     return json.dumps(json.loads(WIRES[1][0]) | changes).encode()
 
 
+def asked(kind: str, **fields) -> bytes:
+    return json.dumps({"version": 1, "kind": kind, "request": 1} | fields).encode()
+
+
 @pytest.mark.parametrize(("parts", "message"), [
     ([WIRES[0][0].replace(b'"version":1,', b"")], "no version"),
     ([WIRES[0][0].replace(b'"version":1', b'"version":2')], "version: Input should be 1"),
@@ -181,6 +185,15 @@ def header(**changes) -> bytes:
     (WIRES[1][:2], "1 arrays follow, 2 announced"),
     ([WIRES[1][0], WIRES[1][1][:-1], WIRES[1][2]], "depth has 95 bytes, 96 announced"),
     ([b" " * (wire.MAX_HEADER_BYTES_TO_HUB + 1)], "header has"),
+    ([asked("find_start")], "expected either last or since"),
+    ([asked("find_start", last=1, since="2026-01-31T00:00:00Z")], "expected either last or since"),
+    ([asked("find_start", since="2026-01-31T00:00:00")], "since: .* timezone"),
+    ([asked("find_start", since="0001-01-01T00:00:00+14:00")], "since: .* does not exist in UTC"),
+    ([asked("find_start", since=1e300)], "since: "),
+    ([asked("find_start", last=0)], "last: "),
+    ([asked("purge")], "expected one of"),
+    ([asked("purge", capture_id="a", everything=True)], "expected one of"),
+    ([asked("purge", before="9999-12-31T23:59:59-14:00")], "before: .* does not exist in UTC"),
     ([b""] * (wire.MAX_PARTS + 1), "parts"),
 ])
 def test_what_is_wrong_is_named(parts, message):
