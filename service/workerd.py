@@ -33,7 +33,9 @@ def run(settings: ServiceSettings) -> int:
     """
     cv2.setNumThreads(1)  # one worker for each core; more threads would only fight
     with StopSignal() as stop:
+        begun = time.monotonic()
         warm()
+        structlog.get_logger("worker").info("warm", seconds=round(time.monotonic() - begun, 2))
         with Background[Face]("recon") as compute:
             with HubLink(settings, "worker") as link:
                 worker = _Worker(settings, link, compute)
