@@ -21,6 +21,8 @@ COPY --from=build /opt/denseface /opt/denseface
 ENV PATH=/opt/denseface/bin:$PATH \
     DENSEFACE_DATA=/data
 USER denseface
+# Compiled for this processor into the user's cache: else the first start would wait for it.
+RUN python3 -c 'from recon import warm; warm()'
 WORKDIR /data
 VOLUME /data
 ENTRYPOINT ["denseface"]
