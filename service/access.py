@@ -28,6 +28,7 @@ KINDS: dict[str, frozenset[Role]] = {
     "sensor_ready": _S,
     "frame": _S,
     "frame_failed": _S,
+    "preview_frame": _S,
     "worker_ready": _W,
     "result": _W,
     "job_failed": _W,

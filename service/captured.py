@@ -8,14 +8,13 @@ import os
 import socket
 import time
 from collections import deque
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
 import structlog
 
-from capture import CaptureError, RgbdFrame, Source, open_source
-from capture.errors import SensorError, UnreadableSourceError
+from capture import CaptureError, RgbdFrame
+from capture.errors import SensorError
 from service.background import Background
 from service.failpoints import failpoint
 from service.link import HubLink
@@ -25,11 +24,15 @@ from service.messages import (
     FrameAccepted,
     FrameFailed,
     FrameRefused,
+    PreviewFrame,
     SensorReady,
     Take,
+    TakePreview,
 )
-from service.payload import FrameHeader
+from service.payload import FrameHeader, PreviewHeader
+from service.sensing import Sensor
 from service.settings import ServiceSettings
+from service.shrink import shrunk
 from service.stopping import StopSignal
 from service.wire import Packet
 
@@ -50,7 +53,7 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None) ->
     CaptureError
         Where the source cannot be opened, or a live sensor went away.
     """
-    sensor = _Sensor(uri, calibration)
+    sensor = Sensor(uri, calibration)
     with StopSignal() as stop, Background[RgbdFrame | None]("sensor") as driver:
         try:
             with HubLink(settings, "capture") as link:
@@ -60,7 +63,7 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None) ->
         return stop.exit_status
 
 
-def _close(driver: Background[RgbdFrame | None], sensor: "_Sensor") -> None:
+def _close(driver: Background[RgbdFrame | None], sensor: Sensor) -> None:
     if not driver.ends_within(_CLOSING_S):
         structlog.get_logger("capture").error("the driver hangs", source=sensor.uri)
         os._exit(1)
@@ -71,36 +74,9 @@ def _close(driver: Background[RgbdFrame | None], sensor: "_Sensor") -> None:
     driver.take()
 
 
-class _Sensor:
-    """A source without an end. All methods are called in the driver's thread."""
-
-    def __init__(self, uri: str, calibration: Path | None) -> None:
-        self.uri = uri
-        self._calibration = calibration
-        self._source: Source | None = None
-        self._frames: Iterator[RgbdFrame] = iter(())
-
-    def open(self) -> None:
-        self._source = open_source(self.uri, calibration=self._calibration)
-
-    def take(self) -> RgbdFrame:
-        if self._source is None:
-            raise SensorError(f"{self.uri}: is not open")
-        for _ in range(2):
-            frame = next(self._frames, None)
-            if frame is not None:
-                return frame
-            self._frames = iter(self._source)
-        raise UnreadableSourceError(f"{self.uri}: holds no pair of a depth and a colour frame")
-
-    def close(self) -> None:
-        if self._source is not None:
-            self._source.close()
-
-
 class _Capture:
     def __init__(
-        self, settings: ServiceSettings, link: HubLink, sensor: _Sensor,
+        self, settings: ServiceSettings, link: HubLink, sensor: Sensor,
         driver: Background[RgbdFrame | None],
     ) -> None:
         self._settings = settings
@@ -110,6 +86,9 @@ class _Capture:
         self._log = structlog.get_logger("capture")
         self._open = False
         self._asked: deque[str] = deque()
+        self._preview_asked = False
+        self._looking = False
+        """The call under way is for a preview."""
         self._unsafe: dict[str, tuple[RgbdFrame, float]] = {}
         """Frames that the hub has not yet said are safe, and when each is to be sent again."""
 
@@ -126,6 +105,9 @@ class _Capture:
                 os._exit(1)
             if self._asked and not self._driver:
                 self._driver.start(self._sensor.take)
+            elif self._preview_asked and not self._driver and not self._unsafe:
+                self._looking = True
+                self._driver.start(self._sensor.look)
             self._send_again()
 
     def _receive(self, packet: Packet) -> None:
@@ -139,6 +121,8 @@ class _Capture:
                     self._send(capture_id, self._unsafe[capture_id][0])
                 elif capture_id not in self._asked:
                     self._asked.append(capture_id)
+            case TakePreview():
+                self._preview_asked = True
             case FrameAccepted(capture_id=capture_id):
                 self._unsafe.pop(capture_id, None)
             case FrameRefused(capture_id=capture_id, message=reason):
@@ -156,19 +140,41 @@ class _Capture:
             self._log.info("source open", source=self._sensor.uri)
             self._ready()
             return
-        capture_id = self._asked.popleft()
+        looking, self._looking = self._looking, False
         try:
             frame = self._driver.take()
         except CaptureError as error:
+            self._no_frame(error, looking=looking)
+            return
+        if frame is None:
+            return
+        # What a live sensor gave after a press came in is for the press, whoever wanted it.
+        if self._asked and (not looking or self._sensor.live):
+            capture_id = self._asked.popleft()
+            failpoint("capture.frame.taken")
+            self._log.info("taken", capture_id=capture_id, skew_us=frame.skew_us)
+            self._send(capture_id, frame)
+        if self._preview_asked and not self._asked and (looking or self._sensor.live):
+            self._preview_asked = False
+            self._send_preview(frame)
+
+    def _no_frame(self, error: CaptureError, *, looking: bool) -> None:
+        if looking:
+            self._preview_asked = False
+            self._log.warning("no preview", reason=str(error))
+        else:
+            capture_id = self._asked.popleft()
             self._log.error("no frame", capture_id=capture_id, reason=str(error))
             self._link.send(FrameFailed(capture_id=capture_id, message=str(error)[:4000]))
-            if isinstance(error, SensorError):
-                raise
-        else:
-            failpoint("capture.frame.taken")
-            if frame is not None:
-                self._log.info("taken", capture_id=capture_id, skew_us=frame.skew_us)
-                self._send(capture_id, frame)
+        if isinstance(error, SensorError):
+            raise error
+
+    def _send_preview(self, frame: RgbdFrame) -> None:
+        image = shrunk(frame.color)
+        height, width, _ = image.shape
+        self._link.send(PreviewFrame(preview=PreviewHeader(
+            width=width, height=height, timestamp_us=frame.color_timestamp_us)),
+            {"image": image})
 
     def _send(self, capture_id: str, frame: RgbdFrame) -> None:
         header, arrays = FrameHeader.of(frame)

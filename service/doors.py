@@ -20,7 +20,13 @@ from service.keys import KeyPair
 from service.outputs import Topic
 from service.payload import MAX_PAYLOAD_BYTES
 from service.refusals import Refusals
-from service.sockets import TooLongError, open_socket, receive_parts, send_parts
+from service.sockets import (
+    TooLongError,
+    open_socket,
+    publish_parts,
+    receive_parts,
+    send_parts,
+)
 from service.wire import MAX_HEADER_BYTES, MAX_PARTS
 from service.zap import DOMAIN, TOPICS_DOMAIN
 
@@ -83,6 +89,8 @@ class Door:
         self._subscribed: set[bytes] = set()
         """Tokens of the keys that subscribed since the publisher was bound."""
         self._unbound = False
+        self.subscriptions: dict[Topic, int] = dict.fromkeys(Topic, 0)
+        """How many there are of each topic."""
         self._router = open_socket(context, zmq.ROUTER)
         self._router.set(zmq.ROUTER_MANDATORY, 1)
         self._publisher = open_socket(context, zmq.XPUB)
@@ -155,9 +163,9 @@ class Door:
                 raise
             return False
 
-    def publish(self, topic: Topic, parts: list[bytes]) -> None:
-        """Send to all who subscribed to a topic."""
-        send_parts(self._publisher, [topic.encode(), *parts])
+    def publish(self, topic: Topic, parts: list[bytes]) -> bool:
+        """Send to all who subscribed to a topic; False where one at least could not take it."""
+        return publish_parts(self._publisher, [topic.encode(), *parts])
 
     def knows(self, peer: bytes) -> bool:
         """Say whether a peer's key is allowed still, with the roles that it had."""
@@ -213,6 +221,10 @@ class Door:
         said = first.bytes
         name = said[1:].decode("utf-8", "replace")
         topic = Topic(name) if name in set(Topic) else None
+        if topic and said[:1] in (b"\0", b"\1"):
+            # Of those not let in too: their end is told as well, without a name.
+            self.subscriptions[topic] = max(
+                0, self.subscriptions[topic] + (1 if said[:1] == b"\1" else -1))
         if said[:1] == b"\0":
             if topic:
                 self._publisher.set(zmq.UNSUBSCRIBE, topic.encode())

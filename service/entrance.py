@@ -109,10 +109,14 @@ class Entrance:
         """Send to a peer; False where it cannot be reached, or its key was revoked."""
         return self._doors[peer[0]].send(peer[1:], parts)
 
-    def publish(self, topic: Topic, parts: list[bytes]) -> None:
-        """Send to all who subscribed to a topic."""
-        for door in self._doors:
-            door.publish(topic, parts)
+    def publish(self, topic: Topic, parts: list[bytes]) -> bool:
+        """Send to all who subscribed to a topic; False where one at least could not take it."""
+        taken = [door.publish(topic, parts) for door in self._doors]
+        return all(taken)
+
+    def subscriptions(self) -> dict[str, int]:
+        """Give how many subscriptions there are to each topic."""
+        return {topic: sum(door.subscriptions[topic] for door in self._doors) for topic in Topic}
 
     def knows(self, peer: bytes) -> bool:
         """Say whether a peer's key is allowed still, with the roles that it had."""

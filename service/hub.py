@@ -13,8 +13,8 @@ import structlog
 
 from recon.settings import Settings
 from service import messages
-from service.counters import Counters
 from service.errors import DamagedDatabaseError, DamagedFaceError, ServiceError, StoreError
+from service.figures import Figures
 from service.intake import Intake
 from service.jobs import Jobs
 from service.keeper import Keeper
@@ -24,6 +24,7 @@ from service.roster import MOST_PEERS, Roster, Sensor, Worker
 from service.settings import ServiceSettings
 from service.states import CaptureState
 from service.stored import Store
+from service.viewfinder import Viewfinder
 from service.wire import Packet
 
 __all__ = ["Hub", "settings_hash"]
@@ -42,22 +43,23 @@ class Hub:
     store : what was accepted before is resumed
     settings : time-outs and limits
     recon : settings of every job accepted from now on
-    counters : counts what is told apart here
+    figures : what the status says of this process
     """
 
     def __init__(
         self, store: Store, settings: ServiceSettings, recon: Settings,
-        counters: Counters | None = None,
+        figures: Figures | None = None,
     ) -> None:
         self._store = store
-        self._counters = counters or Counters()
+        self._figures = figures or Figures()
         self._settings = settings
         self._roster = Roster()
         self._outcomes = Outcomes(store, self._remake)
         self._intake = Intake(store, self._roster, settings, recon, settings_hash(recon))
         self._jobs = Jobs(store, self._roster, settings.attempts, self._outcomes.concluded)
         self._keeper = Keeper(
-            store, settings, self._intake, self._jobs, self._outcomes, self._counters)
+            store, settings, self._intake, self._jobs, self._outcomes, self._figures.counters)
+        self._viewfinder = Viewfinder(self._roster, settings.heartbeat_s)
         self._status_due = 0.0
         self._log = structlog.get_logger("hub")
 
@@ -101,6 +103,7 @@ class Hub:
                 outputs.extend(self._gone(peer, "silent"))
             outputs.extend(self._jobs.dispatch(now))
             self._keeper.tick(now)
+            outputs.extend(self._viewfinder.ask(now, busy=len(self._intake) > 0))
             if now >= self._status_due:
                 self._status_due = now + self._settings.heartbeat_s
                 outputs.append(Publish(Topic.STATUS, Packet(self._status())))
@@ -125,6 +128,10 @@ class Hub:
             return self._intake.knows(capture_id)
         except StoreError:
             return True
+
+    def show(self, *, wanted: bool) -> None:
+        """Take note of whether somebody looks at the previews; they are asked for at each tick."""
+        self._viewfinder.wanted = wanted
 
     def peers(self) -> list[bytes]:
         """Give the sensors and workers that are known."""
@@ -161,8 +168,10 @@ class Hub:
                 yield from self._gone(peer, "goodbye")
             case messages.Frame() as message:
                 yield from self._frame(peer, message, packet)
+            case messages.PreviewFrame() as message:
+                yield from self._viewfinder.receive(peer, message, packet)
             case messages.FrameFailed(capture_id=capture_id, message=reason):
-                yield from self._intake.refuse(capture_id, reason)
+                yield from self._intake.refuse(capture_id, "sensor", reason)
             case messages.Result() as message:
                 yield from self._jobs.result(now, peer, message, packet)
             case messages.JobFailed() as message:
@@ -202,7 +211,7 @@ class Hub:
             self._jobs.lost(worker)
 
     def _status(self, request: int = 0) -> messages.Status:
-        counts = self._store.counts()
+        counts, counters = self._store.counts(), self._figures.counters
         return messages.Status(
             request=request, epoch=self._store.epoch, sequence=self._store.last_sequence(),
             hub_version=version("denseface"),
@@ -211,4 +220,16 @@ class Hub:
             pressed=len(self._intake), queued=self._jobs.queued, working=self._jobs.working,
             done=counts.get(CaptureState.DONE, 0), failed=counts.get(CaptureState.FAILED, 0),
             dead=counts.get(CaptureState.DEAD, 0),
-            refused=self._counters.labels("refused"))
+            refused=counters.labels("refused"),
+            presses_refused=counters.labels("press_refused"),
+            since_start={name: count for name, label, count in counters.items() if not label},
+            latencies={stage: messages.Latency(
+                count=one.count, median_s=one.quantile_s(0.5), p99_s=one.quantile_s(0.99))
+                for stage, one in self._figures.latencies.stages().items()},
+            free_bytes=self._free_bytes(), kept_bytes=self._figures.kept_bytes)
+
+    def _free_bytes(self) -> int | None:
+        try:
+            return self._store.free_bytes()
+        except StoreError:
+            return None

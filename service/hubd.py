@@ -3,6 +3,7 @@
 import math
 import os
 import time
+from contextlib import AbstractContextManager, nullcontext
 
 import structlog
 import zmq
@@ -10,19 +11,20 @@ import zmq
 from recon.settings import Settings
 from service import messages
 from service.access import missing_role
-from service.counters import Counters
 from service.doors import Incoming
 from service.entrance import Entrance
 from service.errors import LocalProtocolError, RemoteProtocolError
 from service.failpoints import failpoint
 from service.hub import Hub
+from service.observer import Observer
 from service.outputs import Output, Publish, Topic, send
 from service.pressed import Pressed
 from service.refusals import Refusals
 from service.settings import ServiceSettings
 from service.stopping import StopSignal
 from service.store import FolderStore
-from service.wire import decode_to_hub, encode
+from service.viewfinder import PERIOD_S
+from service.wire import Packet, decode_to_hub, encode
 
 __all__ = ["run"]
 
@@ -46,27 +48,43 @@ def run(settings: ServiceSettings, recon: Settings) -> int:
     """
     os.umask(0o077)  # the database's files too are for this user alone
     log = structlog.get_logger("hub")
-    counters = Counters()
-    refusals = Refusals(counters)
-    with StopSignal() as stop, FolderStore(settings.data) as store, zmq.Context() as context:
+    with StopSignal() as stop, FolderStore(settings.data) as store, \
+            Observer(settings.data) as observer, zmq.Context() as context:
+        refusals = Refusals(observer.figures.counters)
         entrance = Entrance(context, settings, refusals, stop)
         try:
-            loop = _Loop(entrance, Hub(store, settings, recon, counters), refusals)
+            hub = Hub(store, settings, recon, observer.figures)
+            loop = _Loop(entrance, hub, refusals, observer)
             log.info("listening", address=" ".join(entrance.addresses), data=str(settings.data))
-            loop.serve(stop)
+            with _scrapes(settings, observer):
+                loop.serve(stop)
         finally:
             entrance.close()
         log.info("stopped")
         return stop.exit_status
 
 
+def _scrapes(settings: ServiceSettings, observer: Observer) -> AbstractContextManager[object]:
+    if settings.metrics is None:
+        return nullcontext()
+    from service.health import Health, unwritable
+    from service.metrics import Metrics
+    from service.scrape import ScrapeServer
+
+    health = Health(observer.board, settings, lambda: unwritable(settings.data))
+    server = ScrapeServer(settings.metrics, Metrics(observer.board).render, health.report)
+    structlog.get_logger("hub").info("metrics", url=f"{server.url}/metrics")
+    return server
+
+
 class _Loop:
     def __init__(
-        self, entrance: Entrance, hub: Hub, refusals: Refusals
+        self, entrance: Entrance, hub: Hub, refusals: Refusals, observer: Observer
     ) -> None:
         self._entrance = entrance
         self._hub = hub
         self._refusals = refusals
+        self._observer = observer
         self._pressed = Pressed()
         self._log = structlog.get_logger("hub")
 
@@ -76,10 +94,15 @@ class _Loop:
             if (now := time.monotonic()) >= due:
                 if now - due > _AWAY_S:
                     self._hub.was_away(now - due)
-                due = now + _TICK_S
+                subscriptions = self._entrance.subscriptions()
+                watched = subscriptions[Topic.PREVIEW] > 0
+                due = now + (PERIOD_S if watched else _TICK_S)
                 if self._entrance.tick():
                     self._drop_revoked()
-                self._give_out(self._hub.tick(now))
+                self._hub.show(wanted=watched)
+                outputs = self._hub.tick(now)
+                self._observer.ticked(now, outputs, subscriptions)
+                self._give_out(outputs)
             for incoming in self._entrance.receive(max(0, math.ceil((due - now) * 1000))):
                 self._take_in(incoming)
             stop.drain()
@@ -107,9 +130,10 @@ class _Loop:
         if isinstance(message, messages.Press):
             self._pressed.note(message.capture_id, sender.fingerprint,
                                anew=not self._hub.knows(message.capture_id))
-        self._give_out(self._hub.receive(time.monotonic(), incoming.peer, packet))
+        self._give_out(self._hub.receive(time.monotonic(), incoming.peer, packet), packet)
 
-    def _give_out(self, outputs: list[Output]) -> None:
+    def _give_out(self, outputs: list[Output], caused_by: Packet | None = None) -> None:
+        self._observer.saw(time.monotonic(), caused_by, outputs)
         for output in outputs:
             try:
                 parts = encode(output.packet)
@@ -126,7 +150,8 @@ class _Loop:
     def _publish(self, topic: Topic, parts: list[bytes]) -> None:
         if topic is Topic.FACES:
             failpoint("hub.outcome.publishing")
-        self._entrance.publish(topic, parts)
+        if not self._entrance.publish(topic, parts):
+            self._observer.figures.counters.add("drops", topic)
         if topic is Topic.FACES:
             failpoint("hub.outcome.published")
 

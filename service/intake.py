@@ -45,8 +45,8 @@ class Intake:
         self._recon = recon
         self._recon_hash = recon_hash
         self._presses: dict[str, _Press] = {}
-        self._refused: dict[tuple[bytes, str, int], str] = {}
-        """Why the last requests were refused, so that a repeat of one gets the same answer."""
+        self._refused: dict[tuple[bytes, str, int], messages.PressRefused] = {}
+        """How the last requests were refused, so that a repeat of one gets the same answer."""
         self._log = structlog.get_logger("hub")
 
     def __len__(self) -> int:
@@ -61,10 +61,9 @@ class Intake:
     ) -> Iterator[Output]:
         """Ask a sensor for a frame, unless this id is known already."""
         capture_id, request = message.capture_id, message.request
-        if reason := self._refused.get((peer, capture_id, request)):
+        if refused := self._refused.get((peer, capture_id, request)):
             # A repeat that was under way when the client had its answer: it has told its user.
-            yield send(peer, messages.PressRefused(
-                request=request, capture_id=capture_id, message=reason))
+            yield send(peer, refused)
             return
         state = self._state(capture_id)
         if state is CaptureState.PRESSED:
@@ -74,27 +73,29 @@ class Intake:
             yield send(peer, messages.PressAccepted(request=request, capture_id=capture_id))
             return
         sensor = self._roster.sensor()
-        reason = self._obstacle(queued)
-        if sensor is None or reason:
-            reason = reason or "no sensor is connected"
-            self._log.warning("press refused", capture_id=capture_id, reason=reason)
-            yield self._refusal(peer, capture_id, request, reason)
+        obstacle = self._obstacle(queued)
+        if sensor is None or obstacle:
+            reason, why = obstacle or ("no_sensor", "no sensor is connected")
+            self._log.warning("press refused", capture_id=capture_id, reason=why)
+            yield self._refusal(peer, messages.PressRefused(
+                request=request, capture_id=capture_id, reason=reason, message=why))
             return
         self._log.info("pressed", capture_id=capture_id, sensor=sensor.name)
         deadline = now + self._settings.take_timeout_s
         self._presses[capture_id] = _Press(sensor.peer, deadline, {peer: request})
         yield send(sensor.peer, messages.Take(capture_id=capture_id))
 
-    def _obstacle(self, queued: int) -> str | None:
+    def _obstacle(self, queued: int) -> tuple[messages.PressReason, str] | None:
         if queued + len(self) >= self._settings.queue:
-            return f"{self._settings.queue} frames wait for a worker already"
+            return "queue", f"{self._settings.queue} frames wait for a worker already"
         try:
             free = self._store.free_bytes() // _MIB
         except StoreError as error:
-            return str(error)
+            return "disk", str(error)
         if free < self._settings.reserve_mib:
-            return (f"no room on the disk ({free} MiB free, {self._settings.reserve_mib} MiB are "
-                    "to stay free for the faces of what was accepted)")
+            return "disk", (
+                f"no room on the disk ({free} MiB free, {self._settings.reserve_mib} MiB are "
+                "to stay free for the faces of what was accepted)")
         return None
 
     def frame(self, peer: bytes, message: messages.Frame, packet: Packet) -> Iterator[Output]:
@@ -110,43 +111,47 @@ class Intake:
             self._store.accept(packet, self._recon, self._recon_hash)
         except StoreError as error:
             yield send(peer, messages.FrameRefused(capture_id=capture_id, message=str(error)))
-            yield from self.refuse(capture_id, str(error))
+            yield from self.refuse(capture_id, "disk", str(error))
             return
         self._log.info("accepted", capture_id=capture_id)
         yield send(peer, messages.FrameAccepted(capture_id=capture_id))
         for presser, request in self._presses.pop(capture_id).pressers.items():
             yield send(presser, messages.PressAccepted(request=request, capture_id=capture_id))
 
-    def refuse(self, capture_id: str, reason: str) -> Iterator[Output]:
+    def refuse(
+        self, capture_id: str, reason: messages.PressReason, why: str
+    ) -> Iterator[Output]:
         """Tell all who pressed that there is no capture."""
         if press := self._presses.pop(capture_id, None):
-            self._log.warning("press refused", capture_id=capture_id, reason=reason)
+            self._log.warning("press refused", capture_id=capture_id, reason=why)
             for presser, request in press.pressers.items():
-                yield self._refusal(presser, capture_id, request, reason)
+                yield self._refusal(presser, messages.PressRefused(
+                    request=request, capture_id=capture_id, reason=reason, message=why))
 
-    def _refusal(self, peer: bytes, capture_id: str, request: int, reason: str) -> Output:
-        self._refused[peer, capture_id, request] = reason
+    def _refusal(self, peer: bytes, refused: messages.PressRefused) -> Output:
+        self._refused[peer, refused.capture_id, refused.request] = refused
         if len(self._refused) > _REFUSALS:
             del self._refused[next(iter(self._refused))]
-        return send(peer, messages.PressRefused(
-            request=request, capture_id=capture_id, message=reason))
+        return send(peer, refused)
 
     def purge(self, capture_id: str | None) -> Iterator[Output]:
         """Refuse one press, or all where None, whose frame is no longer wanted."""
         for waiting in [capture_id] if capture_id else list(self._presses):
-            yield from self.refuse(waiting, "purged by an operator")
+            yield from self.refuse(waiting, "purged", "purged by an operator")
 
     def sensor_gone(self, peer: bytes, reason: str) -> Iterator[Output]:
         """Refuse what a sensor that went away was asked for."""
         for capture_id in [key for key, press in self._presses.items() if press.sensor == peer]:
-            yield from self.refuse(capture_id, f"the sensor went away ({reason})")
+            yield from self.refuse(
+                capture_id, "sensor_gone", f"the sensor went away ({reason})")
 
     def tick(self, now: float) -> Iterator[Output]:
         """Refuse what took too long."""
         late = [key for key, press in self._presses.items() if now >= press.deadline]
         for capture_id in late:
             limit = self._settings.take_timeout_s
-            yield from self.refuse(capture_id, f"no frame from the sensor in {limit:g} s")
+            yield from self.refuse(
+                capture_id, "timeout", f"no frame from the sensor in {limit:g} s")
 
     def _state(self, capture_id: str) -> CaptureState | None:
         if capture_id in self._presses:

@@ -31,16 +31,23 @@ from service.operator_messages import (
     Removed,
     RetryDead,
 )
-from service.payload import FaceHeader, FrameHeader
+from service.payload import FaceHeader, FrameHeader, PreviewHeader
+from service.status import Latency, Status
 
 __all__ = [
     "Announce", "CaptureFailed", "CaptureId", "CapturePending", "CaptureUnknown", "DeadLetter",
     "DeadLetters", "Denied", "DropDead", "FaceDone", "FindStart", "Frame", "FrameAccepted",
     "FrameFailed", "FrameRefused", "FromHub", "GetFace", "GetNext", "GetStatus", "Goodbye",
-    "Heartbeat", "Job", "JobFailed", "ListDead", "Message", "NothingNewer", "Press",
-    "PressAccepted", "PressRefused", "Purge", "Removed", "Request", "RequestFailed", "Result",
-    "RetryDead", "SensorReady", "StartAt", "Status", "Take", "ToHub", "WorkerReady",
+    "Heartbeat", "Job", "JobFailed", "Latency", "ListDead", "Message", "NothingNewer", "Press",
+    "PressAccepted", "PressReason", "PressRefused", "Preview", "PreviewFrame", "Purge", "Removed",
+    "Request", "RequestFailed", "Result", "RetryDead", "SensorReady", "StartAt", "Status", "Take",
+    "TakePreview", "ToHub", "WorkerReady",
 ]
+
+
+PressReason = Literal[
+    "no_sensor", "sensor", "sensor_gone", "timeout", "queue", "disk", "purged"]
+"""Why there is no capture: also what the metrics count by."""
 
 
 class _WithFrame(BaseMessage):
@@ -57,6 +64,14 @@ class _WithFace(BaseMessage):
     @property
     def payload(self) -> FaceHeader:
         return self.face
+
+
+class _WithPreview(BaseMessage):
+    preview: PreviewHeader
+
+    @property
+    def payload(self) -> PreviewHeader:
+        return self.preview
 
 
 # --- client to hub
@@ -119,6 +134,7 @@ class PressRefused(BaseAnswer):
 
     kind: Literal["press_refused"] = "press_refused"
     capture_id: CaptureId
+    reason: PressReason
     message: Text
 
 
@@ -184,30 +200,14 @@ class CaptureFailed(_Outcome):
     """Given up after repeated attempts, with the frame kept."""
 
 
-class Status(BaseAnswer):
-    """Published on topic `status` at every heartbeat."""
+class Preview(_WithPreview):
+    """What the sensor sees: published on topic `preview` and not kept."""
 
-    kind: Literal["status"] = "status"
+    kind: Literal["preview"] = "preview"
     epoch: Token
+    """The hub's process that counts `sequence`."""
     sequence: Number
-    """Of the last outcome."""
-    hub_version: Name
-    sensors: Names
-    workers: Names
-    pressed: Number
-    """Presses that wait for their frame."""
-    queued: Number
-    working: Number
-    done: Number
-    failed: Number
-    dead: Number
-    refused: dict[Name, Number] = Field(default_factory=dict)
-    """Connections and messages that were not let in since the hub started, by reason."""
-
-    @property
-    def ready(self) -> bool:
-        """A press now would become a face."""
-        return bool(self.sensors) and bool(self.workers)
+    """A number that is missing was not delivered, and cannot be asked for."""
 
 
 # --- sensor and worker to hub
@@ -258,6 +258,12 @@ class FrameFailed(BaseMessage):
     message: Text
 
 
+class PreviewFrame(_WithPreview):
+    """The preview that was asked for."""
+
+    kind: Literal["preview_frame"] = "preview_frame"
+
+
 class Result(_WithFace):
     """A worker's face."""
 
@@ -304,6 +310,12 @@ class Take(BaseMessage):
     capture_id: CaptureId
 
 
+class TakePreview(BaseMessage):
+    """Send a preview of what you see, when no frame is to be taken; once."""
+
+    kind: Literal["take_preview"] = "take_preview"
+
+
 class FrameAccepted(BaseMessage):
     """The frame is safe: forget it."""
 
@@ -334,9 +346,9 @@ class Job(_WithFrame):
 Request = (Press | GetFace | GetNext | FindStart | GetStatus | ListDead | RetryDead | DropDead
            | Purge)
 ToHub = (Press | GetFace | GetNext | FindStart | GetStatus | ListDead | RetryDead | DropDead
-         | Purge | SensorReady | WorkerReady | Heartbeat | Goodbye | Frame | FrameFailed | Result
-         | JobFailed)
+         | Purge | SensorReady | WorkerReady | Heartbeat | Goodbye | Frame | FrameFailed
+         | PreviewFrame | Result | JobFailed)
 FromHub = (PressAccepted | PressRefused | CapturePending | CaptureUnknown | RequestFailed
            | NothingNewer | StartAt | DeadLetters | Removed | FaceDone | CaptureFailed | Status
-           | Announce | Denied | Take | FrameAccepted | FrameRefused | Job)
+           | Preview | Announce | Denied | Take | TakePreview | FrameAccepted | FrameRefused | Job)
 Message = ToHub | FromHub

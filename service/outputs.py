@@ -17,6 +17,8 @@ class Topic(StrEnum):
     """`FaceDone` and `CaptureFailed`, numbered without gaps."""
     STATUS = "status"
     """`Status`, at every heartbeat."""
+    PREVIEW = "preview"
+    """`Preview`, ten a second at most while somebody subscribes."""
 
 
 @dataclass(frozen=True)

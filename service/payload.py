@@ -16,17 +16,20 @@ from capture import Calibration, CaptureError, RgbdFrame
 from recon.face import DenseCloud, Face, PointCloud, Report
 from service.errors import RemoteProtocolError
 
-__all__ = ["MAX_ARRAY_BYTES", "MAX_PAYLOAD_BYTES", "ArrayInfo", "Arrays", "FaceHeader",
-           "FrameHeader", "Payload"]
+__all__ = ["MAX_ARRAY_BYTES", "MAX_PAYLOAD_BYTES", "MAX_PREVIEW_SIDE", "ArrayInfo", "Arrays",
+           "FaceHeader", "FrameHeader", "Payload", "PreviewHeader"]
 
 MAX_ARRAY_BYTES = 32 * 2**20
 """Largest single array; also MAXMSGSIZE of every socket."""
 MAX_PAYLOAD_BYTES = 96 * 2**20
 """Largest sum of a message's arrays."""
+MAX_PREVIEW_SIDE = 320
+"""Longest side of a preview, pixels."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
 _Count = Annotated[int, Field(gt=0, le=2**24)]
+_Side = Annotated[int, Field(ge=1, le=MAX_PREVIEW_SIDE)]
 _Int64 = Annotated[int, Field(ge=-(2**63), lt=2**63)]
 _DType = Literal["<u2", "|u1", "<f4", "<i4"]
 
@@ -165,7 +168,20 @@ class FaceHeader(_PayloadHeader):
             raise RemoteProtocolError(f"face: {error}") from error
 
 
-Payload = FrameHeader | FaceHeader
+class PreviewHeader(_PayloadHeader):
+    """A small picture of what the sensor sees."""
+
+    width: _Side
+    height: _Side
+    timestamp_us: _Int64
+    """Of the colour image that it was made of."""
+
+    def layout(self) -> tuple[ArrayInfo, ...]:
+        """Give the picture."""
+        return (_info("image", "|u1", self.height, self.width, 3),)
+
+
+Payload = FrameHeader | FaceHeader | PreviewHeader
 
 
 def _info(name: str, dtype: _DType, *shape: int) -> ArrayInfo:

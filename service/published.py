@@ -98,7 +98,7 @@ class Subscriber:
         self._ask_status = ask_status
         self._socket = socket
         self._knock = knock
-        for topic in Topic:
+        for topic in (Topic.FACES, Topic.STATUS):
             self._socket.subscribe(topic)
         self._epoch: str | None = None
         self._last = 0

@@ -18,6 +18,7 @@ from pydantic import (
 )
 
 from service.errors import SettingsError
+from service.loopback import loopback_place
 from service.times import retention_of
 
 __all__ = ["ServiceSettings", "default_address", "private_folder", "runtime_folder"]
@@ -75,6 +76,8 @@ class ServiceSettings(BaseModel):
     """Time after its outcome when a capture is removed, seconds; None for never."""
     reserve_mib: Annotated[int, Field(ge=0, le=2**30)] = 256
     """Room that is to stay free on the disk, MiB; with less a press is refused."""
+    metrics: Annotated[tuple[str, int] | None, BeforeValidator(loopback_place)] = None
+    """Host and port of `/metrics` and `/healthz`, on this machine alone; None for neither."""
     resend_s: _Seconds = 2.0
     """Time after which an unanswered request or frame is sent again, seconds."""
 

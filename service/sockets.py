@@ -5,7 +5,7 @@ import zmq
 from service.errors import RemoteProtocolError
 from service.payload import MAX_ARRAY_BYTES
 
-__all__ = ["TooLongError", "open_socket", "receive_parts", "send_parts"]
+__all__ = ["TooLongError", "open_socket", "publish_parts", "receive_parts", "send_parts"]
 
 _HIGH_WATER_MARK = 16
 """Messages that may wait in one direction for one peer, some of many megabytes; beyond it they
@@ -45,6 +45,22 @@ def send_parts(socket: "zmq.Socket[bytes]", parts: list[bytes]) -> bool:
     try:
         socket.send_multipart(parts, flags=zmq.DONTWAIT)
     except zmq.Again:
+        return False
+    return True
+
+
+def publish_parts(publisher: "zmq.Socket[bytes]", parts: list[bytes]) -> bool:
+    """Send to all subscribers of an XPUB; False where the queue of one at least was found full.
+
+    It went to the others all the same. While a queue stays full libzmq passes over it unseen, so
+    what is counted is how often a subscriber fell behind, not how much it missed.
+    """
+    publisher.set(zmq.XPUB_NODROP, 1)
+    try:
+        publisher.send_multipart(parts, flags=zmq.DONTWAIT)
+    except zmq.Again:
+        publisher.set(zmq.XPUB_NODROP, 0)
+        publisher.send_multipart(parts, flags=zmq.DONTWAIT)
         return False
     return True
 

@@ -13,6 +13,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_listen(parser)
     options.add_hub(parser)
     options.add_retention(parser)
+    options.add_metrics(parser)
     options.add_recon(parser)
     options.add_daemon(parser)
 

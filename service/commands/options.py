@@ -13,8 +13,9 @@ if TYPE_CHECKING:
     from service.settings import ServiceSettings
 
 __all__ = ["add_address", "add_credentials", "add_daemon", "add_hub", "add_keys", "add_listen",
-           "add_recon", "add_retention", "client", "moment", "operator", "recon_arguments",
-           "recon_settings", "service_settings", "start_daemon", "use_one_thread"]
+           "add_metrics", "add_recon", "add_retention", "client", "moment", "operator",
+           "recon_arguments", "recon_settings", "service_settings", "start_daemon",
+           "use_one_thread"]
 
 
 def add_address(parser: argparse.ArgumentParser) -> None:
@@ -70,6 +71,13 @@ def add_retention(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--retention", metavar="TIME",
                         help="remove captures so long after their outcome: 24h, 90m, 7d, or off "
                              "(default: DENSEFACE_RETENTION, else 24h)")
+
+
+def add_metrics(parser: argparse.ArgumentParser) -> None:
+    """Say where the figures are."""
+    parser.add_argument("--metrics", metavar="PORT",
+                        help="serve /metrics and /healthz on this loopback port; 0 chooses one and "
+                             "logs it (default: DENSEFACE_METRICS, else off)")
 
 
 def moment(text: str) -> datetime:
@@ -130,7 +138,7 @@ def service_settings(args: argparse.Namespace) -> "ServiceSettings":
     """Put the flags over the environment."""
     from service.settings import ServiceSettings
 
-    names = ("address", "data", "key", "hub_key", "keys", "listen", "retention")
+    names = ("address", "data", "key", "hub_key", "keys", "listen", "retention", "metrics")
     return ServiceSettings.of(
         os.environ, **{name: getattr(args, name, None) for name in names})
 

@@ -17,6 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_listen(parser)
     options.add_hub(parser)
     options.add_retention(parser)
+    options.add_metrics(parser)
     options.add_recon(parser)
     options.add_daemon(parser)
 
@@ -52,6 +53,8 @@ def run(args: argparse.Namespace) -> int:
         hub += ["--key", str(settings.key)]
     if args.retention:
         hub += ["--retention", args.retention]
+    if args.metrics:
+        hub += ["--metrics", args.metrics]
     table = processes(args.source, args.workers, common, hub, chosen)
     return Supervisor(table).run()
 
