@@ -67,6 +67,8 @@ def outcome(capsys, *arguments):
     (["subscribe", "--last", "1", "--after", "1"], "not allowed with"),
     (["subscribe", "--since", "noon"], "'noon': expected a time"),
     (["hub", "--retention", "0"], "--retention: "),
+    (["hub", "--metrics", "0.0.0.0:9400"], "this machine alone"),
+    (["up", "--metrics", "http"], "--metrics: "),
     (["up", "--retention", "soon"], "24h, 90m or 7d, or off"),
     (["dead", "bury"], "invalid choice: 'bury'"),
     (["dead", "list", "a"], "takes neither"),

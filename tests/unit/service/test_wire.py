@@ -12,12 +12,14 @@ from hypothesis import strategies as st
 from recon.settings import Preset, Settings
 from service import messages, wire
 from service.errors import LocalProtocolError, ProtocolError, RemoteProtocolError
-from service.payload import MAX_ARRAY_BYTES, FaceHeader, FrameHeader
+from service.payload import MAX_ARRAY_BYTES, FaceHeader, FrameHeader, PreviewHeader
 from service.wire import Packet, decode_from_hub, decode_to_hub, encode
 from tests.unit.service.faces import small_face, small_frame
 
 FRAME, FRAME_ARRAYS = FrameHeader.of(small_frame())
 FACE, FACE_ARRAYS = FaceHeader.of(small_face())
+PREVIEW = PreviewHeader(width=4, height=3, timestamp_us=5)
+PREVIEW_ARRAYS = {"image": np.arange(36, dtype=np.uint8).reshape(3, 4, 3)}
 
 ids = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", fullmatch=True)
 numbers = st.integers(0, 2**63 - 1)
@@ -56,10 +58,12 @@ to_hub = st.one_of(
     ids.map(lambda name: Packet(
         messages.Result(capture_id=name, settings_hash="0f", frame_sha256=DIGEST, face=FACE),
         FACE_ARRAYS)),
+    st.just(Packet(messages.PreviewFrame(preview=PREVIEW), PREVIEW_ARRAYS)),
 )
 from_hub = st.one_of(
     plain(messages.PressAccepted, request=numbers, capture_id=ids),
-    plain(messages.PressRefused, request=numbers, capture_id=ids, message=texts),
+    plain(messages.PressRefused, request=numbers, capture_id=ids, message=texts,
+          reason=st.sampled_from(messages.PressReason.__args__)),
     plain(messages.CapturePending, request=numbers, capture_id=ids),
     plain(messages.CaptureUnknown, request=numbers, capture_id=ids),
     plain(messages.RequestFailed, request=numbers, message=texts),
@@ -75,7 +79,16 @@ from_hub = st.one_of(
           sensors=st.lists(texts, max_size=3).map(tuple),
           workers=st.lists(texts, max_size=3).map(tuple), pressed=numbers, queued=numbers,
           working=numbers, done=numbers, failed=numbers, dead=numbers,
-          refused=st.dictionaries(texts, numbers, max_size=3)),
+          refused=st.dictionaries(texts, numbers, max_size=3),
+          presses_refused=st.dictionaries(texts, numbers, max_size=3),
+          since_start=st.dictionaries(texts, numbers, max_size=3),
+          latencies=st.dictionaries(texts, st.builds(
+              messages.Latency, count=numbers, median_s=st.floats(0, 1e6),
+              p99_s=st.floats(0, 1e6)), max_size=3),
+          free_bytes=st.none() | numbers, kept_bytes=st.none() | numbers),
+    numbers.map(lambda number: Packet(messages.Preview(
+        epoch="0f", sequence=number, preview=PREVIEW), PREVIEW_ARRAYS)),
+    st.just(Packet(messages.TakePreview())),
     st.just(Packet(messages.Announce())),
     plain(messages.Denied, message=texts),
     plain(messages.Take, capture_id=ids),
@@ -109,7 +122,7 @@ def test_what_the_hub_sends_comes_out_the_same(packet):
 def test_every_kind_is_covered_by_the_two_tests_above():
     kinds = {kind.model_fields["kind"].default for kind in messages.ToHub.__args__}
     kinds |= {kind.model_fields["kind"].default for kind in messages.FromHub.__args__}
-    assert len(kinds) == len(messages.ToHub.__args__) + len(messages.FromHub.__args__) == 35
+    assert len(kinds) == len(messages.ToHub.__args__) + len(messages.FromHub.__args__) == 38
 
 
 @given(to_hub)
@@ -244,6 +257,16 @@ def test_a_face_with_a_coordinate_that_is_no_number_is_a_protocol_error():
 def test_a_face_with_a_standard_error_of_nothing_is_a_protocol_error():
     with pytest.raises(RemoteProtocolError, match="face: sigma must be positive"):
         FACE.join(FACE_ARRAYS | {"dense_sigma": 0 * FACE_ARRAYS["dense_sigma"]})
+
+
+def test_a_status_of_another_release_can_be_read():
+    given = {"kind": "status", "version": 1, "epoch": "0f", "sequence": 3, "hub_version": "9",
+             "sensors": [], "workers": ["w"], "pressed": 0, "queued": 0, "working": 0, "done": 1,
+             "failed": 0, "dead": 0}
+    older = decode_from_hub([json.dumps(given).encode()]).message
+    newer = decode_from_hub([json.dumps(given | {"mood": "fine"}).encode()]).message
+    assert newer == older
+    assert (older.workers, older.free_bytes, older.latencies) == (("w",), None, {})
 
 
 def test_every_kind_stands_in_the_documentation():
