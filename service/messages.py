@@ -16,7 +16,6 @@ from service.message_base import (
     Digest,
     Moment,
     Name,
-    Names,
     Number,
     Seconds,
     Text,

@@ -24,6 +24,7 @@ COUNTERS: dict[str, tuple[str, str | None, str]] = {
     "failed": ("failed", None, "Captures published as without a face."),
     "dead": ("dead", None, "Captures given up after repeated attempts."),
     "redelivered": ("redelivered", None, "Jobs given out again."),
+    "removed": ("removed", "by", "Captures removed."),
     "refused": ("refused", "reason", "Connections and messages that were not let in."),
     "drops": ("publication_drops", "topic",
               "Publications at which a subscriber's queue was found full."),

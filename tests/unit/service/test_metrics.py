@@ -16,8 +16,8 @@ SETTINGS = ServiceSettings(address="ipc:///unused", reserve_mib=100)
 def status(**changed):
     return Status(**{
         "epoch": "0f", "sequence": 3, "hub_version": "1.2", "sensors": ("s",),
-        "workers": ("a", "b"), "pressed": 1, "queued": 2, "working": 3, "done": 4, "failed": 5, "dead": 6,
-        "free_bytes": 2**30, "kept_bytes": 999} | changed)
+        "workers": ("a", "b"), "pressed": 1, "queued": 2, "working": 3, "done": 4, "failed": 5,
+        "dead": 6, "free_bytes": 2**30, "kept_bytes": 999} | changed)
 
 
 @pytest.fixture
