@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from service import messages
 from service.counters import Counters
 from service.latencies import Latencies
-from service.outputs import Output, Publish
+from service.outputs import Output, Publish, Send
 from service.wire import Packet
 
 __all__ = ["Watch"]
@@ -53,8 +53,8 @@ class Watch:
             match message:
                 case messages.Take(capture_id=capture_id):
                     self._follow(capture_id).pressed = now
-                case messages.PressRefused(capture_id=capture_id):
-                    told = getattr(output, "peer", b""), capture_id, message.request
+                case messages.PressRefused(capture_id=capture_id) if isinstance(output, Send):
+                    told = output.peer, capture_id, message.request
                     if told not in self._refused:
                         refused[capture_id] = message
                         self._remember(told)
