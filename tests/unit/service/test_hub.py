@@ -258,7 +258,7 @@ def test_a_repeat_of_a_refused_press_is_refused_though_a_sensor_came_meanwhile(b
     assert bench.press("a", request=7) == [refused]
     assert kinds(bench.press("a", request=8)) == [(SENSOR, "take")]
     assert bench.wait(11) == [(CLIENT, messages.PressRefused(
-        request=8, capture_id="a", message="no frame from the sensor in 10 s"))]
+        request=8, capture_id="a", reason="timeout", message="no frame from the sensor in 10 s"))]
     assert kinds(bench.press("a", request=8)) == [(CLIENT, "press_refused")]
 
 
