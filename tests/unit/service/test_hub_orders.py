@@ -51,7 +51,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.store = UnkindStore(self.folder / "data", self.clock)
         self.now = 0.0
         self.credit = 0
-        self.frames = 0
+        self.request = self.frames = 0
         self.shown: dict[str, str] = {}
         self.pressed, self.taken, self.accepted = set(), set(), set()
         self.jobs: dict[bytes, list[messages.Job]] = {}
@@ -165,10 +165,11 @@ class AnyOrder(RuleBasedStateMachine):
     def sensor(self):
         self.say(b"s", messages.SensorReady(name="s", source="x"))
 
-    @rule(capture_id=ids)
-    def press(self, capture_id):
+    @rule(capture_id=ids, again=st.booleans())
+    def press(self, capture_id, again=False):
         self.pressed.add(capture_id)
-        self.say(b"c", messages.Press(request=1, capture_id=capture_id))
+        self.request += not again
+        self.say(b"c", messages.Press(request=self.request, capture_id=capture_id))
 
     @rule(capture_id=ids)
     def frame(self, capture_id):
