@@ -88,7 +88,8 @@ class Door:
         self._monitors: list[Handshakes] = []
         self._subscribed: set[bytes] = set()
         """Tokens of the keys that subscribed since the publisher was bound."""
-        self._unbound = False
+        self._unbound: dict[zmq.Socket[bytes], str] = {}
+        """What is to be bound again, where its connections were cut."""
         self.subscriptions: dict[Topic, int] = dict.fromkeys(Topic, 0)
         """How many there are of each topic."""
         self._router = open_socket(context, zmq.ROUTER)
@@ -172,23 +173,35 @@ class Door:
         token = peer[:_TOKEN_BYTES]
         return self._guard.keyring.holds(token) if self._guard else token == _LOCAL
 
-    def cut_revoked(self) -> None:
-        """End all subscriptions where one was made with a key that is allowed no more.
-
-        One alone cannot be ended. The others come back by themselves in less than a second, pass
-        the authenticator again, and fetch what they missed.
-        """
-        if self._guard is None:
-            return
-        if not all(self._guard.keyring.holds(token) for token in self._subscribed):
-            self._subscribed.clear()
-            self._publisher.unbind(self._publisher.get_string(zmq.LAST_ENDPOINT).rstrip("\0"))
-            self._unbound = True
-        if self._unbound:
+    def tick(self) -> None:
+        """End all subscriptions where one was made with a key that is allowed no more."""
+        if self._guard and not all(map(self._guard.keyring.holds, self._subscribed)):
+            self._cut(self._publisher)
+        for socket, address in list(self._unbound.items()):
             # Not free before libzmq's own thread has closed it: tried again at the next tick.
             with suppress(zmq.ZMQError):
-                self._publisher.bind(publications_of(self.address))
-                self._unbound = False
+                socket.bind(address)
+                del self._unbound[socket]
+
+    def cut_all(self) -> None:
+        """End every connection from another machine; those that may come back will."""
+        if self._guard:
+            for socket in (self._router, self._publisher):
+                self._cut(socket)
+            self.tick()
+
+    def _cut(self, socket: "zmq.Socket[bytes]") -> None:
+        """End all connections of a socket: one alone cannot be.
+
+        The others come back by themselves in less than a second, pass the authenticator again and
+        fetch what they missed.
+        """
+        if socket not in self._unbound:
+            address = socket.get_string(zmq.LAST_ENDPOINT).rstrip("\0")
+            socket.unbind(address)
+            self._unbound[socket] = address
+        if socket is self._publisher:
+            self._subscribed.clear()
 
     def _bind(self, socket: "zmq.Socket[bytes]", address: str, domain: bytes) -> None:
         if self._guard:

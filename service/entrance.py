@@ -12,6 +12,7 @@ from service.doors import Door, Guard, Incoming
 from service.errors import AddressError, AuthenticatorStoppedError
 from service.keyring import Allowed, Keyring
 from service.keys import HUB, read_pair
+from service.memory import MemoryWatch
 from service.outputs import Topic
 from service.refusals import Refusals
 from service.settings import ServiceSettings
@@ -40,6 +41,8 @@ class Entrance:
         self._keyring: Keyring | None = None
         self._authenticator: Authenticator | None = None
         self._doors: list[Door] = []
+        self._refusals = refusals
+        self._memory = MemoryWatch(settings.memory_mb << 20)
         self._poller = zmq.Poller()
         self._poller.register(wakes, zmq.POLLIN)
         try:
@@ -77,8 +80,13 @@ class Entrance:
         if self._keyring is None:
             return False
         changed = self._keyring.refresh()
+        if used := self._memory.beyond():
+            self._refusals.note("memory", detail=f"{used >> 20} MB in use: all connections are cut")
+            for door in self._doors:
+                door.cut_all()
+            self._memory.trim()
         for door in self._doors:
-            door.cut_revoked()
+            door.tick()
         return changed
 
     def receive(self, timeout_ms: int) -> Iterator[Incoming]:

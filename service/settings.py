@@ -58,6 +58,8 @@ class ServiceSettings(BaseModel):
     """File of one's own secret key."""
     hub_key: Path | None = None
     """File of the hub's public key."""
+    memory_mb: Annotated[int, Field(ge=64, le=2**20)] = 2048
+    """Memory of the hub, in MiB, beyond which it cuts all connections from other machines."""
     data: Path = Field(default_factory=lambda: platformdirs.user_data_path("denseface"))
     """Folder of frames, faces and their database; created with mode 0700."""
     heartbeat_s: _Seconds = 1.0

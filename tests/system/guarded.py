@@ -117,7 +117,7 @@ class GuardedHub:
 
 @contextmanager
 def guarded_hub(folder: Path, host: str = "127.0.0.1", port: int | None = None,
-                code: str = "") -> Iterator[GuardedHub]:
+                code: str = "", **environment: str) -> Iterator[GuardedHub]:
     """Run a hub that has a key `hub` and for each role one of its name.
 
     Parameters
@@ -139,7 +139,7 @@ def guarded_hub(folder: Path, host: str = "127.0.0.1", port: int | None = None,
                  "sys.exit(main(sys.argv[1:]))", "hub", "--address", local, "--listen", address,
                  "--keys", str(keys), "--data", str(folder / "data")],
                 cwd=REPOSITORY, stderr=stderr, text=True,
-                env=os.environ | {"DENSEFACE_HEARTBEAT_S": "0.2"})
+                env=os.environ | {"DENSEFACE_HEARTBEAT_S": "0.2"} | environment)
         hub = GuardedHub(process, local, address, keys, log)
         try:
             until(lambda: "listening" in log.read_text() or process.poll() is not None)
