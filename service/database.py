@@ -12,7 +12,7 @@ from service.errors import DamagedDatabaseError, DiskFullError, StoreError
 
 __all__ = ["Database"]
 
-_VERSION = 2
+_VERSION = 3
 _ABSURD = 2**53
 _BUSY_S = 1.0
 """Longest wait for someone who looks into the database with a tool, seconds."""
@@ -29,7 +29,8 @@ CREATE TABLE captures (
     attempts INTEGER NOT NULL DEFAULT 0 CHECK (attempts >= 0),
     frame_sha256 TEXT NOT NULL
         CHECK (length(frame_sha256) = 64 AND frame_sha256 NOT GLOB '*[^0-9a-f]*'),
-    accepted_at TEXT NOT NULL CHECK (datetime(accepted_at) IS NOT NULL)
+    accepted_at TEXT NOT NULL CHECK (datetime(accepted_at) IS NOT NULL),
+    pressed_by TEXT NOT NULL CHECK (pressed_by NOT GLOB '*[^0-9a-f]*')
 ) STRICT;
 CREATE TABLE outcomes (
     sequence INTEGER PRIMARY KEY AUTOINCREMENT,

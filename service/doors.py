@@ -58,6 +58,8 @@ class Incoming:
     """Names the sender's key with its roles, and its connection."""
     parts: list[bytes]
     sender: Allowed
+    key: str
+    """Fingerprint of the sender's key; empty where it needed none."""
     address: str
 
 
@@ -135,8 +137,8 @@ class Door:
                                     address=_address(error.first), detail=str(error))
                 continue
             if user := self._known(first):
-                token = user.token if self._guard else _LOCAL
-                yield Incoming(token + first.bytes, parts, user, _address(first))
+                token, key = (user.token, user.fingerprint) if self._guard else (_LOCAL, "")
+                yield Incoming(token + first.bytes, parts, user, key, _address(first))
 
     def listen(self) -> None:
         """Take note of who subscribes, of who leaves and of who was not let in."""

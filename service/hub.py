@@ -20,6 +20,7 @@ from service.jobs import Jobs
 from service.keeper import Keeper
 from service.outcomes import Outcomes
 from service.outputs import Output, Publish, Topic, send
+from service.refusals import Refusals
 from service.roster import MOST_PEERS, Roster, Sensor, Worker
 from service.settings import ServiceSettings
 from service.states import CaptureState
@@ -44,32 +45,38 @@ class Hub:
     settings : time-outs and limits
     recon : settings of every job accepted from now on
     figures : what the status says of this process
+    refusals : counts what was not let through
     """
 
     def __init__(
         self, store: Store, settings: ServiceSettings, recon: Settings,
-        figures: Figures | None = None,
+        figures: Figures | None = None, refusals: Refusals | None = None,
     ) -> None:
         self._store = store
         self._figures = figures or Figures()
+        self._refusals = refusals or Refusals(self._figures.counters)
         self._settings = settings
         self._roster = Roster()
         self._outcomes = Outcomes(store, self._remake)
         self._intake = Intake(store, self._roster, settings, recon, settings_hash(recon))
-        self._jobs = Jobs(store, self._roster, settings.attempts, self._outcomes.concluded)
+        self._jobs = Jobs(store, self._roster, settings.attempts, self._outcomes.concluded,
+                          self._refusals)
         self._keeper = Keeper(
             store, settings, self._intake, self._jobs, self._outcomes, self._figures.counters)
         self._viewfinder = Viewfinder(self._roster, settings.heartbeat_s)
         self._status_due = 0.0
         self._log = structlog.get_logger("hub")
 
-    def receive(self, now: float, peer: bytes, packet: Packet) -> list[Output]:
+    def receive(
+        self, now: float, peer: bytes, packet: Packet, key: str = ""
+    ) -> list[Output]:
         """Take one message from a peer.
 
         Parameters
         ----------
         now : seconds, of a clock that only goes forward
         peer : names the sender's connection
+        key : fingerprint of the sender's key; empty where it needed none
 
         Raises
         ------
@@ -78,7 +85,7 @@ class Hub:
         """
         outputs: list[Output] = []
         try:
-            outputs.extend(self._receive(now, peer, packet))
+            outputs.extend(self._receive(now, peer, packet, key))
             outputs.extend(self._jobs.dispatch(now))
         except DamagedDatabaseError:
             raise
@@ -122,12 +129,14 @@ class Hub:
         """Take note that a message to a peer could not be delivered, nor could the next."""
         return list(self._gone(peer, reason))
 
-    def knows(self, capture_id: str) -> bool:
-        """Say whether there may be a capture of this id; raises DamagedDatabaseError."""
+    def pressed_by(self, capture_id: str) -> str | None:
+        """Give the fingerprint of the key that pressed a capture; None where there is none."""
         try:
-            return self._intake.knows(capture_id)
-        except StoreError:
-            return True
+            stored = self._store.find(capture_id)
+        except StoreError as error:
+            self._log.error("who pressed cannot be read", reason=str(error))
+            return None
+        return stored.pressed_by if stored else None
 
     def show(self, *, wanted: bool) -> None:
         """Take note of whether somebody looks at the previews; they are asked for at each tick."""
@@ -137,10 +146,12 @@ class Hub:
         """Give the sensors and workers that are known."""
         return [*self._roster.sensors, *self._roster.workers]
 
-    def _receive(self, now: float, peer: bytes, packet: Packet) -> Iterator[Output]:
+    def _receive(
+        self, now: float, peer: bytes, packet: Packet, key: str
+    ) -> Iterator[Output]:
         match packet.message:
             case messages.Press() as message:
-                yield from self._intake.press(now, peer, message, self._jobs.queued)
+                yield from self._intake.press(now, peer, message, self._jobs.queued, key)
             case messages.GetFace() as message:
                 yield from self._outcomes.get_face(now, peer, message)
             case messages.GetNext() as message:
@@ -197,6 +208,8 @@ class Hub:
         known = self._roster.workers.get(peer)
         if known is None:
             self._log.info("worker ready", name=name)
+        elif credit <= known.credit:
+            self._refusals.note("replayed", name=name, detail=f"credit {credit}")
         worker = self._roster.worker_ready(peer, name, credit, now)
         if worker.free and worker.job:
             self._jobs.lost(worker)
@@ -220,7 +233,7 @@ class Hub:
             pressed=len(self._intake), queued=self._jobs.queued, working=self._jobs.working,
             done=counts.get(CaptureState.DONE, 0), failed=counts.get(CaptureState.FAILED, 0),
             dead=counts.get(CaptureState.DEAD, 0),
-            refused=counters.labels("refused"),
+            refused=self._refusals.counts(),
             presses_refused=counters.labels("press_refused"),
             since_start={name: count for name, label, count in counters.items() if not label},
             latencies={stage: messages.Latency(

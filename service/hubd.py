@@ -18,7 +18,6 @@ from service.failpoints import failpoint
 from service.hub import Hub
 from service.observer import Observer
 from service.outputs import Output, Publish, Topic, send
-from service.pressed import Pressed
 from service.refusals import Refusals
 from service.settings import ServiceSettings
 from service.stopping import StopSignal
@@ -53,7 +52,7 @@ def run(settings: ServiceSettings, recon: Settings) -> int:
         refusals = Refusals(observer.figures.counters)
         entrance = Entrance(context, settings, refusals, stop)
         try:
-            hub = Hub(store, settings, recon, observer.figures)
+            hub = Hub(store, settings, recon, observer.figures, refusals)
             loop = _Loop(entrance, hub, refusals, observer)
             log.info("listening", address=" ".join(entrance.addresses), data=str(settings.data))
             with _scrapes(settings, observer):
@@ -85,7 +84,6 @@ class _Loop:
         self._hub = hub
         self._refusals = refusals
         self._observer = observer
-        self._pressed = Pressed()
         self._log = structlog.get_logger("hub")
 
     def serve(self, stop: StopSignal) -> None:
@@ -120,17 +118,15 @@ class _Loop:
             self._refusals.note(error.reason, **who, detail=str(error))
             return
         message, sender = packet.message, incoming.sender
-        own = (isinstance(message, messages.GetFace)
-               and self._pressed.by(message.capture_id, sender.fingerprint))
+        own = (incoming.key != "" and isinstance(message, messages.GetFace)
+               and self._hub.pressed_by(message.capture_id) == incoming.key)
         lacks = missing_role(sender.roles, message, own=own)
         if lacks:
             self._refusals.note("role", **who, detail=lacks)
             self._give_out([_denied(incoming, message, lacks)])
             return
-        if isinstance(message, messages.Press):
-            self._pressed.note(message.capture_id, sender.fingerprint,
-                               anew=not self._hub.knows(message.capture_id))
-        self._give_out(self._hub.receive(time.monotonic(), incoming.peer, packet), packet)
+        self._give_out(self._hub.receive(
+            time.monotonic(), incoming.peer, packet, incoming.key), packet)
 
     def _give_out(self, outputs: list[Output], caused_by: Packet | None = None) -> None:
         self._observer.saw(time.monotonic(), caused_by, outputs)

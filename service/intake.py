@@ -28,6 +28,8 @@ class _Press:
 
     sensor: bytes
     deadline: float
+    key: str
+    """Fingerprint of the first presser's key; empty where it needed none."""
     pressers: dict[bytes, int] = field(default_factory=dict)
     """The last request of each client that pressed this id."""
 
@@ -52,12 +54,8 @@ class Intake:
     def __len__(self) -> int:
         return len(self._presses)
 
-    def knows(self, capture_id: str) -> bool:
-        """Say whether an id was pressed and its capture is there, or its frame awaited."""
-        return self._state(capture_id) is not None
-
     def press(
-        self, now: float, peer: bytes, message: messages.Press, queued: int
+        self, now: float, peer: bytes, message: messages.Press, queued: int, key: str = ""
     ) -> Iterator[Output]:
         """Ask a sensor for a frame, unless this id is known already."""
         capture_id, request = message.capture_id, message.request
@@ -82,7 +80,7 @@ class Intake:
             return
         self._log.info("pressed", capture_id=capture_id, sensor=sensor.name)
         deadline = now + self._settings.take_timeout_s
-        self._presses[capture_id] = _Press(sensor.peer, deadline, {peer: request})
+        self._presses[capture_id] = _Press(sensor.peer, deadline, key, {peer: request})
         yield send(sensor.peer, messages.Take(capture_id=capture_id))
 
     def _obstacle(self, queued: int) -> tuple[messages.PressReason, str] | None:
@@ -108,7 +106,8 @@ class Intake:
                        messages.FrameRefused(capture_id=capture_id, message="nobody waits for it"))
             return
         try:
-            self._store.accept(packet, self._recon, self._recon_hash)
+            self._store.accept(
+                packet, self._recon, self._recon_hash, self._presses[capture_id].key)
         except StoreError as error:
             yield send(peer, messages.FrameRefused(capture_id=capture_id, message=str(error)))
             yield from self.refuse(capture_id, "disk", str(error))

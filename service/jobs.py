@@ -11,6 +11,7 @@ from service import messages
 from service.errors import CorruptFileError, ProtocolError, StoreError
 from service.failpoints import failpoint
 from service.outputs import Output, send
+from service.refusals import Refusals
 from service.roster import Roster, Worker
 from service.states import CaptureEvent, CaptureState, advance
 from service.stored import Store, Stored
@@ -29,13 +30,14 @@ class Jobs:
 
     def __init__(
         self, store: Store, roster: Roster, attempts: int,
-        concluded: Callable[[str], Iterator[Output]],
+        concluded: Callable[[str], Iterator[Output]], refusals: Refusals,
     ) -> None:
         """Take up what the store has unfinished; `concluded` announces an outcome."""
         self._store = store
         self._roster = roster
         self._attempts = attempts
         self._concluded = concluded
+        self._refusals = refusals
         self._queue = deque(store.unfinished())
         self._reasons: dict[str, tuple[str, str]] = {}
         self._unkept: deque[tuple[messages.Result, Packet]] = deque()
@@ -214,7 +216,7 @@ class Jobs:
             if not useful and self._state(capture_id) is CaptureState.ACCEPTED:
                 self._retry(capture_id, "RemoteProtocolError", "the answer was to another job")
         if not useful:
-            self._log.info("answer dropped", capture_id=capture_id, answer=str(event))
+            self._refusals.note("replayed", capture_id=capture_id, detail=f"{event}, not asked for")
         return useful
 
     def _of_use(

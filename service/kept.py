@@ -36,6 +36,8 @@ class FrameAbout(_About):
     settings: str
     """Of the reconstruction, JSON."""
     settings_hash: Annotated[str, Field(pattern=r"^[0-9a-f]{1,64}$")]
+    pressed_by: Annotated[str, Field(pattern=r"^[0-9a-f]{0,16}$")] = ""
+    """Fingerprint of the key that pressed; empty where none was needed."""
 
 
 class FaceAbout(_About):

@@ -99,6 +99,7 @@ class _Capture:
     accepted_at: str
     settings_hash: str
     frame_sha256: str
+    pressed_by: str = ""
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,8 @@ class _Adoption:
     def _frame(self, capture_id: str, path: Path) -> None:
         if kept := self._read(capture_id, path, read_frame):
             self._captures[capture_id] = _Capture(
-                kept.about.accepted_at, kept.about.settings_hash, kept.checksum)
+                kept.about.accepted_at, kept.about.settings_hash, kept.checksum,
+                kept.about.pressed_by)
 
     def _face(self, capture_id: str, path: Path) -> None:
         kept = self._read(capture_id, path, read_face)
@@ -201,9 +203,9 @@ class _Adoption:
                     self._captures.items(), key=lambda item: item[1].accepted_at):
                 database.execute(
                     "INSERT INTO captures (capture_id, state, settings_hash, frame_sha256,"
-                    " accepted_at) VALUES (?, ?, ?, ?, ?)",
+                    " accepted_at, pressed_by) VALUES (?, ?, ?, ?, ?, ?)",
                     (capture_id, CaptureState.ACCEPTED, one.settings_hash, one.frame_sha256,
-                     one.accepted_at))
+                     one.accepted_at, one.pressed_by))
             for capture_id, end in sorted(
                     self._outcomes.items(), key=lambda item: item[1].finished_at):
                 database.execute(

@@ -33,6 +33,10 @@ class Refusals:
         self._allowances: dict[str, _Allowance] = {}
         self._log = structlog.get_logger("hub")
 
+    def counts(self) -> dict[str, int]:
+        """Give the number of refusals by reason."""
+        return self._counters.labels("refused")
+
     def note(self, reason: str, **who: object) -> None:
         """Count a refusal and, if there were not too many, log it.
 

@@ -95,7 +95,9 @@ class FolderStore:
         except OSError as error:
             raise store_error(self._layout.frames, error) from error
 
-    def accept(self, frame: Packet, settings: Settings, settings_hash: str) -> None:
+    def accept(
+        self, frame: Packet, settings: Settings, settings_hash: str, pressed_by: str = ""
+    ) -> None:
         """Keep a `Frame`."""
         message = frame.message
         if not isinstance(message, Frame):
@@ -105,14 +107,16 @@ class FolderStore:
         clock = self._account.save()
         about = FrameAbout(
             accepted_at=stamp(self._account.wall()), clock=clock,
-            settings=settings.model_dump_json(), settings_hash=settings_hash)
+            settings=settings.model_dump_json(), settings_hash=settings_hash,
+            pressed_by=pressed_by)
         path = self._layout.frame(capture_id)
         try:
             checksum = write_kept(path, about, frame)
             self._database.all(
                 "INSERT INTO captures (capture_id, state, settings_hash, frame_sha256,"
-                " accepted_at) VALUES (?, ?, ?, ?, ?)",
-                capture_id, CaptureState.ACCEPTED, settings_hash, checksum, about.accepted_at)
+                " accepted_at, pressed_by) VALUES (?, ?, ?, ?, ?, ?)",
+                capture_id, CaptureState.ACCEPTED, settings_hash, checksum, about.accepted_at,
+                pressed_by)
         except StoreError:
             with suppress(OSError):  # at worst it is taken in at the next start
                 path.unlink(missing_ok=True)
@@ -127,7 +131,7 @@ class FolderStore:
         if row is None:
             return None
         return Stored(CaptureState(row["state"]), row["settings_hash"], row["frame_sha256"],
-                      row["attempts"])
+                      row["attempts"], row["pressed_by"])
 
     def unfinished(self) -> list[str]:
         """Give the ids of what was accepted and has no outcome, oldest first."""

@@ -23,6 +23,8 @@ class Stored:
     frame_sha256: str
     """Checksum of the frame's file: names what a result must have been made of."""
     attempts: int
+    pressed_by: str = ""
+    """Fingerprint of the key that pressed; empty where none was needed."""
 
 
 class Store(Protocol):
@@ -39,7 +41,9 @@ class Store(Protocol):
     def free_bytes(self) -> int:
         """Give the room that is left on the disk."""
 
-    def accept(self, frame: Packet, settings: Settings, settings_hash: str) -> None:
+    def accept(
+        self, frame: Packet, settings: Settings, settings_hash: str, pressed_by: str = ""
+    ) -> None:
         """Keep a `Frame`; where that fails, nothing of it stays."""
 
     def find(self, capture_id: str) -> Stored | None:

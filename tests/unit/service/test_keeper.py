@@ -9,8 +9,17 @@ from service import messages
 from service.hub import Hub
 from service.states import CaptureState
 from service.store import FolderStore
+from service.wire import Packet
 from tests.unit.service.clocks import FakeClock
-from tests.unit.service.test_hub import CLIENT, OTHER, SETTINGS, WORKER, Bench, kinds
+from tests.unit.service.test_hub import (
+    CLIENT,
+    OTHER,
+    SETTINGS,
+    WORKER,
+    Bench,
+    kinds,
+    restarted,
+)
 
 DAY = 86400.0
 OPERATOR = b"operator"
@@ -234,15 +243,19 @@ def test_all_are_purged_in_batches(bench, monkeypatch, files):
     assert bench.worker(OTHER) == []
 
 
-def test_an_id_is_known_as_long_as_it_is_kept(bench):
-    assert not bench.hub.knows("a")
+def test_who_pressed_is_known_as_long_as_the_capture_is_kept(bench):
     bench.sensor()
-    bench.press()
-    assert bench.hub.knows("a")
-    bench.frame()
-    assert bench.hub.knows("a")
-    ask(bench, messages.Purge(request=1, capture_id="a"))
-    assert not bench.hub.knows("a")
+    for key in ("0f", "1e"):
+        press = Packet(messages.Press(request=1, capture_id="a"))
+        bench.hub.receive(bench.now, CLIENT, press, key)
+        bench.hub.receive(bench.now, OTHER, press, "2d")
+        assert bench.hub.pressed_by("a") is None
+        bench.frame()
+        bench.hub.receive(bench.now, OTHER, press, "2d")
+        assert bench.hub.pressed_by("a") == key
+        assert restarted(bench).hub.pressed_by("a") == key
+        ask(bench, messages.Purge(request=1, capture_id="a"))
+        assert bench.hub.pressed_by("a") is None
 
 
 def test_what_is_older_than_a_time_is_purged(bench, clock):
