@@ -1,6 +1,8 @@
 """What a client shows at a guarded door, and why a hub does not let it in."""
 
 import errno
+import time
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Self
 
@@ -16,6 +18,8 @@ __all__ = ["Credentials", "Knock", "connect"]
 
 _SURE = 3
 """Handshakes that break off in a row until it is said why: a hub may have ended in one."""
+_REDIAL_S = 2.0
+"""Time until a daemon that was refused knocks again, seconds: it may be allowed meanwhile."""
 _E = zmq.Event
 _EVENTS = (_E.HANDSHAKE_SUCCEEDED | _E.HANDSHAKE_FAILED_AUTH | _E.HANDSHAKE_FAILED_PROTOCOL
            | _E.HANDSHAKE_FAILED_NO_DETAIL)
@@ -63,6 +67,7 @@ class Knock:
         self._keys = keys
         self._monitor = socket.get_monitor_socket(int(_EVENTS))
         self._broken_off = 0
+        self._redial_at: float | None = None
         self.refused: KeyRefusedError | None = None
         """Why the hub does not let us in; None where it did, or is not there."""
 
@@ -72,13 +77,17 @@ class Knock:
         while self._monitor.poll(0):
             said = parse_monitor_message(self._monitor.recv_multipart())
             self._note(zmq.Event(said["event"]), said["value"])
+        if self._redial_at is not None and time.monotonic() >= self._redial_at:
+            self._redial()
         return self.refused is not None and str(self.refused) != before
 
     def check(self) -> None:
-        """Raise what `refused` has, after `read`."""
+        """Raise why the hub does not let us in; the next call begins anew."""
         self.read()
         if self.refused:
-            raise self.refused
+            refused, self.refused = self.refused, None
+            self._redial()
+            raise refused
 
     def close(self) -> None:
         """Listen no more; to be called before the socket is closed."""
@@ -88,15 +97,28 @@ class Knock:
 
     def _note(self, event: zmq.Event, value: int) -> None:
         if event is _E.HANDSHAKE_SUCCEEDED:
-            self.refused, self._broken_off = None, 0
-        elif event is _E.HANDSHAKE_FAILED_AUTH:
+            self.refused, self._broken_off, self._redial_at = None, 0, None
+            return
+        if event is _E.HANDSHAKE_FAILED_AUTH:
             self.refused = KeyRefusedError(
-                f"{self._address}: the hub does not let this key in: it was not allowed there, or "
-                "revoked")
-        elif event is _E.HANDSHAKE_FAILED_PROTOCOL or value in (errno.EPIPE, errno.ECONNRESET):
-            self._broken_off += 1
+                f"{self._address}: the hub does not let this key in: it was not allowed there for "
+                "this, or revoked")
+        elif event is _E.HANDSHAKE_FAILED_PROTOCOL:
+            self.refused = self._mismatch()
+        else:
+            self._broken_off += value in (errno.EPIPE, errno.ECONNRESET)
             if self._broken_off >= _SURE:
                 self.refused = self._mismatch()
+            return
+        # libzmq takes these two for final and would not try again.
+        self._redial_at = time.monotonic() + _REDIAL_S
+
+    def _redial(self) -> None:
+        self._redial_at = None
+        self._broken_off = 0
+        with suppress(zmq.ZMQError):
+            self._socket.disconnect(self._address)
+        self._socket.connect(self._address)
 
     def _mismatch(self) -> KeyRefusedError:
         if self._keys is None:

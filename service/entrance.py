@@ -39,6 +39,7 @@ class Entrance:
         refusals: Refusals, wakes: _Wakes,
     ) -> None:
         self._keyring: Keyring | None = None
+        self._changes = 0
         self._authenticator: Authenticator | None = None
         self._doors: list[Door] = []
         self._refusals = refusals
@@ -79,7 +80,9 @@ class Entrance:
         """Look at the allow-list; True where peers may have been cut off."""
         if self._keyring is None:
             return False
-        changed = self._keyring.refresh()
+        self._keyring.refresh()
+        changed = self._keyring.changes != self._changes
+        self._changes = self._keyring.changes
         if used := self._memory.beyond():
             self._refusals.note("memory", detail=f"{used >> 20} MB in use: all connections are cut")
             for door in self._doors:
@@ -97,12 +100,11 @@ class Entrance:
         AuthenticatorStoppedError
             Nobody could be let in any more; libzmq refuses all until the hub is started again.
         """
-        try:
-            ready = dict(self._poller.poll(timeout_ms))
-        except zmq.ZMQError as error:
-            if self._authenticator and self._authenticator.socket.closed:
-                raise AuthenticatorStoppedError("the authenticator has stopped") from error
-            raise
+        if self._authenticator and self._authenticator.socket.closed:
+            raise AuthenticatorStoppedError("the authenticator has stopped: nobody can come in")
+        ready = dict(self._poller.poll(timeout_ms))
+        if self._keyring and ready:
+            self._keyring.refresh()  # what was revoked a moment ago is refused already
         if self._authenticator and self._authenticator.socket in ready:
             self._authenticator.answer()
         for number, door in enumerate(self._doors):

@@ -67,8 +67,11 @@ class Keyring:
         self._seen: dict[str, tuple[int, ...]] | None = None
         self._by_public: Mapping[str, Allowed] = {}
         self._tokens: frozenset[bytes] = frozenset()
+        self.changes = 0
+        """How often the list has changed since it was first read."""
         self._log = structlog.get_logger("keys")
         self.refresh()
+        self.changes = 0
 
     def __len__(self) -> int:
         return len(self._by_public)
@@ -101,6 +104,7 @@ class Keyring:
             if first is not one:
                 self._log.error("key not let in", reason=f"{name}: the same key as {first.name}")
         changed = found != self._by_public
+        self.changes += changed
         self._by_public = found
         self._tokens = frozenset(one.token for one in found.values())
         return changed

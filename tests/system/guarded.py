@@ -1,6 +1,7 @@
 """A hub with a guarded door as a real process, a key for each role, and peers that say anything."""
 
 import contextlib
+import itertools
 import os
 import socket
 import subprocess
@@ -31,7 +32,7 @@ class Peer:
 
     def __init__(
         self, address: str, pair: KeyPair | None = None, hub: str | None = None,
-        kind: int = zmq.DEALER,
+        kind: int = zmq.DEALER, *, password: str | None = None,
     ) -> None:
         self.context = zmq.Context()
         self.socket = self.context.socket(kind)
@@ -40,6 +41,8 @@ class Peer:
             self.socket.curve_serverkey = hub.encode()
             self.socket.curve_publickey = pair.public.encode()
             self.socket.curve_secretkey = pair.secret.encode()
+        if password:
+            self.socket.plain_username, self.socket.plain_password = b"root", password.encode()
         if kind == zmq.SUB:
             address = publications_of(address)
         self.monitor = self.socket.get_monitor_socket()
@@ -68,6 +71,16 @@ class Peer:
         answer = self.ask(messages.GetStatus(request=99))
         assert isinstance(answer, messages.Status)
         return answer
+
+    def poll_status(self) -> messages.Status:
+        """Ask again and again, as a connection may have been cut meanwhile."""
+        for number in range(1000, 1050):
+            self.say(messages.GetStatus(request=number))
+            if self.socket.poll(500):
+                packet = decode_from_hub(self.socket.recv_multipart())
+                if isinstance(packet.message, messages.Status):
+                    return packet.message
+        raise AssertionError("no status came")
 
     def silent(self, milliseconds: int = 300) -> bool:
         """Say whether nothing comes."""
@@ -184,11 +197,14 @@ def press_through(hub: GuardedHub, capture_id: str) -> None:
         sensor.hears("take")
         sensor.say(messages.Frame(capture_id=capture_id, frame=FRAME), FRAME_ARRAYS)
         presser.hears("press_accepted")
-        job = worker.hears("job").message
-        assert job.capture_id == capture_id
-        worker.say(messages.Result(
-            capture_id=capture_id, settings_hash=job.settings_hash,
-            frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
+        for credit in itertools.count(1):
+            job = worker.hears("job").message
+            worker.say(messages.Result(
+                capture_id=job.capture_id, settings_hash=job.settings_hash,
+                frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
+            if job.capture_id == capture_id:
+                break
+            worker.say(messages.WorkerReady(name="w", credit=credit))
         assert presser.ask(messages.GetFace(
             request=2, capture_id=capture_id, wait_s=10)).kind == "face_done"
         until(lambda: subscriber.socket.recv_multipart()[0] == b"faces")

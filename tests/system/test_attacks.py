@@ -1,16 +1,502 @@
-"""Everyone who is not to come in: refused, counted, and the hub goes on."""
+"""Everyone who is not to come in: refused, counted, and the hub goes on to serve.
 
+`docs/reliability.md` has the same rows as a table.
+"""
+
+import random
+import re
+import socket
+import threading
+from contextlib import suppress
+
+import psutil
 import pytest
+import zmq
+from zmq.utils.monitor import parse_monitor_message
 
-from tests.system.guarded import guarded_hub, press_through
+from service import messages
+from service.errors import ClientTimeoutError, KeyRefusedError, RequestFailedError
+from service.keyring import Role, allow, revoke
+from service.keys import KeyPair, new_pair, read_pair, read_public
+from service.payload import MAX_ARRAY_BYTES
+from service.wire import Packet, encode
+from tests.system.guarded import (
+    FACE,
+    FACE_ARRAYS,
+    FRAME,
+    FRAME_ARRAYS,
+    Peer,
+    free_port,
+    guarded_hub,
+    press_through,
+)
+from tests.system.running import REPOSITORY, denseface, until
+
+PRESS = messages.Press(request=1, capture_id="attack")
 
 
 @pytest.fixture(scope="module")
 def hub(tmp_path_factory):
+    """One hub for all attacks; at the end it must still make a face."""
     with guarded_hub(tmp_path_factory.mktemp("hub")) as hub:
+        press_through(hub, "first")
+        assert hub.status().refused == {}
         yield hub
+        press_through(hub, "last")
+        with pytest.raises(RequestFailedError), hub.client("presser") as client:
+            client.get("attack", timeout=5)  # nothing of any attack became a capture
+        # Garbage does not fill the disk, and no secret reaches the log.
+        assert len(hub.log.read_text().splitlines()) < 300
+        for path in hub.keys.glob("*.secret"):
+            assert read_pair(path).secret not in hub.log.read_text()
 
 
-def test_a_press_with_keys_gives_a_face(hub):
-    press_through(hub, "first")
-    assert hub.status().refused == {}
+@pytest.fixture
+def refused(hub):
+    """Gives what waits until more was refused for a reason than before the test."""
+    before = hub.status().refused
+
+    def more(reason, by=1):
+        until(lambda: hub.refused(reason) - before.get(reason, 0) >= by)
+
+    return more
+
+
+@pytest.fixture
+def knock(hub):
+    """Opens connections and closes them."""
+    peers = []
+
+    def open_peer(*arguments, **named):
+        peers.append(Peer(*arguments, **named))
+        return peers[-1]
+
+    yield open_peer
+    for peer in peers:
+        peer.close()
+
+
+def happened(peer, *events, within_ms=15_000):
+    """Wait for one of some things to happen to a peer's connection."""
+    while peer.monitor.poll(within_ms):
+        if parse_monitor_message(peer.monitor.recv_multipart())["event"] in events:
+            return True
+    return False
+
+
+def as_role(hub, role, kind=zmq.DEALER):
+    return (hub.address, read_pair(hub.secret(role)), read_public(hub.hub_key), kind)
+
+
+# --- no way in without a hub key, an allowed key and an authenticator
+
+def test_without_keys_the_hub_does_not_open_the_door(tmp_path):
+    keys, address = tmp_path / "keys", f"tcp://127.0.0.1:{free_port('127.0.0.1')}"
+    hub = ("hub", "--address", f"ipc://{tmp_path}/h"[:90], "--listen", address, "--keys", keys,
+           "--data", tmp_path / "data")
+    for wrong, mend in (("no hub key", lambda: new_pair(keys, "hub")),
+                        ("no key is allowed", lambda: (keys / "hub.secret").chmod(0o644)),
+                        ("no key is allowed", lambda: allow(
+                            keys, "a", KeyPair.made().public, frozenset({Role.WORKER})))):
+        done = denseface(*hub)
+        assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+        assert address in done.stderr
+        assert wrong in done.stderr
+        mend()
+    done = denseface(*hub)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert "mode 644" in done.stderr
+    anywhere = denseface("hub", "--address", "tcp://0.0.0.0:5700", "--keys", tmp_path / "none",
+                         "--data", tmp_path / "data")
+    assert (anywhere.returncode, len(anywhere.stderr.splitlines())) == (2, 1)
+    assert "CURVE" in anywhere.stderr
+
+
+_STOPS = """
+from pathlib import Path
+from service.zap import Authenticator
+answer = Authenticator.answer
+def changed(self):
+    if not Path({flag!r}).exists():
+        answer(self)
+    elif {closed}:
+        self.socket.close()
+    else:
+        self.socket.recv_multipart()
+Authenticator.answer = changed
+"""
+
+
+def test_when_the_authenticator_ends_nobody_comes_in_and_the_hub_ends(tmp_path, knock):
+    flag = tmp_path / "stop"
+    with guarded_hub(tmp_path, code=_STOPS.format(flag=str(flag), closed=True)) as hub:
+        assert knock(*as_role(hub, "presser")).status()
+        flag.touch()
+        late = knock(*as_role(hub, "presser"))
+        late.say(PRESS)
+        assert hub.process.wait(20) == 1
+        assert "authenticator has stopped" in hub.log.read_text().splitlines()[-1]
+        assert "pressed" not in hub.log.read_text()
+        assert late.silent()
+
+
+def test_when_the_authenticator_is_silent_nobody_comes_in_and_the_rest_goes_on(tmp_path, knock):
+    flag = tmp_path / "stop"
+    with guarded_hub(tmp_path, code=_STOPS.format(flag=str(flag), closed=False)) as hub:
+        before = knock(*as_role(hub, "presser"))
+        assert before.status()
+        flag.touch()
+        late = knock(*as_role(hub, "presser"))
+        late.say(messages.GetStatus(request=1))
+        assert late.silent(2000)
+        assert before.status()
+        until(lambda: hub.refused("handshake") == 1)  # after 10 s it is hung up on
+        flag.unlink()
+        assert late.poll_status()
+
+
+# --- keys
+
+def test_an_unknown_key_is_refused(hub, knock, refused, tmp_path):
+    peer = knock(hub.address, KeyPair.made(), read_public(hub.hub_key))
+    peer.say(PRESS)
+    assert happened(peer, zmq.Event.HANDSHAKE_FAILED_AUTH)
+    refused("unknown key")
+    hub.new_key("stranger")
+    with hub.client("stranger") as client, pytest.raises(KeyRefusedError, match="not allowed"):
+        client.status()
+
+
+def test_a_key_revoked_before_is_unknown(hub, refused):
+    hub.new_key("former", Role.PRESSER)
+    with hub.client("former") as client:
+        assert client.status(timeout=20)
+    revoke(hub.keys, "former")
+    with hub.client("former") as client, pytest.raises(KeyRefusedError, match="revoked"):
+        client.press()
+    refused("unknown key")
+
+
+@pytest.mark.parametrize("show", ["another hub's key", "no key", "a password"])
+def test_another_mechanism_or_hub_is_refused(hub, knock, refused, show):
+    if show == "another hub's key":
+        peer = knock(hub.address, read_pair(hub.secret("presser")), KeyPair.made().public)
+    elif show == "no key":
+        peer = knock(hub.address)
+    else:
+        peer = knock(hub.address, password="guess")  # noqa: S106
+    peer.say(PRESS)
+    assert happened(peer, zmq.Event.HANDSHAKE_FAILED_NO_DETAIL,
+                    zmq.Event.HANDSHAKE_FAILED_PROTOCOL)
+    refused("handshake")
+    assert peer.silent()
+
+
+def test_a_client_says_why_it_is_not_let_in(hub):
+    _, other = new_pair(hub.keys, "other-hub")
+    status = ("status", "--hub", hub.address)
+    keyless = denseface(*status)
+    key = ("--key", hub.secret("subscriber"), "--hub-key")
+    wrong = denseface(*status, *key, other)
+    right = denseface(*status, *key, hub.hub_key)
+    half = denseface(*status, *key[:2])
+    assert [one.returncode for one in (keyless, wrong, right, half)] == [1, 1, 0, 2]
+    assert all(len(one.stderr.splitlines()) == 1 for one in (keyless, wrong, half))
+    assert "asks for a key" in keyless.stderr
+    assert "--hub-key is not the key of the hub" in wrong.stderr
+    assert "expected --hub-key" in half.stderr
+    assert "refused" in right.stdout
+
+
+# --- revoked while connected
+
+def test_a_revoked_worker_s_job_goes_to_another(hub, knock, refused):
+    hub.new_key("evil", Role.WORKER)
+    sensor, presser = knock(*as_role(hub, "sensor")), knock(*as_role(hub, "presser"))
+    evil, good = knock(*as_role(hub, "evil")), knock(*as_role(hub, "worker"))
+    sensor.say(messages.SensorReady(name="s", source="x"))
+    evil.say(messages.WorkerReady(name="evil", credit=0))
+    until(lambda: hub.status().ready)
+    presser.say(messages.Press(request=1, capture_id="kept"))
+    sensor.hears("take")
+    sensor.say(messages.Frame(capture_id="kept", frame=FRAME), FRAME_ARRAYS)
+    job = evil.hears("job").message
+    revoke(hub.keys, "evil")
+    until(lambda: not hub.status().workers)
+    assert hub.status().queued == 1
+    evil.say(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
+                             frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
+    evil.say(messages.WorkerReady(name="evil", credit=1))
+    refused("revoked key", by=2)
+    assert evil.silent()
+    assert (hub.status().queued, hub.status().workers) == (1, ())
+    good.say(messages.WorkerReady(name="good", credit=0))
+    job = good.hears("job").message
+    assert (job.capture_id, job.attempt) == ("kept", 2)
+    good.say(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
+                             frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
+    until(lambda: hub.status().queued + hub.status().working == 0)
+    # Said again, it is of no use any more.
+    good.say(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
+                             frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
+    good.say(messages.WorkerReady(name="good", credit=0))
+    refused("replayed", by=2)
+    for peer in (sensor, good):
+        peer.say(messages.Goodbye())
+
+
+def test_a_revoked_presser_presses_no_more(hub, refused):
+    hub.new_key("leaver", Role.PRESSER)
+    with hub.client("leaver") as client:
+        assert client.status(timeout=20)
+        revoke(hub.keys, "leaver")
+        until(lambda: hub.log.read_text() and _unanswered(client))
+        with pytest.raises(ClientTimeoutError, match="revoked"):
+            client.press("attack", timeout=1)
+    refused("revoked key")
+
+
+def _unanswered(client):
+    try:
+        client.status(timeout=1)
+    except ClientTimeoutError:
+        return True
+    return False
+
+
+def test_a_revoked_subscriber_hears_no_more_and_the_others_do(hub, knock, refused):
+    hub.new_key("spy", Role.SUBSCRIBER)
+    spy, other = (knock(*as_role(hub, name, zmq.SUB)) for name in ("spy", "subscriber"))
+    for one in (spy, other):
+        one.socket.subscribe("status")
+        assert one.socket.poll(10_000)
+    revoke(hub.keys, "spy")
+    assert happened(spy, zmq.Event.DISCONNECTED)
+    assert happened(spy, zmq.Event.HANDSHAKE_FAILED_AUTH)
+    refused("unknown key")
+    while spy.socket.poll(0):
+        spy.socket.recv_multipart()
+    while other.socket.poll(0):
+        other.socket.recv_multipart()
+    for _ in range(3):
+        assert other.socket.poll(10_000)
+        other.socket.recv_multipart()
+    assert spy.silent(0)
+
+
+def test_a_client_that_follows_is_told(hub):
+    hub.new_key("reader", Role.SUBSCRIBER)
+    with hub.client("reader") as client:
+        after = client.status(timeout=20).sequence
+        revoked = threading.Timer(0.5, revoke, (hub.keys, "reader"))
+        revoked.start()
+        with pytest.raises(KeyRefusedError, match="revoked"):
+            next(client.published(after=after, timeout=30))
+        revoked.join()
+
+
+# --- the wrong role
+
+ROLES = [
+    ("subscriber", PRESS),
+    ("worker", PRESS),
+    ("sensor", PRESS),
+    ("operator", PRESS),
+    ("worker", messages.GetFace(request=1, capture_id="first")),
+    ("sensor", messages.GetFace(request=1, capture_id="first")),
+    ("operator", messages.GetFace(request=1, capture_id="first")),
+    ("worker", messages.GetNext(request=1, after=0)),
+    ("presser", messages.GetNext(request=1, after=0)),
+    ("presser", messages.GetFace(request=1, capture_id="foreign")),
+    ("presser", messages.Purge(request=1, everything=True)),
+    ("subscriber", messages.Purge(request=1, everything=True)),
+    ("worker", messages.DropDead(request=1, capture_id="first")),
+    ("presser", messages.SensorReady(name="evil", source="x")),
+    ("worker", messages.SensorReady(name="evil", source="x")),
+    ("subscriber", messages.WorkerReady(name="evil", credit=0)),
+    ("sensor", messages.WorkerReady(name="evil", credit=0)),
+    ("presser", messages.Goodbye()),
+]
+
+
+@pytest.mark.parametrize(("role", "message"), ROLES, ids=[f"{a}-{b.kind}" for a, b in ROLES])
+def test_the_wrong_role_is_told_so(hub, knock, refused, role, message):
+    if message.kind == "get_face" and message.capture_id == "foreign":
+        _foreign(hub, knock)
+    peer = knock(*as_role(hub, role))
+    peer.say(message)
+    kind = "request_failed" if isinstance(message, messages.Request) else "denied"
+    said = peer.hears(kind).message.message
+    assert said.startswith(f"refused: {message.kind} needs the role ")
+    assert said.endswith(f"the key {role} has {role}")
+    refused("role")
+    status = hub.status()
+    assert "evil" not in status.sensors + status.workers
+
+
+@pytest.mark.parametrize(("role", "message", "arrays"), [
+    ("worker", messages.Frame(capture_id="attack", frame=FRAME), FRAME_ARRAYS),
+    ("presser", messages.Frame(capture_id="attack", frame=FRAME), FRAME_ARRAYS),
+    ("sensor", messages.Result(capture_id="first", settings_hash="0", frame_sha256="0" * 64,
+                               face=FACE), FACE_ARRAYS),
+    ("subscriber", messages.Result(capture_id="first", settings_hash="0", frame_sha256="0" * 64,
+                                   face=FACE), FACE_ARRAYS),
+])
+def test_frames_and_faces_come_from_their_makers(hub, knock, refused, role, message, arrays):
+    peer = knock(*as_role(hub, role))
+    peer.say(message, arrays)
+    assert "needs the role" in peer.hears("denied").message.message
+    refused("role")
+
+
+def _foreign(hub, knock):
+    """Have another key press and accept that capture."""
+    hub.new_key("somebody", Role.PRESSER)
+    sensor, presser = knock(*as_role(hub, "sensor")), knock(*as_role(hub, "somebody"))
+    sensor.say(messages.SensorReady(name="s", source="x"))
+    until(lambda: hub.status().sensors)
+    presser.say(messages.Press(request=1, capture_id="foreign"))
+    sensor.hears("take")
+    sensor.say(messages.Frame(capture_id="foreign", frame=FRAME), FRAME_ARRAYS)
+    presser.hears("press_accepted")
+    assert presser.ask(messages.GetFace(request=2, capture_id="foreign")).kind == "capture_pending"
+    sensor.say(messages.Goodbye())
+
+
+@pytest.mark.parametrize("role", ["worker", "sensor", "presser", "operator"])
+def test_only_a_subscriber_may_come_to_the_topics(hub, knock, refused, role):
+    peer = knock(*as_role(hub, role, zmq.SUB))
+    peer.socket.subscribe("")
+    assert happened(peer, zmq.Event.HANDSHAKE_FAILED_AUTH)
+    refused("role")
+    assert peer.silent(0)
+
+
+def test_other_topics_are_nobody_s(hub, knock, refused):
+    peer = knock(*as_role(hub, "subscriber", zmq.SUB))
+    peer.socket.subscribe("")
+    peer.socket.subscribe("f")
+    refused("malformed", by=2)
+    assert peer.silent(600)
+
+
+# --- not ZeroMQ, not ours, too much
+
+def test_garbage_is_hung_up_on(hub, refused):
+    host, port = "127.0.0.1", int(hub.address.rpartition(":")[2])
+    noise = random.Random(4)
+    said = [b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", noise.randbytes(70_000), b"\x16\x03\x01" * 50,
+            b"\xff" + bytes(8) + b"\x7f\3\0CURVE" + bytes(15) + b"\0" * 32 + noise.randbytes(500),
+            b"\xff" + bytes(8) + b"\x7f\3\0NULL" + bytes(16) + b"\0" * 32 + b"\4\x19\5READY"]
+    for offset in (0, 1):
+        for text in said:
+            with socket.create_connection((host, port + offset), timeout=20) as raw:
+                with suppress(OSError):  # it may be hung up on meanwhile
+                    raw.sendall(text)
+                    raw.shutdown(socket.SHUT_WR)
+                _read_to_the_end(raw)
+    refused("handshake", by=2 * len(said))
+
+
+def test_a_slow_drip_is_hung_up_on(hub, refused):
+    """Of many connections that dribble, all are ended in 10 s, and others come in meanwhile."""
+    port = int(hub.address.rpartition(":")[2])
+    drips = [socket.create_connection(("127.0.0.1", port), timeout=30) for _ in range(20)]
+    for drip in drips:
+        drip.sendall(b"\xff")
+    with hub.client("presser") as client:
+        assert client.status(timeout=20)
+    for drip in drips:
+        with drip:
+            _read_to_the_end(drip)
+    refused("handshake", by=len(drips))
+
+
+def _read_to_the_end(raw):
+    try:
+        while raw.recv(4096):
+            pass
+    except ConnectionResetError:
+        pass
+
+
+def test_fuzzed_messages_of_an_accepted_key_are_counted(hub, knock, refused):
+    noise = random.Random(4)
+    good = [encode(Packet(messages.Result(capture_id="first", settings_hash="0",
+                                          frame_sha256="0" * 64, face=FACE), FACE_ARRAYS)),
+            encode(Packet(messages.WorkerReady(name="w", credit=0))),
+            encode(Packet(messages.JobFailed(
+                capture_id="first", settings_hash="0", frame_sha256="0" * 64, error="E",
+                message="m", final=True)))]
+    peer = knock(*as_role(hub, "worker"))
+    before = sum(hub.status().refused.values())
+    for _ in range(1000):
+        parts = [*noise.choice(good)]
+        where = noise.randrange(len(parts))
+        match noise.randrange(5):
+            case 0:
+                parts[where] = parts[where][:noise.randrange(len(parts[where]))]
+            case 1:
+                parts[where] += noise.randbytes(noise.randrange(1, 50))
+            case 2:
+                parts.insert(where, noise.randbytes(noise.randrange(100)))
+            case 3:
+                parts[0] = noise.randbytes(noise.randrange(200))
+            case 4:
+                at = noise.randrange(len(parts[0]) - 1)
+                parts[0] = parts[0][:at] + b"{[" + parts[0][at + 2:]
+        peer.socket.send_multipart(parts)
+    until(lambda: sum(hub.status().refused.values()) >= before + 1000)
+    refused("malformed", by=100)
+    refused("truncated", by=100)
+    assert hub.status().workers == ()
+
+
+def test_what_is_too_much_is_dropped(hub, knock, refused):
+    peer = knock(*as_role(hub, "sensor"))
+    ready = encode(Packet(messages.SensorReady(name="s", source="x")))
+    peer.socket.send_multipart([*ready, *[b""] * 17])
+    peer.socket.send_multipart([*ready, *[b"x"] * 100_000])
+    peer.socket.send_multipart([b" " * 300_000 + ready[0]])
+    peer.socket.send_multipart([b"x" * 30_000_000] * 5)
+    refused("oversized", by=4)
+    peer.socket.send_multipart([ready[0].replace(b'"version":1', b'"version":2')])
+    peer.socket.send_multipart([ready[0].replace(b'"version":1,', b"").replace(
+        b',"version":1', b"")])
+    refused("version", by=2)
+    peer.socket.send_multipart([ready[0], b"one array too many"])
+    peer.socket.send_multipart([encode(Packet(messages.Frame(
+        capture_id="attack", frame=FRAME), FRAME_ARRAYS))[0]])
+    refused("truncated", by=2)
+    assert hub.status().sensors == ()
+
+
+def test_a_part_beyond_the_limit_ends_the_connection(hub, knock):
+    peer = knock(*as_role(hub, "sensor"))
+    assert peer.status()
+    peer.socket.send(bytes(MAX_ARRAY_BYTES + 1))
+    assert happened(peer, zmq.Event.DISCONNECTED)
+    assert peer.poll_status()
+
+
+def test_a_message_without_end_cannot_fill_the_memory(tmp_path, knock):
+    with guarded_hub(tmp_path, DENSEFACE_MEMORY_MB="200") as hub:
+        process, used = psutil.Process(hub.process.pid), []
+        peer = knock(*as_role(hub, "worker"))
+        assert peer.status()
+        for _ in range(1500):
+            peer.socket.send(bytes(2**20), zmq.SNDMORE)
+        peer.socket.send(b"")
+        until(lambda: used.append(process.memory_info().rss) or hub.refused("memory") == 1)
+        assert happened(peer, zmq.Event.DISCONNECTED)
+        until(lambda: process.memory_info().rss < 200 * 2**20)
+        press_through(hub, "after")
+        # A tick may come late, so the limit of 200 MiB is passed by what comes meanwhile.
+        assert 100 * 2**20 < max(used) < 1000 * 2**20
+
+
+def test_every_row_stands_in_the_documentation():
+    text = (REPOSITORY / "docs" / "reliability.md").read_text()
+    shown = set(re.findall(r"`(test_\w+)`", text))
+    here = {name for name in globals() if name.startswith("test_")}
+    assert here - shown == {"test_every_row_stands_in_the_documentation"}
