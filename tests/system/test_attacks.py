@@ -495,6 +495,13 @@ def test_a_message_without_end_cannot_fill_the_memory(tmp_path, knock):
         assert 100 * 2**20 < max(used) < 1000 * 2**20
 
 
+def test_another_user_of_the_machine_reads_nothing(hub):
+    data = hub.log.parent / "data"
+    found = [data, hub.keys, *data.rglob("*"), *hub.keys.rglob("*")]
+    assert len([path for path in found if path.parent.name in ("frames", "faces")]) >= 2
+    assert [path for path in found if path.stat().st_mode & 0o077] == []
+
+
 def test_every_row_stands_in_the_documentation():
     text = (REPOSITORY / "docs" / "reliability.md").read_text()
     shown = set(re.findall(r"`(test_\w+)`", text))

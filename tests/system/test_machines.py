@@ -1,0 +1,85 @@
+"""Hub and sensor on one machine, worker and presser on another: two network namespaces."""
+
+import contextlib
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from service.client import Client
+from service.export import load_face
+from service.keyring import Role, allow
+from service.keys import new_pair, read_public
+from tests.system.guarded import free_port
+from tests.system.running import RECORDINGS, REPOSITORY, until
+
+_HERE, _THERE = "10.231.77.1", "10.231.77.2"
+
+
+def _ip(*arguments: str) -> None:
+    subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True)
+
+
+@pytest.fixture
+def machines():
+    """Give the hub's address and what goes before a command of the other machine.
+
+    Where namespaces cannot be made, both are this one, by a loopback address that is guarded.
+    """
+    name = f"df{os.getpid()}"
+    with contextlib.ExitStack() as undo:
+        try:
+            _ip("netns", "add", name)
+            undo.callback(_ip, "netns", "del", name)
+            _ip("link", "add", f"{name}a", "type", "veth", "peer", "name", f"{name}b")
+            undo.callback(subprocess.run, ["ip", "link", "del", f"{name}a"], capture_output=True,
+                          check=False)
+            _ip("link", "set", f"{name}b", "netns", name)
+            _ip("addr", "add", f"{_HERE}/30", "dev", f"{name}a")
+            _ip("link", "set", f"{name}a", "up")
+            _ip("-n", name, "addr", "add", f"{_THERE}/30", "dev", f"{name}b")
+            _ip("-n", name, "link", "set", f"{name}b", "up")
+        except (OSError, subprocess.CalledProcessError):
+            yield "127.0.0.2", ()
+        else:
+            yield _HERE, ("ip", "netns", "exec", name)
+
+
+def test_a_face_is_made_on_another_machine(machines, tmp_path):
+    host, there = machines
+    here_keys, there_keys = tmp_path / "hub", tmp_path / "bench"
+    _, hub_key = new_pair(here_keys, "hub")
+    secret, public = new_pair(there_keys, "bench")
+    roles = frozenset({Role.WORKER, Role.PRESSER})
+    allow(here_keys, "bench", read_public(public), roles)
+    guarded = f"tcp://{host}:{free_port(host)}"
+    to_hub = ("--hub", guarded, "--key", str(secret), "--hub-key", str(hub_key))
+    environment = {name: value for name, value in os.environ.items()
+                   if name != "DENSEFACE_ADDRESS"} | {"DENSEFACE_HEARTBEAT_S": "0.2"}
+    with tempfile.TemporaryDirectory(prefix="df-") as folder, contextlib.ExitStack() as running:
+        local = f"ipc://{folder}/hub"
+
+        def start(*arguments: object, before: tuple[str, ...] = ()) -> Path:
+            log = tmp_path / f"{arguments[0]}.log"
+            process = subprocess.Popen(
+                [*before, sys.executable, "-m", "service", *map(str, arguments)],
+                cwd=REPOSITORY, env=environment, stderr=running.enter_context(log.open("w")))
+            running.callback(process.wait, 20)
+            running.callback(process.terminate)
+            return log
+
+        hub_log = start("hub", "--address", local, "--listen", guarded, "--keys", here_keys,
+                        "--data", tmp_path / "data")
+        start("capture", "--address", local, "--source", RECORDINGS / "frontal_700.oni")
+        start("worker", *to_hub, before=there)
+        with Client(local) as client:
+            until(lambda: client.status(timeout=20).ready, within_s=60)
+        pressed = subprocess.run(
+            [*there, sys.executable, "-m", "service", "press", *to_hub, "--save",
+             str(tmp_path / "face.npz")], cwd=REPOSITORY, env=environment, check=False,
+            capture_output=True, text=True, timeout=60)
+        assert (pressed.returncode, pressed.stderr) == (0, ""), hub_log.read_text()
+    assert len(load_face(tmp_path / "face.npz").dense) > 10_000
