@@ -8,12 +8,14 @@ from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, FailF
 from service.payload import Payload
 
 __all__ = ["BaseAnswer", "BaseMessage", "BaseRequest", "CaptureId", "Digest", "Moment", "Name",
-           "Names", "Number", "Seconds", "Text", "Token"]
+           "Names", "Number", "PeerName", "Seconds", "Text", "Token"]
 
 CaptureId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
 """Chosen by whoever pressed; also part of file names, hence no dots and no slashes."""
 
 Name = Annotated[str, Field(max_length=200)]
+PeerName = Annotated[str, Field(pattern=r"^[!-~]{1,100}$")]
+"""Of a sensor or worker: a machine's name and a process's number."""
 Names = Annotated[tuple[Name, ...], FailFast()]
 """One complaint is enough: each of a hundred thousand would cost a thousand bytes of memory."""
 Text = Annotated[str, Field(max_length=4000)]

@@ -17,6 +17,7 @@ from service.message_base import (
     Moment,
     Name,
     Number,
+    PeerName,
     Seconds,
     Text,
     Token,
@@ -215,7 +216,7 @@ class SensorReady(BaseMessage):
     """A capture process has its source open."""
 
     kind: Literal["sensor_ready"] = "sensor_ready"
-    name: Name
+    name: PeerName
     source: Text
 
 
@@ -223,7 +224,7 @@ class WorkerReady(BaseMessage):
     """A worker is free for one job."""
 
     kind: Literal["worker_ready"] = "worker_ready"
-    name: Name
+    name: PeerName
     credit: Number
     """One more each time; a repeat of the same one asks for nothing new."""
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 __all__ = ["MOST_PEERS", "Roster", "Sensor", "Worker"]
 
-MOST_PEERS = 100
+MOST_PEERS = 256
 """Of sensors, and of workers: whoever comes later is not taken, so that all fit into a status."""
 
 

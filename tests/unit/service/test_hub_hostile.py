@@ -163,12 +163,12 @@ def test_a_crowd_is_not_taken_and_the_status_can_still_be_written(store, kind):
     hub = Hub(store, SETTINGS, Settings())
     more = {"source": "x"} if kind is messages.SensorReady else {"credit": 0}
     for number in range(MOST_PEERS + 50):
-        hub.receive(0.0, b"%d" % number, Packet(kind(name="\x01" * 200, **more)))
-        hub.receive(0.0, b"%d" % number, Packet(kind(name="\x01" * 200, **more)))
+        hub.receive(0.0, b"%d" % number, Packet(kind(name="\\" * 100, **more)))
+        hub.receive(0.0, b"%d" % number, Packet(kind(name="\\" * 100, **more)))
     assert len(hub.peers()) == MOST_PEERS
-    other = (messages.WorkerReady(name="\x01" * 200, credit=0)
+    other = (messages.WorkerReady(name="\\" * 100, credit=0)
              if kind is messages.SensorReady
-             else messages.SensorReady(name="\x01" * 200, source="x"))
+             else messages.SensorReady(name="\\" * 100, source="x"))
     for number in range(MOST_PEERS):
         hub.receive(0.0, b"%d" % number, Packet(other))
     for output in hub.tick(1.0):

@@ -24,6 +24,7 @@ PREVIEW_ARRAYS = {"image": np.arange(36, dtype=np.uint8).reshape(3, 4, 3)}
 ids = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", fullmatch=True)
 numbers = st.integers(0, 2**63 - 1)
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=200)
+peer_names = st.from_regex(r"[!-~]{1,100}", fullmatch=True)
 hashes = st.from_regex(r"[0-9a-f]{1,64}", fullmatch=True)
 digests = st.from_regex(r"[0-9a-f]{64}", fullmatch=True)
 times = st.datetimes(datetime(1, 1, 2), datetime(9999, 12, 30), timezones=st.just(UTC))
@@ -47,8 +48,8 @@ to_hub = st.one_of(
     plain(messages.Purge, request=numbers, capture_id=ids),
     plain(messages.Purge, request=numbers, before=times),
     plain(messages.Purge, request=numbers, everything=st.just(True)),
-    plain(messages.SensorReady, name=texts, source=texts),
-    plain(messages.WorkerReady, name=texts, credit=numbers),
+    plain(messages.SensorReady, name=peer_names, source=texts),
+    plain(messages.WorkerReady, name=peer_names, credit=numbers),
     plain(messages.Heartbeat, holding=st.none() | ids),
     st.just(Packet(messages.Goodbye())),
     plain(messages.FrameFailed, capture_id=ids, message=texts),
