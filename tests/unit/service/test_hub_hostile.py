@@ -54,6 +54,7 @@ class Hostile:
     accepted: set[str] = field(default_factory=set)
     jobs: list[messages.Job] = field(default_factory=list)
     heard: list[Parts] = field(default_factory=list)
+    asked: str = ""
     taken: int = 0
 
     def __post_init__(self) -> None:
@@ -65,6 +66,8 @@ class Hostile:
             match message:
                 case messages.PressAccepted() | messages.FrameAccepted():
                     self.accepted.add(message.capture_id)
+                case messages.Take():
+                    self.asked = message.capture_id
                 case messages.Job():
                     self.jobs = [*self.jobs[-20:], message]
             if isinstance(output, Publish) and output.topic is Topic.FACES:
@@ -106,7 +109,8 @@ class Hostile:
             case 0 | 1:
                 message, arrays = messages.Press(request=1, capture_id=capture_id), {}
             case 2 | 3:
-                message, arrays = messages.Frame(capture_id=capture_id, frame=FRAME), FRAME_ARRAYS
+                message, arrays = messages.Frame(
+                    capture_id=self.asked or capture_id, frame=FRAME), FRAME_ARRAYS
             case 4:
                 message, arrays = messages.WorkerReady(name="w", credit=rng.randrange(99)), {}
             case 5:
