@@ -4,11 +4,12 @@ import struct
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from pydantic import BaseModel
+import numpy as np
 
 from recon.settings import Settings
 from service import messages
-from service.payload import Arrays, FaceHeader, FrameHeader
+from service.messages import Message
+from service.payload import Arrays, FaceHeader, FrameHeader, Payload
 from service.wire import Packet, encode
 from tests.unit.service.faces import small_face, small_frame
 
@@ -21,27 +22,22 @@ _BY_TYPE: dict[str, Any] = {
     "integer": 1, "number": 0.5, "boolean": False, "array": (), "object": {}, "null": None}
 
 
-def kinds(union: Any) -> tuple[type[BaseModel], ...]:
+def kinds(union: Any) -> tuple[type[Message], ...]:
     """Give the classes of `ToHub` or `FromHub`."""
-    found: tuple[type[BaseModel], ...] = union.__args__
+    found: tuple[type[Message], ...] = union.__args__
     return found
 
 
 def packets() -> Iterator[Packet]:
     """Give messages of every kind there is, made from the fields that the kind declares."""
-    frame, frame_arrays = FrameHeader.of(small_frame())
-    face, face_arrays = FaceHeader.of(small_face())
+    frame, _ = FrameHeader.of(small_frame())
+    face, _ = FaceHeader.of(small_face())
     for kind in (*kinds(messages.ToHub), *kinds(messages.FromHub)):
         given: dict[str, Any] = {"frame": frame, "face": face, "settings": Settings()}
-        arrays: Arrays = {}
-        if "frame" in kind.model_fields:
-            arrays = frame_arrays
-        elif "face" in kind.model_fields:
-            arrays = face_arrays
         schema = kind.model_json_schema()
         for name, about in schema["properties"].items():
             if name in schema.get("required", ()) and name not in given:
-                given[name] = _example(about)
+                given[name] = _example(about, schema.get("$defs", {}))
         given = {name: value for name, value in given.items() if name in kind.model_fields}
         # Where one of several fields must be given, the first that makes the message valid.
         for more in ({}, {"last": 3}, {"capture_id": "a0"}):
@@ -49,13 +45,28 @@ def packets() -> Iterator[Packet]:
                 message = kind.model_validate(given | more)
             except ValueError:
                 continue
-            yield Packet(message, arrays)  # type: ignore[arg-type]
+            yield Packet(message, _arrays(message.payload))
             break
         else:
             raise TypeError(f"no example of {kind.__name__} can be made from its fields")
 
 
-def _example(about: dict[str, Any]) -> Any:
+def _arrays(payload: Payload | None) -> Arrays:
+    """Give arrays of ones: positive, finite, on the grid."""
+    return {info.name: np.ones(info.shape, info.dtype) for info in payload.layout()
+            } if payload else {}
+
+
+def _example(about: dict[str, Any], definitions: dict[str, Any]) -> Any:
+    if "$ref" in about:
+        return _example(definitions[about["$ref"].rpartition("/")[2]], definitions)
+    if "anyOf" in about:
+        return _example(about["anyOf"][0], definitions)
+    if "enum" in about or "const" in about:
+        return about.get("const", about.get("enum", [None])[0])
+    if "properties" in about:
+        return {name: _example(about["properties"][name], definitions)
+                for name in about.get("required", ())}
     if about.get("type") == "string":
         return _DIGEST if "{64}" in about.get("pattern", "") else "a0"
     return _BY_TYPE[about["type"]]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from service.errors import ProtocolError
+from service.payload import FaceHeader, FrameHeader
 from service.wire import Packet, decode_from_hub, decode_kept, decode_to_hub, encode
 from tests.fuzzing.corpus import Parts
 
@@ -50,7 +51,8 @@ def check(decode: Decoder, parts: Parts) -> bool:
             for name, array in packet.arrays.items()):
         raise UnexpectedError(f"what is passed on is not what was read: {packet.message!r}")
     try:
-        if payload := packet.message.payload:
+        payload = packet.message.payload
+        if isinstance(payload, FrameHeader | FaceHeader):
             payload.join(packet.arrays)
     except ProtocolError:
         pass

@@ -54,7 +54,6 @@ class Hostile:
     accepted: set[str] = field(default_factory=set)
     jobs: list[messages.Job] = field(default_factory=list)
     heard: list[Parts] = field(default_factory=list)
-    asked: str = ""
     taken: int = 0
 
     def __post_init__(self) -> None:
@@ -66,8 +65,6 @@ class Hostile:
             match message:
                 case messages.PressAccepted() | messages.FrameAccepted():
                     self.accepted.add(message.capture_id)
-                case messages.Take():
-                    self.asked = message.capture_id
                 case messages.Job():
                     self.jobs = [*self.jobs[-20:], message]
             if isinstance(output, Publish) and output.topic is Topic.FACES:
@@ -98,8 +95,18 @@ class Hostile:
                 self.say(peer, self.rng.choice(self.heard))
             case 4 | 5:
                 self.say(peer, mutate(self.rng, self.likely(), CORPUS))
+            case 6:
+                self.all_is_well_until_the_job(self.rng.choice(IDS))
             case _:
                 self.say(peer, self.likely())
+
+    def all_is_well_until_the_job(self, capture_id: str) -> None:
+        """Make sure that there is something to lose."""
+        for message, arrays in (
+                (messages.SensorReady(name="s", source="x"), {}),
+                (messages.Press(request=1, capture_id=capture_id), {}),
+                (messages.Frame(capture_id=capture_id, frame=FRAME), FRAME_ARRAYS)):
+            self.say(PEERS[0], encode(Packet(message, arrays)))
 
     def likely(self) -> Parts:
         """Give a message that may mean something now."""
@@ -110,7 +117,7 @@ class Hostile:
                 message, arrays = messages.Press(request=1, capture_id=capture_id), {}
             case 2 | 3:
                 message, arrays = messages.Frame(
-                    capture_id=self.asked or capture_id, frame=FRAME), FRAME_ARRAYS
+                    capture_id=capture_id, frame=FRAME), FRAME_ARRAYS
             case 4:
                 message, arrays = messages.WorkerReady(name="w", credit=rng.randrange(99)), {}
             case 5:
@@ -142,7 +149,7 @@ class Hostile:
                     capture_id=job.capture_id, settings_hash=job.settings_hash,
                     frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)))
             self.jobs = []
-        return {one for one in IDS if self.store.outcome(one)}
+        return {one for one in self.accepted if self.store.outcome(one)}
 
 
 @pytest.mark.parametrize("seed", range(6))
