@@ -97,6 +97,11 @@ class Database:
         connection.execute(
             "INSERT OR IGNORE INTO meta VALUES ('epoch', ?)", (secrets.token_hex(8),))
 
+    @property
+    def changes(self) -> int:
+        """How many rows were changed since this was opened."""
+        return self._connection.total_changes
+
     def close(self) -> None:
         """Close; harmless when repeated."""
         self._connection.close()

@@ -66,6 +66,8 @@ class FolderStore:
             self._database, self._account, self._quarantine = recover(
                 self._layout, clock or SystemClock())
             self._epoch = self._database.meta("epoch") or ""
+            self._counts: dict[CaptureState, int] = {}
+            self._counted_at = -1
             self._ballast = Ballast(self._layout.ballast)
             self._ballast.take_in()
         except OSError as error:
@@ -236,10 +238,14 @@ class FolderStore:
 
     def counts(self) -> dict[CaptureState, int]:
         """Give the number of captures that are kept in each state."""
-        rows = self._database.all(
-            "SELECT state, count(*) AS count FROM captures WHERE state != ? GROUP BY state",
-            CaptureState.REMOVED)
-        return {CaptureState(row["state"]): row["count"] for row in rows}
+        # Asked at every heartbeat: counting a million rows anew would keep an idle hub busy.
+        if self._counted_at != self._database.changes:
+            self._counted_at = self._database.changes
+            self._counts = {
+                CaptureState(row["state"]): row["count"] for row in self._database.all(
+                    "SELECT state, count(*) AS count FROM captures WHERE state != ?"
+                    " GROUP BY state", CaptureState.REMOVED)}
+        return dict(self._counts)
 
     def expired(self, retention_s: float, most: int) -> list[str]:
         """Give ids of what was finished longer ago than the retention, oldest first."""
