@@ -83,13 +83,13 @@ def _opened(layout: Layout, clock: Clock) -> tuple[Database, Account, Quarantine
 
 
 def _account(layout: Layout, clock: Clock) -> Account:
-    """Go on with the newest account that a file holds."""
-    accounts = [Account(clock, None)]
+    """Go on with the newest account that a frame holds, or a face where there are no frames."""
+    accounts: list[Account] = []
     for names, read in ((layout.all_frames(), read_frame), (layout.all_faces(), read_face)):
-        for _, path in names:
+        for _, path in () if accounts else names:
             with suppress(StoreError):
                 accounts.append(Account(clock, read(path).about.clock))
-    return max(accounts, key=lambda account: account.now())
+    return max(accounts, key=lambda account: account.now(), default=Account(clock, None))
 
 
 @dataclass(frozen=True)
