@@ -133,7 +133,7 @@ def connect(
     context: "zmq.Context[zmq.Socket[bytes]]", kind: int, address: str, keys: Credentials | None
 ) -> "tuple[zmq.Socket[bytes], Knock]":
     """Open a socket toward the hub, which may come later."""
-    socket = open_socket(context, kind)
+    socket = open_socket(context, kind, address)
     if kind == zmq.DEALER:
         # Nothing is queued for a hub that is not there: it would arrive stale.
         socket.set(zmq.IMMEDIATE, 1)

@@ -37,6 +37,8 @@ _LOCAL = bytes(_TOKEN_BYTES)
 _MAX_SUBSCRIPTION_BYTES = 1024
 """MAXMSGSIZE of an XPUB; a handshake is as long."""
 _HANDSHAKE_MS = 10_000
+_FLOOD = 100
+"""Messages of revoked keys between two ticks for which all connections are cut."""
 _BURST = 32
 """Messages taken from one socket between two looks at the clock."""
 
@@ -90,13 +92,15 @@ class Door:
         self._monitors: list[Handshakes] = []
         self._subscribed: set[bytes] = set()
         """Tokens of the keys that subscribed since the publisher was bound."""
+        self._revoked = 0
+        """Messages with keys that are allowed no more, since the last tick."""
         self._unbound: dict[zmq.Socket[bytes], str] = {}
         """What is to be bound again, where its connections were cut."""
         self.subscriptions: dict[Topic, int] = dict.fromkeys(Topic, 0)
         """How many there are of each topic."""
-        self._router = open_socket(context, zmq.ROUTER)
+        self._router = open_socket(context, zmq.ROUTER, address)
         self._router.set(zmq.ROUTER_MANDATORY, 1)
-        self._publisher = open_socket(context, zmq.XPUB)
+        self._publisher = open_socket(context, zmq.XPUB, address)
         self._publisher.set(zmq.XPUB_MANUAL, 1)
         self._publisher.set(zmq.MAXMSGSIZE, _MAX_SUBSCRIPTION_BYTES)
         try:
@@ -176,7 +180,10 @@ class Door:
         return self._guard.keyring.holds(token) if self._guard else token == _LOCAL
 
     def tick(self) -> None:
-        """End all subscriptions where one was made with a key that is allowed no more."""
+        """Cut off the keys that are allowed no more, if they subscribed or do not fall silent."""
+        if self._revoked > _FLOOD:
+            self._cut(self._router)
+        self._revoked = 0
         if self._guard and not all(map(self._guard.keyring.holds, self._subscribed)):
             self._cut(self._publisher)
         for socket, address in list(self._unbound.items()):
@@ -228,6 +235,7 @@ class Door:
     def _known(self, first: zmq.Frame) -> Allowed | None:
         user = self._user(first)
         if user is None:
+            self._revoked += 1
             self._refusals.note("revoked key", address=_address(first),
                                 key=_property(first, "User-Id"))
         return user

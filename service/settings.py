@@ -50,7 +50,7 @@ class ServiceSettings(BaseModel):
 
     address: str = Field(default_factory=default_address)
     """The hub's address: `ipc://PATH` or `tcp://HOST:PORT`."""
-    listen: tuple[str, ...] = ()
+    listen: Annotated[tuple[str, ...], Field(max_length=16)] = ()
     """Where the hub listens too, for those with a key: `tcp://HOST:PORT`, several with commas."""
     keys: Path = Field(default_factory=lambda: platformdirs.user_config_path("denseface") / "keys")
     """Folder of the keys and of the hub's allow-list."""

@@ -28,9 +28,13 @@ class TooLongError(RemoteProtocolError):
         self.first = first
 
 
-def open_socket(context: "zmq.Context[zmq.Socket[bytes]]", kind: int) -> "zmq.Socket[bytes]":
-    """Open a socket with high-water marks, linger and the largest message part set."""
+def open_socket(
+    context: "zmq.Context[zmq.Socket[bytes]]", kind: int, address: str
+) -> "zmq.Socket[bytes]":
+    """Make a socket for an address, with high-water marks, linger and the largest part set."""
     socket = context.socket(kind)
+    if address.startswith("tcp://["):
+        socket.set(zmq.IPV6, 1)
     socket.set(zmq.SNDHWM, _HIGH_WATER_MARK)
     socket.set(zmq.RCVHWM, _HIGH_WATER_MARK)
     socket.set(zmq.LINGER, _LINGER_MS)

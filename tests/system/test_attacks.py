@@ -245,6 +245,21 @@ def test_a_revoked_worker_s_job_goes_to_another(hub, knock, refused):
         peer.say(messages.Goodbye())
 
 
+def test_a_revoked_key_that_floods_is_cut_off(hub, knock, refused):
+    hub.new_key("flood", Role.WORKER)
+    flood, other = knock(*as_role(hub, "flood")), knock(*as_role(hub, "worker"))
+    assert flood.status()
+    assert other.status()
+    revoke(hub.keys, "flood")
+    heartbeat = encode(Packet(messages.Heartbeat()))
+    with suppress(zmq.Again):
+        for _ in range(100_000):
+            flood.socket.send_multipart(heartbeat, zmq.DONTWAIT)
+    assert happened(flood, zmq.Event.HANDSHAKE_FAILED_AUTH)
+    refused("revoked key", by=100)
+    assert other.poll_status()
+
+
 def test_a_revoked_presser_presses_no_more(hub, refused):
     hub.new_key("leaver", Role.PRESSER)
     with hub.client("leaver") as client:
