@@ -18,7 +18,7 @@ from service.client import Client
 from service.errors import ServiceError
 from service.failpoints import NAMES, TOKENS, VARIABLE
 
-__all__ = ["Cluster", "Nursery", "Part", "until"]
+__all__ = ["PACE", "Cluster", "Nursery", "Part", "until"]
 
 _REPOSITORY = Path(__file__).resolve().parents[2]
 _WATCH_S = 0.01

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Self
 
 import zmq
@@ -20,6 +20,7 @@ __all__ = ["Follower", "Listener", "Presser"]
 _ASK_S = 3.0
 """Longest wait of one try, seconds."""
 _PAUSE_S = 0.05
+_LOOK_S = 0.005
 _POLL_MS = 50
 
 
@@ -58,18 +59,29 @@ class _Person:
 class Presser(_Person):
     """Presses until `wanted` captures are accepted; a refused id is not used again.
 
+    Parameters
+    ----------
+    ahead : waits while so many of its accepted presses have not been `saw`n to end
+
     Attributes
     ----------
     answers : what was said of each id, in order
     began : when each id was first pressed, seconds
     """
 
-    def __init__(self, address: str, name: str, wanted: int, *, tries: int = 60) -> None:
+    def __init__(
+        self, address: str, name: str, wanted: int, *, saw: Callable[[str], bool],
+        ahead: int | None = None, tries: int = 60,
+    ) -> None:
         super().__init__()
         self._address = address
         self._name = name
         self._wanted = wanted
         self._tries = tries
+        self._saw = saw
+        self._ahead = ahead or wanted
+        self._open: set[str] = set()
+        """Accepted, and not yet seen to end."""
         self.answers: dict[str, Answer] = {}
         self.began: dict[str, float] = {}
         self.reasons: list[str] = []
@@ -89,8 +101,18 @@ class Presser(_Person):
                 self.began[capture_id] = time.monotonic()
                 self.answers[capture_id] = Answer.UNKNOWN
                 self.answers[capture_id] = self._press(client, capture_id)
-                if self.answers[capture_id] is not Answer.ACCEPTED:
+                if self.answers[capture_id] is Answer.ACCEPTED:
+                    self._open.add(capture_id)
+                    self._wait()
+                else:
                     self._leave.wait(_PAUSE_S)
+
+    def _wait(self) -> None:
+        while not self._leave.is_set():
+            self._open = {one for one in self._open if not self._saw(one)}
+            if len(self._open) < self._ahead:
+                return
+            self._leave.wait(_LOOK_S)
 
     def _ids(self) -> Iterator[str]:
         number = 0

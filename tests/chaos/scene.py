@@ -43,12 +43,18 @@ class Scene:
     ) -> None:
         self._stack.__exit__(kind, error, traceback)
 
-    def press(self, name: str, count: int = 1) -> Presser:
-        """Have someone press until `count` captures are accepted."""
-        presser = Presser(self.cluster.address, name, count)
+    def press(self, name: str, count: int = 1, ahead: int | None = None) -> Presser:
+        """Have someone press until `count` captures are accepted; see `Presser`."""
+        presser = Presser(
+            self.cluster.address, name, count, saw=self.follower.saw, ahead=ahead)
         self.pressers.append(presser)
         self._stack.enter_context(presser)
         return presser
+
+    def pressed(self, within_s: float) -> None:
+        """Wait until every press is answered."""
+        until(lambda: all(presser.done() for presser in self.pressers),
+              "an answer to each press", within_s)
 
     def all_seen(self) -> bool:
         """Say whether every press is answered and every accepted one was seen to end."""

@@ -1,0 +1,156 @@
+"""Random faults, one after the other, from a seed."""
+
+import random
+import signal
+import threading
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+from service.failpoints import NAMES
+from service.layout import Layout
+from tests.chaos.cluster import Part
+from tests.chaos.scene import Scene
+
+__all__ = ["Storm", "random_actions"]
+
+_MEAN_PAUSE_S = 0.25
+_LONGEST_STOP_S = 1.5
+"""Beyond the liveness of `tests.chaos.cluster.PACE`."""
+_DISK = ("written", "synced", "renamed")
+
+
+def random_actions(source: random.Random) -> dict[str, str]:
+    """Draw what each failpoint does in this run."""
+    actions = {}
+    for name in NAMES:
+        possible = ["kill", "kill", "stop"]
+        if name.endswith(_DISK):
+            possible += ["raise:ENOSPC", "raise:EIO"]
+        if name == "worker.job.computing":
+            possible.append("hang")
+        actions[name] = source.choice(possible)
+    return actions
+
+
+class Storm(threading.Thread):
+    """Does harm until `calm` is called.
+
+    Parameters
+    ----------
+    actions : what the failpoints do, for the counts
+    spoil : spoil files on the disk too, which may cost a frame
+    """
+
+    def __init__(
+        self, scene: Scene, source: random.Random, actions: dict[str, str], *, spoil: bool
+    ) -> None:
+        super().__init__(daemon=True)
+        self.counts: Counter[str] = Counter()
+        self.error: BaseException | None = None
+        self._scene = scene
+        self._random = source
+        self._actions = actions
+        self._asked: set[str] = set()
+        self._over = threading.Event()
+        self._harms: list[Callable[[], None]] = [
+            self._kill, self._kill, self._terminate, self._stop, self._failpoint, self._failpoint,
+            self._failpoint, self._new_subscriber]
+        if spoil:
+            self._harms.append(self._spoil)
+
+    def run(self) -> None:
+        """Choose a harm, do it, wait a little."""
+        try:
+            while not self._over.wait(self._random.expovariate(1 / _MEAN_PAUSE_S)):
+                self._random.choice(self._harms)()
+                self._count_failpoints()
+        except BaseException as error:
+            self.error = error
+
+    def calm(self) -> None:
+        """End, and let everyone run."""
+        self._over.set()
+        self.join()
+        self._count_failpoints()
+        for name in self._asked:
+            self._scene.cluster.token(name).unlink(missing_ok=True)
+        for part in self._scene.cluster.parts:
+            part.send(signal.SIGCONT)
+        if self.error:
+            raise self.error
+
+    def _part(self) -> Part:
+        cluster = self._scene.cluster
+        return self._random.choice([cluster.hub, cluster.capture, *cluster.workers])
+
+    def _kill(self) -> None:
+        part = self._part()
+        if part.send(signal.SIGKILL):
+            self.counts[f"SIGKILL to a {_kind(part)}"] += 1
+
+    def _terminate(self) -> None:
+        part = self._part()
+        if part.send(signal.SIGTERM):
+            self.counts[f"SIGTERM to a {_kind(part)}"] += 1
+
+    def _stop(self) -> None:
+        part = self._part()
+        if part.send(signal.SIGSTOP):
+            self.counts[f"SIGSTOP of a {_kind(part)}, then SIGCONT"] += 1
+            self._over.wait(self._random.uniform(0.1, _LONGEST_STOP_S))
+            part.send(signal.SIGCONT)
+
+    def _failpoint(self) -> None:
+        name = self._random.choice(NAMES)
+        if name not in self._asked:
+            self._asked.add(name)
+            self._scene.cluster.let_fail(name)
+
+    def _new_subscriber(self) -> None:
+        self._scene.follower.restart()
+        self.counts["subscriber restarted"] += 1
+
+    def _spoil(self) -> None:
+        """Spoil one file while there is no hub, as a disk would."""
+        hub = self._scene.cluster.hub
+        hub.end(signal.SIGKILL)
+        try:
+            layout = Layout(self._scene.cluster.data)
+            files = [*layout.all_frames(), *layout.all_faces()]
+            if files:
+                capture_id, path = self._random.choice(files)
+                self._scene.damaged.add(capture_id)
+                self._spoil_file(path)
+        finally:
+            hub.wanted = True
+
+    def _spoil_file(self, path: Path) -> None:
+        size = path.stat().st_size
+        at = self._random.randrange(size)
+        how = self._random.choice(("cut short", "bit flipped"))
+        with path.open("r+b") as file:
+            if how == "cut short":
+                file.truncate(at)
+            else:
+                file.seek(at)
+                (byte,) = file.read(1)
+                file.seek(at)
+                file.write(bytes([byte ^ 1 << self._random.randrange(8)]))
+        self.counts[f"{path.suffix[1:]} file {how}"] += 1
+
+    def _count_failpoints(self) -> None:
+        """Count those that acted, and let what stopped there go on."""
+        for name in list(self._asked):
+            if not self._scene.cluster.token(name).exists():
+                self._asked.remove(name)
+                kind = self._actions[name].replace(":", " ")
+                self.counts[f"failpoint: {kind}"] += 1
+                if kind == "stop":
+                    self._over.wait(self._random.uniform(0.1, _LONGEST_STOP_S))
+                    for part in self._scene.cluster.parts:
+                        part.send(signal.SIGCONT)
+
+
+def _kind(part: Part) -> str:
+    return part.name.split("-")[0].replace("capture", "capture process")
