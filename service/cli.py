@@ -42,6 +42,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         line = " ".join(str(error).split()) or type(error).__name__
         print(f"denseface {args.command}: {line}", file=sys.stderr)
         return _status_of(error)
+    finally:
+        # What libraries do at the very end (OpenNI2 takes a while) is no place for an exception.
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
     return status
 
 

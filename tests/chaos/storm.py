@@ -14,7 +14,7 @@ from tests.chaos.scene import Scene
 
 __all__ = ["Storm", "random_actions"]
 
-_MEAN_PAUSE_S = 0.25
+_MEAN_PAUSE_S = 0.4
 _LONGEST_STOP_S = 1.5
 """Beyond the liveness of `tests.chaos.cluster.PACE`."""
 _DISK = ("written", "synced", "renamed")

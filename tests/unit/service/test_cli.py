@@ -1,6 +1,7 @@
 """The command line, without a service."""
 
 import os
+import signal
 import subprocess
 import sys
 
@@ -137,3 +138,14 @@ def test_a_reader_that_leaves_is_no_error():
         stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writing)
     assert (done.returncode, done.stderr) == (141, "")
+
+
+def test_a_sigterm_while_the_interpreter_ends_leaves_no_traceback():
+    code = ("import atexit, os, signal, sys\nfrom service.cli import main\n"
+            "atexit.register(os.kill, os.getpid(), signal.SIGTERM)\n"
+            "sys.exit(main(['status', '--address', 'ipc:///tmp/none', '--wait', '0.01']))\n")
+    ended = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False,
+        env=os.environ | {"PYTHONPATH": ":".join(sys.path)})
+    assert ended.returncode == -signal.SIGTERM
+    assert "Traceback" not in ended.stderr
