@@ -103,7 +103,6 @@ class Presser(_Person):
                 self.answers[capture_id] = self._press(client, capture_id)
                 if self.answers[capture_id] is Answer.ACCEPTED:
                     self._open.add(capture_id)
-                    self._wait()
                 else:
                     self._leave.wait(_PAUSE_S)
 
@@ -117,6 +116,7 @@ class Presser(_Person):
     def _ids(self) -> Iterator[str]:
         number = 0
         while self.accepted < self._wanted and not self._leave.is_set():
+            self._wait()
             number += 1
             yield f"{self._name}-{number}"
 
