@@ -83,7 +83,7 @@ def test_whoever_hangs_is_given_up_and_may_come_back_late(scene):
     running.settle()  # by the other worker
     (late,) = [one for one in running.cluster.workers if is_stopped(one)]
     late.send(signal.SIGCONT)
-    until(lambda: "answer dropped" in running.cluster.hub.log.read_text(), "the late result")
+    until(lambda: "not asked for" in running.cluster.hub.log.read_text(), "the late result")
     for name in ("hub.frame.renamed", "hub.face.synced"):
         fail_at(running, name)
         until(lambda: is_stopped(running.cluster.hub), "stop of the hub")
