@@ -1,0 +1,149 @@
+"""What the service adds to the bare function: overhead, throughput, latency, idle cost."""
+
+import argparse
+import logging
+import statistics
+import sys
+import tempfile
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import cv2
+import numpy as np
+import structlog
+
+from bench.accuracy import RECORDINGS
+from bench.machine import describe
+from bench.service_processes import Bare, Running, running
+from bench.service_steps import Laps, one_capture_each
+from capture import open_source
+from recon import warm
+
+__all__: list[str] = []
+
+_STEPS = ("decode", "checksum", "write", "write and sync", "encode")
+_MB = 2**20
+
+
+def _overhead(source: Path, folder: Path, runs: int) -> Laps:
+    with open_source(str(source)) as frames:
+        frame = next(iter(frames))
+    return one_capture_each(folder, frame, runs)
+
+
+def _print_overhead(laps: Laps, source: Path, runs: int) -> None:
+    medians = {name: statistics.median(taken) for name, taken in laps.ms.items()}
+    bare = medians["reconstruct"]
+    print(f"\nThe hub's process without its sockets ({source.stem}, frame of "
+          f"{laps.frame_bytes / 1e6:.1f} MB, face of {laps.points:,} points and "
+          f"{laps.face_bytes / 1e6:.1f} MB), {runs} captures, each step by turns with the bare "
+          "function, medians:\n")
+    print("| | ms | share of `reconstruct` |\n| --- | --- | --- |")
+    hub = ("accept to dispatch", "result to publication")
+    rows = {"`reconstruct`": bare, **{name: medians[name] for name in hub},
+            "both": sum(medians[name] for name in hub),
+            "sensor: encode the frame": medians["sensor: encode frame"],
+            "worker: decode the job, encode the result":
+                medians["worker: decode job"] + medians["worker: encode result"]}
+    for name, ms in rows.items():
+        print(f"| {name} | {ms:.1f} | {100 * ms / bare:.0f} % |")
+    print("\nOf that, on the same bytes alone:\n")
+    print(f"| | {' | '.join(_STEPS)} |\n|{' --- |' * (1 + len(_STEPS))}")
+    for what in ("frame", "face"):
+        print(f"| {what}, ms | "
+              + " | ".join(f"{medians[f'{what}: {step}']:.1f}" for step in _STEPS) + " |")
+
+
+def _print_throughput(rates: dict[str, list[float]], rounds: int, count: int) -> None:
+    print(f"\nThroughput, {rounds} rounds of {count} captures by turns, medians. A round of the "
+          "service lasts from the first press to the last publication, the next press as soon as "
+          "the last is accepted:\n")
+    print("| | captures / s | of the bare function |\n| --- | --- | --- |")
+    for workers in (1, 2):
+        name, bare = (f"{what}, {workers}" for what in ("service", "bare"))
+        ratios = [ours / theirs for ours, theirs in zip(rates[name], rates[bare], strict=True)]
+        print(f"| `reconstruct` in a loop, {workers} process{'es' * (workers > 1)} "
+              f"| {statistics.median(rates[bare]):.1f} | |")
+        print(f"| service, {workers} worker{'s' * (workers > 1)} "
+              f"| {statistics.median(rates[name]):.1f} | {100 * statistics.median(ratios):.0f} % "
+              f"({100 * min(ratios):.0f} to {100 * max(ratios):.0f}; goal 90) |")
+
+
+def _latency(service: Running, presses: int) -> tuple[list[float], list[float]]:
+    """Milliseconds from each press to its acknowledgement, and to the face at a subscriber."""
+    accepted, published = [], []
+    faces = service.client.published(after=service.client.status().sequence, timeout=60)
+    for _ in range(presses):
+        start = time.perf_counter()
+        service.client.press()
+        accepted.append((time.perf_counter() - start) * 1e3)
+        next(faces)
+        published.append((time.perf_counter() - start) * 1e3)
+    return accepted, published
+
+
+def _idle(service: Running, seconds: float) -> list[tuple[str, float, float]]:
+    """Name, share of a core in % and memory (USS) in MiB of each process while nobody presses."""
+    family = service.family()
+    before = [sum(one.cpu_times()[:2]) for one in family]
+    time.sleep(seconds)
+    return [(one.cmdline()[4] if "-P" in one.cmdline() else "up",
+             100 * (sum(one.cpu_times()[:2]) - was) / seconds, one.memory_full_info().uss / _MB)
+            for one, was in zip(family, before, strict=True)]
+
+
+def main() -> int:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(prog="script/bench service", description=__doc__)
+    parser.add_argument("--source", type=Path, default=RECORDINGS / "frontal_700.oni",
+                        help="recording that is served (frontal_700)")
+    parser.add_argument("--captures", type=int, default=30, help="of one round (30)")
+    parser.add_argument("--rounds", type=int, default=5, help="of throughput (5)")
+    parser.add_argument("--presses", type=int, default=200, help="for the latency (200)")
+    parser.add_argument("--idle", type=float, default=20.0, help="seconds (20)")
+    args = parser.parse_args()
+    if min(args.captures, args.rounds, args.presses) < 1 or args.idle < 1:
+        parser.error("--captures, --rounds, --presses and --idle must be at least 1")
+    structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(logging.ERROR))
+    cv2.setNumThreads(1)
+    print(describe("script/bench service " + " ".join(sys.argv[1:])), flush=True)
+    warm()
+    rates: dict[str, list[float]] = {}
+    accepted: list[float] = []
+    published: list[float] = []
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="df-")))
+        _print_overhead(_overhead(args.source, folder, args.captures), args.source, args.captures)
+        services = {count: stack.enter_context(running(args.source, count)) for count in (1, 2)}
+        bare = {count: Bare(args.source, count) for count in (1, 2)}
+        for each in bare.values():
+            stack.callback(each.close)
+        for service in services.values():
+            service.throughput(2)  # both workers have seen a frame
+        for turn in range(args.rounds):
+            for name, sides in (("bare", bare), ("service", services)):
+                for count, side in sides.items():
+                    rates.setdefault(f"{name}, {count}", []).append(
+                        args.captures / side.throughput(args.captures))
+            some = args.presses * (turn + 1) // args.rounds - args.presses * turn // args.rounds
+            for into, found in zip((accepted, published), _latency(services[1], some),
+                                   strict=True):
+                into += found
+        _print_throughput(rates, args.rounds, args.captures)
+        print(f"\nFrom a press, {args.presses} of them between those rounds, 1 worker:\n")
+        print("| until | p50, ms | p99, ms |\n| --- | --- | --- |")
+        for what, taken in (("it is accepted", accepted),
+                            ("a subscriber has the face", published)):
+            print(f"| {what} | {np.percentile(taken, 50):.0f} | {np.percentile(taken, 99):.0f} |")
+        idle = _idle(services[2], args.idle)
+        print(f"\nIdle, over {args.idle:g} s:\n\n| process | processor, % of a core "
+              "| own memory, MiB |\n| --- | --- | --- |")
+        for name, cpu, memory in [*idle, ("all", *map(sum, zip(*[one[1:] for one in idle],
+                                                               strict=True)))]:
+            print(f"| {name} | {cpu:.2f} | {memory:.0f} |")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
