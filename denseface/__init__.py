@@ -9,17 +9,19 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from capture import RgbdFrame, open_source
     from recon import Face, Settings, reconstruct
+    from service.aio import AsyncClient
     from service.client import Client
     from service.export import load_face, save_face
 
     __version__: str
 
 __all__ = [
-    "Client", "Face", "RgbdFrame", "Settings", "__version__", "load_face", "open_source",
-    "reconstruct", "save_face",
+    "AsyncClient", "Client", "Face", "RgbdFrame", "Settings", "__version__", "load_face",
+    "open_source", "reconstruct", "save_face",
 ]
 
 _HOMES = {
+    "AsyncClient": "service.aio",
     "Client": "service.client",
     "Face": "recon",
     "RgbdFrame": "capture",

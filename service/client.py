@@ -4,47 +4,42 @@ Every call has a time-out. Requests are repeated until answered, so a hub that r
 is not noticed; repeating is safe, for an id is one capture however often it is pressed.
 """
 
-import itertools
 import math
 import os
 import time
-import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import closing
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeVar
 
 import zmq
-from pydantic import ValidationError
 
 from recon.face import Face
 from service import messages
 from service.addresses import publications_of
 from service.credentials import Credentials, connect
-from service.errors import (
-    ClientTimeoutError,
-    LocalProtocolError,
-    PressRefusedError,
-    ProtocolError,
-    RemoteProtocolError,
-    RequestFailedError,
-    UnknownCaptureError,
-)
+from service.ears import LOOK_S, Ear
+from service.errors import ClientClosedError, ClientTimeoutError, ProtocolError
+from service.following import TOPICS, Follower
 from service.messages import Status
-from service.published import Published, PublishedFace, PublishedFailure, Subscriber, outcome_of
+from service.outputs import Topic
+from service.published import (
+    Published,
+    PublishedFace,
+    PublishedFailure,
+    PublishedPreview,
+    preview_of,
+)
 from service.settings import ServiceSettings
 from service.sockets import send_parts
+from service.talks import UNCONNECTED_S, Ask, Step, Talk, Talks, checked, deadline, no_answer
 from service.wire import Packet, decode_from_hub, encode
 
-__all__ = ["Client", "Published", "PublishedFace", "PublishedFailure", "expect"]
+__all__ = ["Client", "Published", "PublishedFace", "PublishedFailure", "PublishedPreview"]
 
 _T = TypeVar("_T")
-
-_UNCONNECTED_S = 0.05
-"""Time between two tries to send while there is no connection, seconds."""
-_LONGEST_WAIT_S = 20.0
-"""Longest time for which the hub is asked to hold an answer back, seconds."""
 
 
 class Client:
@@ -72,7 +67,7 @@ class Client:
         self._resend_s = settings.resend_s
         self._publications = publications_of(self.address)
         self._keys = Credentials.of(settings)
-        self._requests = itertools.count(1)
+        self._talks = Talks(settings.resend_s)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._socket, self._knock = connect(
             self._context, zmq.DEALER, self.address, self._keys)
@@ -108,17 +103,7 @@ class Client:
         LocalProtocolError
             The id is malformed.
         """
-        chosen = capture_id or uuid.uuid4().hex
-        try:
-            message = messages.Press(request=next(self._requests), capture_id=chosen)
-        except ValidationError as error:
-            raise LocalProtocolError(
-                f"capture id {chosen!r}: expected letters, digits, - and _, at most 64") from error
-        answer = self._ask(message, timeout).message
-        if isinstance(answer, messages.PressRefused):
-            raise PressRefusedError(f"press refused: {answer.message}")
-        expect(answer, messages.PressAccepted)
-        return chosen
+        return self._carry_out(self._talks.press(capture_id, timeout))
 
     def get(self, capture_id: str, *, timeout: float = 60.0) -> Face:
         """Wait for a capture's face.
@@ -132,24 +117,7 @@ class Client:
         ClientTimeoutError
             It is not finished in `timeout` seconds.
         """
-        deadline = time.monotonic() + timeout
-        while True:
-            left = deadline - time.monotonic()
-            answer = self._ask(messages.GetFace(
-                request=next(self._requests), capture_id=capture_id,
-                wait_s=min(max(left, 0.0), _LONGEST_WAIT_S)), left + self._resend_s)
-            match answer.message:
-                case messages.CaptureUnknown():
-                    raise UnknownCaptureError(f"capture {capture_id}: the hub has no such capture")
-                case messages.CapturePending():
-                    if time.monotonic() >= deadline:
-                        raise ClientTimeoutError(
-                            f"capture {capture_id}: accepted, no face within {timeout:g} s")
-                case _:
-                    outcome = outcome_of(answer)
-                    if isinstance(outcome, PublishedFailure):
-                        raise outcome.error
-                    return outcome.face
+        return self._carry_out(self._talks.get(capture_id, timeout))
 
     def faces(
         self, *, after: int | None = None, last: int | None = None, since: datetime | None = None,
@@ -184,12 +152,35 @@ class Client:
         LocalProtocolError
             More than one start is given, `last` is not positive or `since` has no zone.
         """
-        find = self._finder(after, last, since)
-        socket, knock = connect(self._context, zmq.SUB, self._publications, self._keys)
-        with Subscriber(socket, knock, self._ask_next, self.status) as follow:
-            follow.start(after, timeout, find)
+        follow = Follower(self._talks, after, last, since)
+        with closing(Ear(self._context, self._publications, self._keys, TOPICS)) as ear:
+            self._carry_out(follow.start(timeout), ear)
             while True:
-                yield follow.next(timeout)
+                yield self._carry_out(follow.next(timeout), ear)
+
+    def previews(self, *, timeout: float | None = None) -> Iterator[PublishedPreview]:
+        """Follow what the sensor sees, ten times a second at most: always the newest.
+
+        Nothing is kept of them: what does not come in time is skipped. A live sensor shows its
+        newest picture, a recording the one that the next press gives.
+
+        Parameters
+        ----------
+        timeout : longest wait for the next one, seconds; where None, for ever
+
+        Raises
+        ------
+        ClientTimeoutError
+            Nothing came in `timeout` seconds.
+        """
+        with closing(Ear(self._context, self._publications, self._keys, (Topic.PREVIEW,))) as ear:
+            while True:
+                until = deadline(timeout)
+                preview = None
+                while preview is None:
+                    self._wait(ear, until - time.monotonic())
+                    preview = preview_of(ear.newest())
+                yield preview
 
     def status(self, *, timeout: float = 5.0) -> Status:
         """Ask who is there and what was done.
@@ -199,44 +190,52 @@ class Client:
         ClientTimeoutError
             The hub did not answer.
         """
-        answer = self._ask(messages.GetStatus(request=next(self._requests)), timeout).message
-        return expect(answer, Status)
+        return self._carry_out(self._talks.status(timeout))
 
-    def _finder(
-        self, after: int | None, last: int | None, since: datetime | None
-    ) -> Callable[[float], messages.StartAt] | None:
-        if (after is not None) + (last is not None) + (since is not None) > 1:
-            raise LocalProtocolError("expected at most one of after, last and since")
-        if last is None and since is None:
-            return None
+    def _carry_out(self, talk: Talk[_T], ear: Ear | None = None) -> _T:
         try:
-            message = messages.FindStart(request=next(self._requests), last=last, since=since)
-        except ValidationError as error:
-            raise LocalProtocolError(
-                f"expected a positive last, found {last}, or a since with a zone, found {since}"
-            ) from error
-        return lambda timeout: expect(self._ask(message, timeout).message, messages.StartAt)
+            step = next(talk)
+            while True:
+                try:
+                    came = self._do(step, ear)
+                except ClientTimeoutError as error:
+                    step = talk.throw(error)
+                else:
+                    step = talk.send(came)
+        except StopIteration as end:
+            result: _T = end.value
+            return result
 
-    def _ask_next(self, after: int, timeout: float) -> Packet:
-        return self._ask(messages.GetNext(request=next(self._requests), after=after), timeout)
+    def _do(self, step: Step, ear: Ear | None) -> Packet | None:
+        if isinstance(step, Ask):
+            return self._ask(step.message, step.timeout)
+        if ear is None:
+            raise TypeError("there is no subscription to hear")
+        self._wait(ear, step.timeout)
+        return ear.receive()
+
+    @staticmethod
+    def _wait(ear: Ear, timeout: float) -> None:
+        until = time.monotonic() + timeout
+        while not ear.socket.poll(max(0, math.ceil(min(until - time.monotonic(), LOOK_S) * 1000))):
+            ear.knock.check()
+            if time.monotonic() >= until:
+                raise ClientTimeoutError("nothing was published in the time allowed")
 
     def _ask(self, message: messages.Request, timeout: float) -> Packet:
         """Send until answered."""
+        if self._context.closed:
+            raise ClientClosedError(f"{self.address}: the client was closed")
         parts = encode(Packet(message))
-        deadline = time.monotonic() + timeout
-        while (left := deadline - time.monotonic()) > 0:
+        until = time.monotonic() + timeout
+        while (left := until - time.monotonic()) > 0:
             self._knock.check()
-            wait = self._resend_s if send_parts(self._socket, parts) else _UNCONNECTED_S
+            wait = self._resend_s if send_parts(self._socket, parts) else UNCONNECTED_S
             answer = self._answer(message.request, min(left, wait))
             if answer is None:
                 continue
-            if isinstance(answer.message, messages.RequestFailed):
-                raise RequestFailedError(f"{self.address}: {answer.message.message}")
-            return answer
-        why = ("is it running, or was this key revoked?" if self._keys
-               else "is `denseface up` running?")
-        raise ClientTimeoutError(
-            f"{self.address}: no answer from the hub within {timeout:g} s, {why}")
+            return checked(self.address, answer)
+        raise no_answer(self.address, timeout, keys=self._keys is not None)
 
     def _answer(self, request: int, wait: float) -> Packet | None:
         until = time.monotonic() + wait
@@ -251,10 +250,3 @@ class Client:
             if getattr(packet.message, "request", None) == request:
                 return packet
 
-
-def expect(answer: object, kind: type[_T]) -> _T:
-    """Give an answer that is of the kind expected; else RemoteProtocolError."""
-    if not isinstance(answer, kind):
-        raise RemoteProtocolError(
-            f"the hub answered with {type(answer).__name__}, {kind.__name__} expected")
-    return answer

@@ -7,6 +7,7 @@ __all__ = [
     "AddressError",
     "AuthenticatorStoppedError",
     "CaptureFailedError",
+    "ClientClosedError",
     "ClientTimeoutError",
     "CorruptFileError",
     "DamagedDatabaseError",
@@ -54,12 +55,25 @@ class RemoteProtocolError(ProtocolError):
         self.reason = reason
 
 
+class ClientClosedError(ServiceError, RuntimeError):
+    """A call on a client that was closed."""
+
+
 class ClientTimeoutError(ServiceError, TimeoutError):
     """The hub did not answer, or the face was not ready, in the time allowed."""
 
 
 class PressRefusedError(ServiceError, RuntimeError):
-    """The press led to no capture: no sensor, no frame in time, no room on the disk."""
+    """The press led to no capture: no sensor, no frame in time, no room on the disk.
+
+    Attributes
+    ----------
+    reason : `no_sensor`, `sensor`, `sensor_gone`, `timeout`, `queue`, `disk` or `purged`
+    """
+
+    def __init__(self, message: str, reason: str) -> None:
+        super().__init__(message)
+        self.reason = reason
 
 
 class CaptureFailedError(ServiceError, RuntimeError):

@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from datetime import datetime
 
 from service import messages
-from service.client import Client, expect
+from service.client import Client
 from service.errors import RemoteProtocolError, UnknownCaptureError
+from service.talks import expect
 
 __all__ = ["Operator"]
 
@@ -87,4 +88,4 @@ class Operator(Client):
         return answer
 
     def _request(self) -> int:
-        return next(self._requests)
+        return self._talks.number()

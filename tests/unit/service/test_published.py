@@ -1,31 +1,25 @@
-"""Following publications with gaps, repeats and restarts."""
+"""Following publications with gaps, repeats and restarts: without a socket."""
+
+from collections import deque
 
 import pytest
-import zmq
 
 from service import messages
-from service.credentials import connect
-from service.errors import ClientTimeoutError
-from service.outputs import Topic
-from service.published import Subscriber
-from service.wire import Packet, encode
+from service.errors import ClientTimeoutError, LocalProtocolError
+from service.following import Follower
+from service.talks import Ask, Hear, Talks
+from service.wire import Packet
 
 
 class FakeHub:
     """Publishes what it is told to; gives on request all that happened."""
 
-    def __init__(self, context, address):
-        self.socket = context.socket(zmq.XPUB)
-        self.socket.set(zmq.LINGER, 0)
-        self.socket.bind(address)
+    def __init__(self):
         self.epoch = "a"
         self.outcomes = []
+        self.published = deque()
         self.asked = []
-
-    def subscribed(self):
-        for _ in (Topic.FACES, Topic.STATUS):
-            assert self.socket.poll(5000)
-            self.socket.recv_multipart()
+        self.away = 0
 
     def conclude(self, *, published=True):
         sequence = len(self.outcomes) + 1
@@ -34,52 +28,81 @@ class FakeHub:
             message="m", dead=False)
         self.outcomes.append(message)
         if published:
-            self.publish(Topic.FACES, message)
+            self.publish(message)
 
-    def publish(self, topic, message):
-        self.socket.send_multipart([topic.encode(), *encode(Packet(message))])
+    def publish(self, message):
+        self.published.append(Packet(message))
 
-    def status(self, *, timeout=5.0):  # noqa: ARG002
+    def status(self):
         return messages.Status(
             epoch=self.epoch, sequence=len(self.outcomes), hub_version="0", sensors=(),
             workers=(), pressed=0, queued=0, working=0, done=0, failed=0, dead=0)
 
-    def next(self, after, timeout):  # noqa: ARG002
+    def next(self, after):
         self.asked.append(after)
         if after < len(self.outcomes):
-            return Packet(self.outcomes[after])
-        return Packet(messages.NothingNewer(epoch=self.epoch, sequence=len(self.outcomes)))
+            return self.outcomes[after]
+        return messages.NothingNewer(epoch=self.epoch, sequence=len(self.outcomes))
+
+    def do(self, step):
+        match step:
+            case Hear():
+                if not self.published:
+                    raise ClientTimeoutError("silence")
+                return self.published.popleft()
+            case Ask() if self.away:
+                self.away -= 1
+                raise ClientTimeoutError("away")
+            case Ask(message=messages.GetStatus()):
+                return Packet(self.status())
+            case Ask(message=messages.GetNext(after=after)):
+                return Packet(self.next(after))
+            case Ask(message=messages.FindStart(last=last)):
+                return Packet(messages.StartAt(
+                    epoch=self.epoch, sequence=len(self.outcomes) - last))
+
+    def carry_out(self, talk):
+        try:
+            step = next(talk)
+            while True:
+                try:
+                    came = self.do(step)
+                except ClientTimeoutError as error:
+                    step = talk.throw(error)
+                else:
+                    step = talk.send(came)
+        except StopIteration as end:
+            return end.value
 
 
 @pytest.fixture
 def hub():
-    context = zmq.Context()
-    hub = FakeHub(context, "inproc://published")
-    yield hub
-    hub.socket.close()
-    context.term()
+    return FakeHub()
+
+
+def following(hub, **start):
+    follow = Follower(Talks(2.0), **start)
+    hub.carry_out(follow.start(60))
+    return follow
 
 
 @pytest.fixture
 def follow(hub):
-    socket, knock = connect(hub.socket.context, zmq.SUB, "inproc://published", None)
-    with Subscriber(socket, knock, hub.next, hub.status) as follow:
-        hub.subscribed()
-        follow.start(None, 5)
-        with pytest.raises(ClientTimeoutError):
-            follow.next(0.01)
-        hub.asked.clear()
-        yield follow
+    follow = following(hub)
+    with pytest.raises(ClientTimeoutError):
+        hub.carry_out(follow.next(60))
+    hub.asked.clear()
+    return follow
 
 
-def ids(follow, count):
-    return [follow.next(5).capture_id for _ in range(count)]
+def ids(hub, follow, count):
+    return [hub.carry_out(follow.next(60)).capture_id for _ in range(count)]
 
 
 def test_what_is_published_is_not_asked_for(hub, follow):
     hub.conclude()
     hub.conclude()
-    assert ids(follow, 2) == ["a1", "a2"]
+    assert ids(hub, follow, 2) == ["a1", "a2"]
     assert hub.asked == []
 
 
@@ -88,78 +111,77 @@ def test_a_gap_is_filled(hub, follow):
     hub.conclude(published=False)
     hub.conclude()
     hub.conclude()
-    assert ids(follow, 4) == ["a1", "a2", "a3", "a4"]
+    assert ids(hub, follow, 4) == ["a1", "a2", "a3", "a4"]
 
 
 def test_a_repeated_publication_is_seen_once(hub, follow):
     hub.conclude()
-    hub.publish(Topic.FACES, hub.outcomes[0])
+    hub.publish(hub.outcomes[0])
     hub.conclude()
-    assert ids(follow, 2) == ["a1", "a2"]
+    assert ids(hub, follow, 2) == ["a1", "a2"]
 
 
 def test_the_last_one_missed_is_known_from_the_status(hub, follow):
     hub.conclude(published=False)
-    hub.publish(Topic.STATUS, hub.status())
-    assert ids(follow, 1) == ["a1"]
+    hub.publish(hub.status())
+    assert ids(hub, follow, 1) == ["a1"]
 
 
 def test_another_store_starts_over(hub, follow):
     hub.conclude()
-    assert ids(follow, 1) == ["a1"]
+    assert ids(hub, follow, 1) == ["a1"]
     hub.epoch, hub.outcomes = "b", []
     hub.conclude(published=False)
     hub.conclude()
-    assert ids(follow, 2) == ["b1", "b2"]
+    assert ids(hub, follow, 2) == ["b1", "b2"]
 
 
 def test_garbage_is_taken_for_something_missed(hub, follow):
     hub.conclude(published=False)
-    hub.socket.send_multipart([b"faces", b"garbage"])
-    assert ids(follow, 1) == ["a1"]
+    hub.published.append(None)
+    assert ids(hub, follow, 1) == ["a1"]
 
 
 def test_a_start_in_the_past_gives_all_since(hub):
     for _ in range(3):
         hub.conclude(published=False)
-    socket, knock = connect(hub.socket.context, zmq.SUB, "inproc://published", None)
-    with Subscriber(socket, knock, hub.next, hub.status) as follow:
-        hub.subscribed()
-        follow.start(1, 5)
-        assert ids(follow, 2) == ["a2", "a3"]
+    assert ids(hub, following(hub, after=1), 2) == ["a2", "a3"]
 
 
-def test_numbers_that_were_removed_are_not_waited_for(hub, follow):
+def test_numbers_that_were_removed_are_not_waited_for(hub, follow, monkeypatch):
     for _ in range(3):
         hub.conclude(published=False)
-    follow._ask_next = lambda after, _: hub.asked.append(after) or Packet(
-        messages.NothingNewer(epoch=hub.epoch, sequence=3))
-    hub.publish(Topic.STATUS, hub.status())
-    hub.publish(Topic.STATUS, hub.status())
+    monkeypatch.setattr(hub, "next", lambda after: hub.asked.append(after) or
+                        messages.NothingNewer(epoch=hub.epoch, sequence=3))
+    hub.publish(hub.status())
+    hub.publish(hub.status())
     hub.conclude()
-    assert ids(follow, 1) == ["a4"]
+    assert ids(hub, follow, 1) == ["a4"]
     assert hub.asked == [0]
 
+
 def test_a_start_is_asked_for(hub):
-    hub.conclude(published=False)
-    hub.conclude(published=False)
-    socket, knock = connect(hub.socket.context, zmq.SUB, "inproc://published", None)
-    with Subscriber(socket, knock, hub.next, hub.status) as follow:
-        hub.subscribed()
-        follow.start(None, 5, lambda _: messages.StartAt(epoch=hub.epoch, sequence=1))
-        assert ids(follow, 1) == ["a2"]
+    for _ in range(2):
+        hub.conclude(published=False)
+    assert ids(hub, following(hub, last=1), 1) == ["a2"]
 
 
 def test_a_hub_that_is_away_is_waited_for(hub, follow):
-    answers = iter([ClientTimeoutError("away"), ClientTimeoutError("away")])
-    real = hub.next
-
-    def flaky(after, timeout):
-        for error in answers:
-            raise error
-        return real(after, timeout)
-
-    follow._ask_next = flaky
+    hub.away = 2
     hub.conclude(published=False)
-    hub.publish(Topic.STATUS, hub.status())
-    assert ids(follow, 1) == ["a1"]
+    hub.publish(hub.status())
+    assert ids(hub, follow, 1) == ["a1"]
+
+
+def test_but_no_longer_than_allowed(hub, follow):
+    hub.away = 10**9
+    hub.conclude(published=False)
+    hub.publish(hub.status())
+    with pytest.raises(ClientTimeoutError, match="away"):
+        hub.carry_out(follow.next(0.0))
+
+
+@pytest.mark.parametrize("start", [{"after": 1, "last": 1}, {"last": 0}])
+def test_impossible_starts_are_refused(start):
+    with pytest.raises(LocalProtocolError):
+        Follower(Talks(2.0), **start)

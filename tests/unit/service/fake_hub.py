@@ -1,0 +1,134 @@
+"""A hub in a thread, with real sockets, for the clients: answers as it is told."""
+
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import zmq
+
+from service import messages
+from service.addresses import publications_of
+from service.outputs import Topic
+from service.payload import FaceHeader, PreviewHeader
+from service.wire import Packet, decode_to_hub, encode
+from tests.unit.service.faces import small_face
+
+
+class FakeHub:
+    """Keeps outcomes, publishes them where it is told to; silent towards what `deaf` names."""
+
+    def __init__(self, address: str) -> None:
+        self.address = address
+        self.outcomes: list[Packet] = []
+        self.deaf: set[str] = set()
+        self.refuse: str | None = None
+        self.heard: list[str] = []
+        self.subscriptions: list[bytes] = []
+        self._context = zmq.Context()
+        self._router = self._context.socket(zmq.ROUTER)
+        self._publisher = self._context.socket(zmq.XPUB)
+        self._publisher.set(zmq.XPUB_VERBOSER, 1)
+        self._router.bind(address)
+        self._publisher.bind(publications_of(address))
+        self._calls: list[Callable[[], None]] = []
+        self._stop = False
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._stop = True
+        self._thread.join()
+        self._context.destroy(linger=0)
+
+    def wait(self, true: Callable[[], bool]) -> None:
+        with self._changed:
+            assert self._changed.wait_for(true, 20), (self.heard, self.subscriptions)
+
+    def subscribers(self, topic: Topic) -> int:
+        name = topic.encode()
+        return self.subscriptions.count(b"\1" + name) - self.subscriptions.count(b"\0" + name)
+
+    def conclude(self, capture_id: str, *, published: bool = True) -> None:
+        header, arrays = FaceHeader.of(small_face())
+        packet = Packet(messages.FaceDone(
+            epoch="0f", sequence=len(self.outcomes) + 1, capture_id=capture_id, face=header),
+            arrays)
+        self.outcomes.append(packet)
+        if published:
+            self.publish(Topic.FACES, packet)
+
+    def preview(self, sequence: int) -> None:
+        self.publish(Topic.PREVIEW, Packet(messages.Preview(
+            epoch="0f", sequence=sequence,
+            preview=PreviewHeader(width=2, height=1, timestamp_us=sequence)),
+            {"image": np.full((1, 2, 3), sequence, np.uint8)}))
+
+    def publish(self, topic: Topic, packet: Packet) -> None:
+        self._calls.append(
+            lambda: self._publisher.send_multipart([topic.encode(), *encode(packet)]))
+
+    def garble(self, topic: Topic) -> None:
+        self._calls.append(lambda: self._publisher.send_multipart([topic.encode(), b"?"]))
+
+    def _serve(self) -> None:
+        poller = zmq.Poller()
+        poller.register(self._router, zmq.POLLIN)
+        poller.register(self._publisher, zmq.POLLIN)
+        while not self._stop:
+            ready = dict(poller.poll(5))
+            with self._changed:
+                while self._calls:
+                    self._calls.pop(0)()
+                if self._publisher in ready:
+                    self.subscriptions.append(self._publisher.recv())
+                if self._router in ready:
+                    peer, *parts = self._router.recv_multipart()
+                    message = decode_to_hub(parts).message
+                    self.heard.append(message.kind)
+                    if message.kind not in self.deaf:
+                        for answer in self._answers(message):
+                            self._router.send_multipart([peer, *encode(answer)])
+                self._changed.notify_all()
+
+    def _answers(self, message: messages.Message) -> Iterator[Packet]:
+        request = getattr(message, "request", 0)
+        match message:
+            case messages.Press(capture_id=capture_id):
+                if self.refuse:
+                    yield Packet(messages.PressRefused(
+                        request=request, capture_id=capture_id, reason="disk",
+                        message=self.refuse))
+                else:
+                    yield Packet(messages.PressAccepted(request=request, capture_id=capture_id))
+            case messages.GetStatus():
+                yield Packet(messages.Status(
+                    request=request, epoch="0f", sequence=len(self.outcomes), hub_version="0",
+                    sensors=("s",), workers=(), pressed=0, queued=0, working=0, done=0, failed=0,
+                    dead=0))
+            case messages.GetFace(capture_id=capture_id):
+                found = [one for one in self.outcomes if one.message.capture_id == capture_id]
+                yield _again(found[0], request) if found else Packet(messages.CaptureUnknown(
+                    request=request, capture_id=capture_id))
+            case messages.GetNext(after=after):
+                if after < len(self.outcomes):
+                    yield _again(self.outcomes[after], request)
+                else:
+                    yield Packet(messages.NothingNewer(
+                        request=request, epoch="0f", sequence=len(self.outcomes)))
+
+
+def _again(packet: Packet, request: int) -> Packet:
+    return Packet(packet.message.model_copy(update={"request": request}), packet.arrays)
+
+
+@contextmanager
+def fake_hub() -> Iterator[FakeHub]:
+    with tempfile.TemporaryDirectory(prefix="df-") as folder:
+        hub = FakeHub(f"ipc://{folder}/hub")
+        try:
+            yield hub
+        finally:
+            hub.close()
