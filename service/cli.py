@@ -40,7 +40,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if args.debug:
             raise
         line = " ".join(str(error).split()) or type(error).__name__
-        print(f"denseface {args.command}: {line}", file=sys.stderr)
+        if getattr(args, "log", "text") == "json":
+            import structlog
+
+            structlog.get_logger(args.command).critical("ended", reason=line)
+        else:
+            print(f"denseface {args.command}: {line}", file=sys.stderr)
         return _status_of(error)
     finally:
         # What libraries do at the very end (OpenNI2 takes a while) is no place for an exception.

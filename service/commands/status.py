@@ -1,10 +1,15 @@
 """`denseface status`."""
 
 import argparse
+import json
 import time
+from typing import TYPE_CHECKING
 
 from service.commands import options
 from service.commands.press import seconds
+
+if TYPE_CHECKING:
+    from service.messages import Status
 
 __all__ = ["add_arguments", "run"]
 
@@ -16,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """State the flags."""
     options.add_address(parser)
     options.add_credentials(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--wait", type=seconds, metavar="SECONDS",
                         help="wait until hub, a sensor and a worker are ready; fail where they "
                              "are not in this time")
@@ -35,16 +41,33 @@ def run(args: argparse.Namespace) -> int:
                 raise ClientTimeoutError(f"{missing} is ready after {args.wait:g} s")
             time.sleep(min(_POLL_S, left))
             status = client.status(timeout=_TIMEOUT_S)
+    if args.json:
+        shown = status.model_dump(mode="json", exclude={"kind", "version", "request"})
+        print(json.dumps({"address": client.address, "ready": status.ready} | shown))
+    else:
+        for name, value in _rows(client.address, status).items():
+            print(f"{name:8} {value}")
+    return 0
+
+
+def _rows(address: str, status: "Status") -> dict[str, str]:
     rows = {
-        "hub": f"{status.hub_version} at {client.address}",
+        "hub": f"{status.hub_version} at {address}",
         "sensors": ", ".join(status.sensors) or "none",
         "workers": ", ".join(status.workers) or "none",
         "now": f"{status.pressed} pressed, {status.queued} queued, {status.working} working",
         "kept": f"{status.done} faces, {status.failed} without a face, {status.dead} given up",
     }
-    if status.refused:
-        rows["refused"] = ", ".join(f"{reason} {count}" for reason, count in
-                                    status.refused.items())
-    for name, value in rows.items():
-        print(f"{name:8} {value}")
-    return 0
+    if status.free_bytes is not None:
+        rows["disk"] = f"{status.free_bytes / 1e9:.1f} GB free"
+        if status.kept_bytes is not None:
+            rows["disk"] += f", {status.kept_bytes / 1e6:.1f} MB kept"
+    if times := status.latencies.get("press_to_published"):
+        rows["time"] = (f"{times.median_s:.2f} s from press to outcome, 99 % within "
+                        f"{times.p99_s:.2f} s (of {times.count} since the start)")
+    for name, counts in (("since", status.since_start), ("presses", status.presses_refused),
+                         ("refused", status.refused)):
+        if counts:
+            what = {"since": "the start: ", "presses": "refused: "}.get(name, "")
+            rows[name] = what + ", ".join(f"{one} {count}" for one, count in counts.items())
+    return rows
