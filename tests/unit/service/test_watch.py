@@ -46,7 +46,7 @@ class WatchedBench(Bench):
 
     def counted(self):
         return {(name, label) if label else name: count
-                for name, label, count in self.figures.counters.items()}
+                for name, label, count in self.figures.counters.items() if name != "refused"}
 
     def times(self):
         return {stage: (one.count, one.total_s)
