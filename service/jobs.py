@@ -169,7 +169,10 @@ class Jobs:
         """Take back what a worker held that was told to stop; as an attempt it does not count."""
         capture_id, worker.job = worker.job, None
         if capture_id and self._state(capture_id) is CaptureState.ACCEPTED:
-            self._store.take_back_attempt(capture_id)
+            try:
+                self._store.take_back_attempt(capture_id)
+            except StoreError as error:
+                self._log.warning("attempt not taken back", reason=str(error))
             self._retry(capture_id, "HandedBack", "the worker that held it was stopped")
 
     def _give(

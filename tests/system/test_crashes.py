@@ -1,6 +1,8 @@
 """Processes are killed, stopped, cut off and lied to; the history of each run is checked."""
 
 import signal
+import subprocess
+import sys
 from contextlib import ExitStack
 
 import psutil
@@ -16,6 +18,7 @@ from tests.chaos.history import Answer, violations
 from tests.chaos.proxy import Proxy
 from tests.chaos.scene import Scene
 from tests.chaos.source import CHEAP, write_small_frame
+from tests.system.running import REPOSITORY
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -191,3 +194,13 @@ def test_a_worker_told_to_stop_hands_back_what_it_cannot_finish(scene):
     assert said.count("attempt=1") == 2
     assert "attempt=2" not in said
     check(running, done=1)
+
+
+def test_a_storm_prints_its_table(tmp_path):
+    ended = subprocess.run(
+        [sys.executable, "-m", "tests.chaos", "--presses", "40", "--seed", "3", "--keep",
+         str(tmp_path)], cwd=REPOSITORY, capture_output=True, text=True, timeout=110, check=False)
+    assert ended.returncode == 0, ended.stderr
+    assert "| presses accepted | 40 |" in ended.stdout
+    assert "| **promises broken** | **0** |" in ended.stdout
+    assert list(tmp_path.iterdir()) == []

@@ -252,6 +252,19 @@ def test_a_worker_that_takes_its_leave_hands_back_its_job_and_no_attempt_is_lost
     assert bench.store.find("a").attempts == 1
 
 
+def test_a_full_disk_does_not_keep_a_job_from_being_handed_back(bench, monkeypatch):
+    def full(*_):
+        raise StoreError("No space left on device")
+
+    bench.accepted("a")
+    bench.worker()
+    with monkeypatch.context() as patch:
+        patch.setattr(bench.store, "take_back_attempt", full)
+        assert bench.say(WORKER, messages.Goodbye()) == []
+    (job,) = bench.worker(OTHER)
+    assert (job[1].kind, job[1].attempt) == ("job", 2)
+
+
 def test_a_repeat_of_a_refused_press_is_refused_though_a_sensor_came_meanwhile(bench):
     (refused,) = bench.press("a", request=7)
     bench.sensor()
