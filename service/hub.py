@@ -121,7 +121,12 @@ class Hub:
         return outputs
 
     def was_away(self, seconds: float) -> None:
-        """Take note that the hub could not listen for a while: stopped, or waiting for its disk."""
+        """Take note of how late a tick is: the hub was stopped, or waited for its disk.
+
+        What was said meanwhile has not been heard yet.
+        """
+        if seconds < self._settings.heartbeat_s:  # no more than liveness allows for
+            return
         self._log.warning("was away", seconds=round(seconds, 1))
         self._roster.forgive(seconds)
 

@@ -28,8 +28,6 @@ from service.wire import Packet, decode_to_hub, encode
 __all__ = ["run"]
 
 _TICK_S = 0.25
-_AWAY_S = 0.25
-"""A tick that is later than this: what was said meanwhile has not been heard yet, seconds."""
 _SENT = {"take": "hub.take.sent", "frame_accepted": "hub.frame.acknowledged",
          "press_accepted": "hub.press.acknowledged", "job": "hub.job.sent"}
 """Failpoints after a kind of message was sent."""
@@ -90,8 +88,7 @@ class _Loop:
         due = time.monotonic()
         while not stop:
             if (now := time.monotonic()) >= due:
-                if now - due > _AWAY_S:
-                    self._hub.was_away(now - due)
+                self._hub.was_away(now - due)
                 subscriptions = self._entrance.subscriptions()
                 watched = subscriptions[Topic.PREVIEW] > 0
                 due = now + (PERIOD_S if watched else _TICK_S)

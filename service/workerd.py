@@ -77,7 +77,7 @@ class _Worker:
     def finish(self) -> None:
         """End the job under way and deliver it; where that takes too long, leave it."""
         deadline = time.monotonic() + _FINISH_S
-        while not self._compute.ends_within(self._settings.heartbeat_s):
+        while not self._compute.ends_within(min(self._settings.heartbeat_s, _FINISH_S)):
             if time.monotonic() >= deadline:
                 self._log.warning("job handed back", capture_id=self._holding(),
                                   seconds=round(self._compute.elapsed_s, 1))
