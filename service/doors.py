@@ -179,25 +179,34 @@ class Door:
         token = peer[:_TOKEN_BYTES]
         return self._guard.keyring.holds(token) if self._guard else token == _LOCAL
 
-    def tick(self) -> None:
+    def cut_revoked(self) -> None:
         """Cut off the keys that are allowed no more, if they subscribed or do not fall silent."""
         if self._revoked > _FLOOD:
             self._cut(self._router)
         self._revoked = 0
         if self._guard and not all(map(self._guard.keyring.holds, self._subscribed)):
             self._cut(self._publisher)
+
+    def bind_again(self) -> None:
+        """Open what was cut."""
         for socket, address in list(self._unbound.items()):
             # Not free before libzmq's own thread has closed it: tried again at the next tick.
             with suppress(zmq.ZMQError):
                 socket.bind(address)
                 del self._unbound[socket]
 
-    def cut_all(self) -> None:
-        """End every connection from another machine; those that may come back will."""
-        if self._guard:
-            for socket in (self._router, self._publisher):
-                self._cut(socket)
-            self.tick()
+    def cut_all(self) -> bool:
+        """End every connection from another machine; those that may come back will.
+
+        False where that was done already and the door is not yet open again.
+        """
+        if self._guard is None or len(self._unbound) == 2:
+            return False
+        for socket in (self._router, self._publisher):
+            self._cut(socket)
+        for monitor in self._monitors:
+            monitor.forget()
+        return True
 
     def _cut(self, socket: "zmq.Socket[bytes]") -> None:
         """End all connections of a socket: one alone cannot be.

@@ -8,6 +8,7 @@ import zmq
 
 from service.access import TOPICS
 from service.addresses import check_bindable, is_local, socket_file
+from service.descriptors import DescriptorWatch
 from service.doors import Door, Guard, Incoming
 from service.errors import AddressError, AuthenticatorStoppedError
 from service.keyring import Allowed, Keyring
@@ -44,6 +45,7 @@ class Entrance:
         self._doors: list[Door] = []
         self._refusals = refusals
         self._memory = MemoryWatch(settings.memory_mb << 20)
+        self._descriptors = DescriptorWatch()
         self._poller = zmq.Poller()
         self._poller.register(wakes, zmq.POLLIN)
         try:
@@ -75,6 +77,7 @@ class Entrance:
             door.close()
         if self._authenticator:
             self._authenticator.close()
+        self._memory.close()
 
     def tick(self) -> bool:
         """Look at the allow-list; True where peers may have been cut off."""
@@ -83,14 +86,22 @@ class Entrance:
         self._keyring.refresh()
         changed = self._keyring.changes != self._changes
         self._changes = self._keyring.changes
-        if used := self._memory.beyond():
-            self._refusals.note("memory", detail=f"{used >> 20} MB in use: all connections are cut")
-            for door in self._doors:
-                door.cut_all()
-            self._memory.trim()
         for door in self._doors:
-            door.tick()
+            door.cut_revoked()
+        if used := self._memory.beyond():
+            self._cut_all("memory", f"{used >> 20} MB in use")
+            self._memory.trim()
+        if used := self._descriptors.beyond():
+            self._cut_all("connections", f"{used} descriptors in use")
+        else:  # libzmq ends the process where it has no descriptor to bind with
+            for door in self._doors:
+                door.bind_again()
         return changed
+
+    def _cut_all(self, reason: str, detail: str) -> None:
+        cut = [door.cut_all() for door in self._doors]
+        if any(cut):
+            self._refusals.note(reason, detail=f"{detail}: all connections from others are cut")
 
     def receive(self, timeout_ms: int) -> Iterator[Incoming]:
         """Wait, then give the messages that have come.

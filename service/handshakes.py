@@ -50,6 +50,11 @@ class Handshakes:
             said = parse_monitor_message(parts)
             self._note(zmq.Event(said["event"]), said["value"])
 
+    def forget(self) -> None:
+        """Take note that all connections were cut, of which libzmq says nothing."""
+        self.read()
+        self._open.clear()
+
     def close(self) -> None:
         """Listen no more."""
         self._listening.disable_monitor()

@@ -30,6 +30,8 @@ from service.wire import Packet
 
 __all__ = ["Hub", "settings_hash"]
 
+_VERSION = version("denseface")
+
 
 def settings_hash(settings: Settings) -> str:
     """Name settings in 16 hexadecimal digits."""
@@ -232,7 +234,7 @@ class Hub:
         counts, counters = self._store.counts(), self._figures.counters
         return messages.Status(
             request=request, epoch=self._store.epoch, sequence=self._store.last_sequence(),
-            hub_version=version("denseface"),
+            hub_version=_VERSION,
             sensors=tuple(sensor.name for sensor in self._roster.sensors.values()),
             workers=tuple(worker.name for worker in self._roster.workers.values()),
             pressed=len(self._intake), queued=self._jobs.queued, working=self._jobs.working,

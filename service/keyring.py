@@ -13,6 +13,7 @@ from pathlib import Path
 import structlog
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from service.descriptors import OUT_OF_DESCRIPTORS
 from service.errors import KeyFileError
 from service.keys import check_key, check_name, fingerprint, read_private_text, write_private
 from service.settings import private_folder
@@ -92,12 +93,15 @@ class Keyring:
         seen = self._look()
         if seen == self._seen:
             return False
-        self._seen = seen
+        before, self._seen = self._seen, seen
         found: dict[str, Allowed] = {}
         for name in sorted(seen):
             try:
                 one = _read(self._folder / name)
             except KeyFileError as error:
+                if _out_of_descriptors(error.__cause__):
+                    self._seen = before
+                    return False
                 self._log.error("key not let in", reason=str(error))
                 continue
             first = found.setdefault(one.public, one)
@@ -121,6 +125,8 @@ class Keyring:
         except FileNotFoundError:
             return {}  # nobody was ever allowed
         except OSError as error:
+            if _out_of_descriptors(error):  # a flood of connections may revoke nobody
+                return self._seen or {}
             self._log.error("allow-list unreadable, nobody is let in", reason=str(error))
             return {}
         return seen
@@ -160,6 +166,10 @@ def revoke(keys: Path, name: str) -> None:
         raise KeyFileError(f"{name}: no key of that name is allowed in {path.parent}") from None
     except OSError as error:
         raise KeyFileError(f"{path}: {error.strerror or error}") from error
+
+
+def _out_of_descriptors(error: BaseException | None) -> bool:
+    return isinstance(error, OSError) and error.errno in OUT_OF_DESCRIPTORS
 
 
 def _read(path: Path) -> Allowed:

@@ -6,12 +6,11 @@ has a key could fill the memory with one that never ends. The only cure is to cu
 
 import ctypes
 import os
-from pathlib import Path
 
 __all__ = ["MemoryWatch"]
 
 _PAGE = os.sysconf("SC_PAGE_SIZE")
-_STATM = Path("/proc/self/statm")
+_STATM = "/proc/self/statm"
 _GROWTH = 1.25
 
 
@@ -19,12 +18,13 @@ class MemoryWatch:
     """Says when the memory in use goes beyond a limit, once for each time that it does."""
 
     def __init__(self, limit: int) -> None:
+        self._statm = os.open(_STATM, os.O_RDONLY)  # kept: one may not be had later
         self._limit = self._ceiling = limit
         self._cut = False
 
     def beyond(self) -> int:
         """Give the bytes in use where they are too many, else 0."""
-        used = int(_STATM.read_text().split()[1]) * _PAGE
+        used = int(os.pread(self._statm, 256, 0).split()[1]) * _PAGE
         if self._cut:
             # What was freed may stay with the process: only what grows from here is new.
             self._cut = False
@@ -35,6 +35,10 @@ class MemoryWatch:
             return 0
         self._cut = True
         return used
+
+    def close(self) -> None:
+        """Watch no more."""
+        os.close(self._statm)
 
     @staticmethod
     def trim() -> None:

@@ -7,7 +7,7 @@ import random
 import re
 import socket
 import threading
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 
 import psutil
 import pytest
@@ -425,6 +425,20 @@ def test_a_slow_drip_is_hung_up_on(hub, refused):
         with drip:
             _read_to_the_end(drip)
     refused("handshake", by=len(drips))
+
+
+def test_more_connections_than_the_hub_may_have_are_cut(tmp_path):
+    """Whoever has no key at all can neither end the hub nor shut its own users out for long."""
+    with guarded_hub(tmp_path) as hub, ExitStack() as flood:
+        psutil.Process(hub.process.pid).rlimit(psutil.RLIMIT_NOFILE, (200, 200))
+        port = int(hub.address.rpartition(":")[2])
+        for _ in range(400):
+            with suppress(OSError):  # while the port is closed
+                drip = flood.enter_context(socket.create_connection(("127.0.0.1", port), 5))
+                drip.sendall(b"\xff")
+        until(lambda: hub.refused("connections") >= 1)
+        press_through(hub, "through")
+        assert hub.process.poll() is None
 
 
 def _read_to_the_end(raw):

@@ -146,6 +146,7 @@ def test_several_addresses_come_with_commas():
 
 def test_memory_that_stays_with_the_process_is_said_once(monkeypatch, tmp_path):
     statm = tmp_path / "statm"
+    statm.touch()
     monkeypatch.setattr("service.memory._STATM", statm)
     monkeypatch.setattr("service.memory._PAGE", 1)
     watch = MemoryWatch(100)
@@ -156,3 +157,4 @@ def test_memory_that_stays_with_the_process_is_said_once(monkeypatch, tmp_path):
 
     assert [beyond(used) for used in (50, 120, 110, 130, 140, 150)] == [0, 120, 0, 0, 140, 0]
     assert [beyond(used) for used in (50, 120)] == [0, 120]
+    watch.close()

@@ -1,5 +1,6 @@
 """Key files and the allow-list."""
 
+import errno
 import json
 import os
 
@@ -126,6 +127,30 @@ def test_a_folder_that_went_lets_nobody_in(keys):
     (keys / "allowed").rename(keys / "gone")
     assert ring.refresh()
     assert not ring.holds(one.token)
+
+
+@pytest.mark.parametrize("where", ["pathlib.Path.iterdir", "service.keyring.read_private_text"])
+def test_a_want_of_descriptors_revokes_nobody(keys, monkeypatch, where):
+    one = allow(keys, "a", KeyPair.made().public, ROLES)
+    ring = Keyring(keys)
+
+    def none_left(*_):
+        error = OSError(errno.EMFILE, "Too many open files")
+        raise (error if "iterdir" in where else KeyFileError("a")) from error
+
+    with monkeypatch.context() as patched:
+        patched.setattr(where, none_left)
+        revoke(keys, "a")
+        other = KeyPair.made().public
+        if "iterdir" not in where:
+            monkeypatch.undo()
+            other = allow(keys, "b", other, ROLES).public
+            patched.setattr(where, none_left)
+        assert not ring.refresh()
+        assert ring.holds(one.token)
+    assert ring.refresh()
+    assert not ring.holds(one.token)
+    assert (ring.get(other) is None) is ("iterdir" in where)
 
 
 def test_the_commands(keys, capsys):
