@@ -430,13 +430,15 @@ def test_a_slow_drip_is_hung_up_on(hub, refused):
 def test_more_connections_than_the_hub_may_have_are_cut(tmp_path):
     """Whoever has no key at all can neither end the hub nor shut its own users out for long."""
     with guarded_hub(tmp_path) as hub, ExitStack() as flood:
-        psutil.Process(hub.process.pid).rlimit(psutil.RLIMIT_NOFILE, (200, 200))
+        process = psutil.Process(hub.process.pid)
+        process.rlimit(psutil.RLIMIT_NOFILE, (200, 200))
         port = int(hub.address.rpartition(":")[2])
         for _ in range(400):
             with suppress(OSError):  # while the port is closed
                 drip = flood.enter_context(socket.create_connection(("127.0.0.1", port), 5))
                 drip.sendall(b"\xff")
         until(lambda: hub.refused("connections") >= 1)
+        until(lambda: process.num_fds() < 60)  # the last of them cut, though still held open
         press_through(hub, "through")
         assert hub.process.poll() is None
 
