@@ -99,6 +99,24 @@ class Hub:
                     request=request, message=str(error))))
         return outputs
 
+    def next_job(self, now: float, peer: bytes, packet: Packet) -> list[Output]:
+        """Give what a worker gets for its answer, to be sent before `receive` keeps the answer.
+
+        Raises
+        ------
+        DamagedDatabaseError
+            As `receive`.
+        """
+        outputs: list[Output] = []
+        if isinstance(packet.message, messages.Result):
+            try:
+                outputs.extend(self._jobs.next_job(now, peer, packet.message))
+            except DamagedDatabaseError:
+                raise
+            except ServiceError as error:
+                self._log.error("no next job", reason=str(error))
+        return outputs
+
     def tick(self, now: float) -> list[Output]:
         """Do what is due: time-outs, silent peers, removals, status.
 

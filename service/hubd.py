@@ -122,6 +122,7 @@ class _Loop:
             self._refusals.note("role", **who, detail=lacks)
             self._give_out([_denied(incoming, message, lacks)])
             return
+        self._give_out(self._hub.next_job(time.monotonic(), incoming.peer, packet))
         self._give_out(self._hub.receive(
             time.monotonic(), incoming.peer, packet, incoming.key), packet)
 

@@ -119,6 +119,18 @@ class Jobs:
             else:
                 return
 
+    def next_job(self, now: float, peer: bytes, answer: messages.Result) -> Iterator[Output]:
+        """Give a worker its next frame before its answer is kept: it need not wait for the disk.
+
+        Its answer counts as its next `WorkerReady`, which then asks for nothing new.
+        """
+        worker = self._roster.workers.get(peer)
+        if (worker and worker.job == answer.capture_id
+                and self._of_use(answer, CaptureEvent.RESULT)):
+            worker.job, worker.free = None, True
+            worker.credit += 1
+            yield from self.dispatch(now)
+
     def result(
         self, now: float, peer: bytes, message: messages.Result, packet: Packet
     ) -> Iterator[Output]:

@@ -77,6 +77,7 @@ class Hostile:
             return
         self.taken += 1
         self.heard = [*self.heard[-50:], parts]
+        self.give(self.hub.next_job(self.now, peer, packet))
         self.give(self.hub.receive(self.now, peer, packet))
         kept = {one for one in self.accepted if self.store.find(one)}
         if type(packet.message) in OPERATOR:

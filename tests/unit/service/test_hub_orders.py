@@ -140,8 +140,10 @@ class AnyOrder(RuleBasedStateMachine):
         return done
 
     def say(self, peer, message, arrays=None):
+        packet = Packet(message, arrays or {})
         try:
-            self.give(self.hub.receive(self.now, peer, Packet(message, arrays or {})))
+            self.give(self.hub.next_job(self.now, peer, packet))
+            self.give(self.hub.receive(self.now, peer, packet))
         except KilledError:
             self.kill()
 
