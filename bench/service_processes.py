@@ -44,7 +44,7 @@ class Running:
         """Press so often, one press after the other; seconds from the first to the last face."""
         with zmq.Context() as context:
             # As they come, undecoded: what a subscriber does with a face is not measured here.
-            socket = open_socket(context, zmq.SUB)
+            socket = open_socket(context, zmq.SUB, publications_of(self.address))
             socket.set(zmq.LINGER, 0)
             socket.set(zmq.RCVHWM, 0)
             socket.connect(publications_of(self.address))
