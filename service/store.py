@@ -24,7 +24,15 @@ from service.errors import (
     StoreError,
 )
 from service.failpoints import failpoint
-from service.kept import FaceAbout, FrameAbout, KeptFrame, read_face, read_frame, write_kept
+from service.kept import (
+    FaceAbout,
+    FrameAbout,
+    KeptFace,
+    KeptFrame,
+    read_face,
+    read_frame,
+    write_kept,
+)
 from service.layout import Layout
 from service.messages import CaptureFailed, DeadLetter, FaceDone, Frame, Result
 from service.recovery import recover
@@ -62,6 +70,9 @@ class FolderStore:
         with _naming(folder):
             self._layout = Layout(private_folder(folder))
         self._fresh: KeptFrame | None = None
+        self._fresh_face: KeptFace | None = None
+        self._unread: set[str] = set()
+        """Captures whose face was published from memory and never read from its file."""
         self._lock = _lock(self._layout.lock)
         try:
             self._database, self._account, self._quarantine = recover(
@@ -187,6 +198,8 @@ class FolderStore:
             accepted_at=row["accepted_at"], finished_at=now, clock=self._account.save())
         checksum = write_kept(
             self._layout.face(message.capture_id, message.settings_hash), about, result)
+        self._fresh_face = KeptFace(message, result.arrays, about, checksum)
+        self._unread.add(message.capture_id)
         self._conclude(message.capture_id, CaptureState.DONE, now, face_sha256=checksum)
 
     def fail(self, capture_id: str, error: str, message: str, *, dead: bool) -> None:
@@ -196,6 +209,9 @@ class FolderStore:
 
     def reopen(self, capture_id: str, *, attempts_left: bool) -> None:
         """Withdraw an outcome: the capture is accepted again, its number is used up."""
+        # One that is damaged as soon as it is written has used up its attempt.
+        attempts_left = attempts_left and capture_id not in self._unread
+        self._unread.discard(capture_id)
         with self._database.transaction() as database:
             database.execute("DELETE FROM outcomes WHERE capture_id = ?", (capture_id,))
             database.execute(
@@ -305,7 +321,8 @@ class FolderStore:
         """Remove the files, then the rows: a row of a file that is gone says so in its state."""
         if not capture_ids:
             return
-        self._fresh = None
+        self._fresh = self._fresh_face = None
+        self._unread.difference_update(capture_ids)
         for capture_id in capture_ids:
             row = self._database.one(
                 "SELECT settings_hash FROM captures WHERE capture_id = ?", capture_id)
@@ -355,11 +372,14 @@ class FolderStore:
                 **common, error=row["error"], message=row["message"], dead=bool(row["dead"])))
         path = self._layout.face(capture_id, row["settings_hash"])
         try:
-            kept = read_face(path, row["face_sha256"])
+            fresh, self._fresh_face = self._fresh_face, None
+            if fresh is None or fresh.checksum != row["face_sha256"]:
+                fresh = read_face(path, row["face_sha256"])
+                self._unread.discard(capture_id)
         except CorruptFileError as error:
             self._quarantine.take(path, str(error), capture_id)
             raise DamagedFaceError(capture_id, str(error)) from error
-        return Packet(FaceDone(**common, face=kept.message.face), kept.arrays)
+        return Packet(FaceDone(**common, face=fresh.message.face), fresh.arrays)
 
     def _ids(self, which: str, *values: str | int) -> list[str]:
         return [row["capture_id"] for row in self._database.all(

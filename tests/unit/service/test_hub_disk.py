@@ -87,6 +87,20 @@ def test_a_disk_that_damages_every_face_uses_up_the_attempts(bench, monkeypatch)
     bench.accepted("a")
     for credit in range(SETTINGS.attempts):
         assert kinds(bench.worker(credit=credit)) == [(WORKER, "job")]
-        bench.result()
-    (published,) = bench.published
-    assert (published.dead, published.error) == (True, "CorruptFileError")
+        bench.result()  # published from memory
+        assert bench.published[-1].kind == "face_done"
+        bench.say(CLIENT, messages.GetNext(request=1, after=0))  # read from the disk
+    assert len(bench.published) == SETTINGS.attempts + 1
+    assert (bench.published[-1].dead, bench.published[-1].error) == (True, "CorruptFileError")
+
+
+def test_a_face_that_was_read_once_and_then_damaged_has_all_attempts_again(bench):
+    bench.accepted("a")
+    bench.worker()
+    bench.result()
+    ask = messages.GetNext(request=1, after=0)
+    assert [one.kind for _, one in bench.say(CLIENT, ask)] == ["face_done"]
+    for path in bench.store._layout.faces.iterdir():
+        path.write_bytes(b"damaged")
+    bench.say(CLIENT, ask)
+    assert bench.store.find("a").attempts == 0
