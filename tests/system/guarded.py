@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import zmq
+from zmq.utils.monitor import parse_monitor_message
 
 from service import messages
 from service.addresses import publications_of
@@ -214,3 +215,21 @@ def press_through(hub: GuardedHub, capture_id: str) -> None:
         until(lambda: not hub.status().workers)
         for one in (sensor, worker, presser, subscriber):
             one.close()
+
+
+def happened(peer: Peer, *events: zmq.Event, within_ms: int = 15_000) -> bool:
+    """Wait for one of some things to happen to a peer's connection."""
+    while peer.monitor.poll(within_ms):
+        if parse_monitor_message(peer.monitor.recv_multipart())["event"] in events:
+            return True
+    return False
+
+
+def as_role(
+    hub: GuardedHub, role: str, kind: int = zmq.DEALER
+) -> tuple[str, KeyPair, str, int]:
+    """Give what opens a connection with the key of a role."""
+    return (hub.address, read_pair(hub.secret(role)), read_public(hub.hub_key), kind)
+
+
+PRESS = messages.Press(request=1, capture_id="attack")

@@ -6,16 +6,15 @@
 import random
 import re
 import socket
-import threading
 from contextlib import ExitStack, suppress
+from pathlib import Path
 
 import psutil
 import pytest
 import zmq
-from zmq.utils.monitor import parse_monitor_message
 
 from service import messages
-from service.errors import ClientTimeoutError, KeyRefusedError, RequestFailedError
+from service.errors import KeyRefusedError
 from service.keyring import Role, allow, revoke
 from service.keys import KeyPair, new_pair, read_pair, read_public
 from service.payload import MAX_ARRAY_BYTES
@@ -25,68 +24,14 @@ from tests.system.guarded import (
     FACE_ARRAYS,
     FRAME,
     FRAME_ARRAYS,
-    Peer,
+    PRESS,
+    as_role,
     free_port,
     guarded_hub,
+    happened,
     press_through,
 )
 from tests.system.running import REPOSITORY, denseface, until
-
-PRESS = messages.Press(request=1, capture_id="attack")
-
-
-@pytest.fixture(scope="module")
-def hub(tmp_path_factory):
-    """One hub for all attacks; at the end it must still make a face."""
-    with guarded_hub(tmp_path_factory.mktemp("hub")) as hub:
-        press_through(hub, "first")
-        assert hub.status().refused == {}
-        yield hub
-        press_through(hub, "last")
-        with pytest.raises(RequestFailedError), hub.client("presser") as client:
-            client.get("attack", timeout=5)  # nothing of any attack became a capture
-        # Garbage does not fill the disk, and no secret reaches the log.
-        assert len(hub.log.read_text().splitlines()) < 300
-        for path in hub.keys.glob("*.secret"):
-            assert read_pair(path).secret not in hub.log.read_text()
-
-
-@pytest.fixture
-def refused(hub):
-    """Gives what waits until more was refused for a reason than before the test."""
-    before = hub.status().refused
-
-    def more(reason, by=1):
-        until(lambda: hub.refused(reason) - before.get(reason, 0) >= by)
-
-    return more
-
-
-@pytest.fixture
-def knock(hub):
-    """Opens connections and closes them."""
-    peers = []
-
-    def open_peer(*arguments, **named):
-        peers.append(Peer(*arguments, **named))
-        return peers[-1]
-
-    yield open_peer
-    for peer in peers:
-        peer.close()
-
-
-def happened(peer, *events, within_ms=15_000):
-    """Wait for one of some things to happen to a peer's connection."""
-    while peer.monitor.poll(within_ms):
-        if parse_monitor_message(peer.monitor.recv_multipart())["event"] in events:
-            return True
-    return False
-
-
-def as_role(hub, role, kind=zmq.DEALER):
-    return (hub.address, read_pair(hub.secret(role)), read_public(hub.hub_key), kind)
-
 
 # --- no way in without a hub key, an allowed key and an authenticator
 
@@ -206,193 +151,6 @@ def test_a_client_says_why_it_is_not_let_in(hub):
     assert "--hub-key is not the key of the hub" in wrong.stderr
     assert "expected --hub-key" in half.stderr
     assert "refused" in right.stdout
-
-
-# --- revoked while connected
-
-def test_a_revoked_worker_s_job_goes_to_another(hub, knock, refused):
-    hub.new_key("evil", Role.WORKER)
-    sensor, presser = knock(*as_role(hub, "sensor")), knock(*as_role(hub, "presser"))
-    evil, good = knock(*as_role(hub, "evil")), knock(*as_role(hub, "worker"))
-    sensor.say(messages.SensorReady(name="s", source="x"))
-    evil.say(messages.WorkerReady(name="evil", credit=0))
-    until(lambda: hub.status().ready)
-    presser.say(messages.Press(request=1, capture_id="kept"))
-    sensor.hears("take")
-    sensor.say(messages.Frame(capture_id="kept", frame=FRAME), FRAME_ARRAYS)
-    job = evil.hears("job").message
-    revoke(hub.keys, "evil")
-    until(lambda: not hub.status().workers)
-    assert hub.status().queued == 1
-    evil.say(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
-                             frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
-    evil.say(messages.WorkerReady(name="evil", credit=1))
-    refused("revoked key", by=2)
-    assert evil.silent()
-    assert (hub.status().queued, hub.status().workers) == (1, ())
-    good.say(messages.WorkerReady(name="good", credit=0))
-    job = good.hears("job").message
-    assert (job.capture_id, job.attempt) == ("kept", 2)
-    good.say(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
-                             frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
-    until(lambda: hub.status().queued + hub.status().working == 0)
-    # Said again, it is of no use any more.
-    good.say(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
-                             frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
-    good.say(messages.WorkerReady(name="good", credit=0))
-    refused("replayed", by=2)
-    for peer in (sensor, good):
-        peer.say(messages.Goodbye())
-
-
-def test_a_revoked_key_that_floods_is_cut_off(hub, knock, refused):
-    hub.new_key("flood", Role.WORKER)
-    flood, other = knock(*as_role(hub, "flood")), knock(*as_role(hub, "worker"))
-    assert flood.status()
-    assert other.status()
-    revoke(hub.keys, "flood")
-    heartbeat = encode(Packet(messages.Heartbeat()))
-    with suppress(zmq.Again):
-        for _ in range(100_000):
-            flood.socket.send_multipart(heartbeat, zmq.DONTWAIT)
-    assert happened(flood, zmq.Event.HANDSHAKE_FAILED_AUTH)
-    refused("revoked key", by=100)
-    assert other.poll_status()
-
-
-def test_a_revoked_presser_presses_no_more(hub, refused):
-    hub.new_key("leaver", Role.PRESSER)
-    with hub.client("leaver") as client:
-        assert client.status(timeout=20)
-        revoke(hub.keys, "leaver")
-        until(lambda: hub.log.read_text() and _unanswered(client))
-        with pytest.raises(ClientTimeoutError, match="revoked"):
-            client.press("attack", timeout=1)
-    refused("revoked key")
-
-
-def _unanswered(client):
-    try:
-        client.status(timeout=1)
-    except ClientTimeoutError:
-        return True
-    return False
-
-
-def test_a_revoked_subscriber_hears_no_more_and_the_others_do(hub, knock, refused):
-    hub.new_key("spy", Role.SUBSCRIBER)
-    spy, other = (knock(*as_role(hub, name, zmq.SUB)) for name in ("spy", "subscriber"))
-    for one in (spy, other):
-        one.socket.subscribe("status")
-        assert one.socket.poll(10_000)
-    revoke(hub.keys, "spy")
-    assert happened(spy, zmq.Event.DISCONNECTED)
-    assert happened(spy, zmq.Event.HANDSHAKE_FAILED_AUTH)
-    refused("unknown key")
-    while spy.socket.poll(0):
-        spy.socket.recv_multipart()
-    while other.socket.poll(0):
-        other.socket.recv_multipart()
-    for _ in range(3):
-        assert other.socket.poll(10_000)
-        other.socket.recv_multipart()
-    assert spy.silent(0)
-
-
-def test_a_client_that_follows_is_told(hub):
-    hub.new_key("reader", Role.SUBSCRIBER)
-    with hub.client("reader") as client:
-        after = client.status(timeout=20).sequence
-        revoked = threading.Timer(0.5, revoke, (hub.keys, "reader"))
-        revoked.start()
-        with pytest.raises(KeyRefusedError, match="revoked"):
-            next(client.published(after=after, timeout=30))
-        revoked.join()
-
-
-# --- the wrong role
-
-ROLES = [
-    ("subscriber", PRESS),
-    ("worker", PRESS),
-    ("sensor", PRESS),
-    ("operator", PRESS),
-    ("worker", messages.GetFace(request=1, capture_id="first")),
-    ("sensor", messages.GetFace(request=1, capture_id="first")),
-    ("operator", messages.GetFace(request=1, capture_id="first")),
-    ("worker", messages.GetNext(request=1, after=0)),
-    ("presser", messages.GetNext(request=1, after=0)),
-    ("presser", messages.GetFace(request=1, capture_id="foreign")),
-    ("presser", messages.Purge(request=1, everything=True)),
-    ("subscriber", messages.Purge(request=1, everything=True)),
-    ("worker", messages.DropDead(request=1, capture_id="first")),
-    ("presser", messages.SensorReady(name="evil", source="x")),
-    ("worker", messages.SensorReady(name="evil", source="x")),
-    ("subscriber", messages.WorkerReady(name="evil", credit=0)),
-    ("sensor", messages.WorkerReady(name="evil", credit=0)),
-    ("presser", messages.Goodbye()),
-]
-
-
-@pytest.mark.parametrize(("role", "message"), ROLES, ids=[f"{a}-{b.kind}" for a, b in ROLES])
-def test_the_wrong_role_is_told_so(hub, knock, refused, role, message):
-    if message.kind == "get_face" and message.capture_id == "foreign":
-        _foreign(hub, knock)
-    peer = knock(*as_role(hub, role))
-    peer.say(message)
-    kind = "request_failed" if isinstance(message, messages.Request) else "denied"
-    said = peer.hears(kind).message.message
-    assert said.startswith(f"refused: {message.kind} needs the role ")
-    assert said.endswith(f"the key {role} has {role}")
-    refused("role")
-    status = hub.status()
-    assert "evil" not in status.sensors + status.workers
-
-
-@pytest.mark.parametrize(("role", "message", "arrays"), [
-    ("worker", messages.Frame(capture_id="attack", frame=FRAME), FRAME_ARRAYS),
-    ("presser", messages.Frame(capture_id="attack", frame=FRAME), FRAME_ARRAYS),
-    ("sensor", messages.Result(capture_id="first", settings_hash="0", frame_sha256="0" * 64,
-                               face=FACE), FACE_ARRAYS),
-    ("subscriber", messages.Result(capture_id="first", settings_hash="0", frame_sha256="0" * 64,
-                                   face=FACE), FACE_ARRAYS),
-])
-def test_frames_and_faces_come_from_their_makers(hub, knock, refused, role, message, arrays):
-    peer = knock(*as_role(hub, role))
-    peer.say(message, arrays)
-    assert "needs the role" in peer.hears("denied").message.message
-    refused("role")
-
-
-def _foreign(hub, knock):
-    """Have another key press and accept that capture."""
-    hub.new_key("somebody", Role.PRESSER)
-    sensor, presser = knock(*as_role(hub, "sensor")), knock(*as_role(hub, "somebody"))
-    sensor.say(messages.SensorReady(name="s", source="x"))
-    until(lambda: hub.status().sensors)
-    presser.say(messages.Press(request=1, capture_id="foreign"))
-    sensor.hears("take")
-    sensor.say(messages.Frame(capture_id="foreign", frame=FRAME), FRAME_ARRAYS)
-    presser.hears("press_accepted")
-    assert presser.ask(messages.GetFace(request=2, capture_id="foreign")).kind == "capture_pending"
-    sensor.say(messages.Goodbye())
-
-
-@pytest.mark.parametrize("role", ["worker", "sensor", "presser", "operator"])
-def test_only_a_subscriber_may_come_to_the_topics(hub, knock, refused, role):
-    peer = knock(*as_role(hub, role, zmq.SUB))
-    peer.socket.subscribe("")
-    assert happened(peer, zmq.Event.HANDSHAKE_FAILED_AUTH)
-    refused("role")
-    assert peer.silent(0)
-
-
-def test_other_topics_are_nobody_s(hub, knock, refused):
-    peer = knock(*as_role(hub, "subscriber", zmq.SUB))
-    peer.socket.subscribe("")
-    peer.socket.subscribe("f")
-    refused("malformed", by=2)
-    assert peer.silent(600)
 
 
 # --- not ZeroMQ, not ours, too much
@@ -536,5 +294,6 @@ def test_another_user_of_the_machine_reads_nothing(hub):
 def test_every_row_stands_in_the_documentation():
     text = (REPOSITORY / "docs" / "reliability.md").read_text()
     shown = set(re.findall(r"`(test_\w+)`", text))
-    here = {name for name in globals() if name.startswith("test_")}
+    here = {name for file in ("test_attacks.py", "test_revoked_and_roles.py") for name in
+            re.findall(r"^def (test_\w+)", Path(__file__).with_name(file).read_text(), re.M)}
     assert here - shown == {"test_every_row_stands_in_the_documentation"}

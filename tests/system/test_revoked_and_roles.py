@@ -1,0 +1,211 @@
+"""Keys that are revoked while in use, and keys that say what is not theirs to say.
+
+The second half of the attacks in `docs/reliability.md`.
+"""
+
+import threading
+from contextlib import suppress
+
+import pytest
+import zmq
+
+from service import messages
+from service.errors import ClientTimeoutError, KeyRefusedError
+from service.keyring import Role, revoke
+from service.wire import Packet, encode
+from tests.system.guarded import (
+    FACE,
+    FACE_ARRAYS,
+    FRAME,
+    FRAME_ARRAYS,
+    PRESS,
+    as_role,
+    happened,
+)
+from tests.system.running import until
+
+# --- revoked while connected
+
+def test_a_revoked_worker_s_job_goes_to_another(hub, knock, refused):
+    hub.new_key("evil", Role.WORKER)
+    sensor, presser = knock(*as_role(hub, "sensor")), knock(*as_role(hub, "presser"))
+    evil, good = knock(*as_role(hub, "evil")), knock(*as_role(hub, "worker"))
+    sensor.say(messages.SensorReady(name="s", source="x"))
+    evil.say(messages.WorkerReady(name="evil", credit=0))
+    until(lambda: hub.status().ready)
+    presser.say(messages.Press(request=1, capture_id="kept"))
+    sensor.hears("take")
+    sensor.say(messages.Frame(capture_id="kept", frame=FRAME), FRAME_ARRAYS)
+    job = evil.hears("job").message
+    revoke(hub.keys, "evil")
+    until(lambda: not hub.status().workers)
+    assert hub.status().queued == 1
+    evil.say(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
+                             frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
+    evil.say(messages.WorkerReady(name="evil", credit=1))
+    refused("revoked key", by=2)
+    assert evil.silent()
+    assert (hub.status().queued, hub.status().workers) == (1, ())
+    good.say(messages.WorkerReady(name="good", credit=0))
+    job = good.hears("job").message
+    assert (job.capture_id, job.attempt) == ("kept", 2)
+    good.say(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
+                             frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
+    until(lambda: hub.status().queued + hub.status().working == 0)
+    # Said again, it is of no use any more.
+    good.say(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
+                             frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
+    good.say(messages.WorkerReady(name="good", credit=0))
+    refused("replayed", by=2)
+    for peer in (sensor, good):
+        peer.say(messages.Goodbye())
+
+
+def test_a_revoked_key_that_floods_is_cut_off(hub, knock, refused):
+    hub.new_key("flood", Role.WORKER)
+    flood, other = knock(*as_role(hub, "flood")), knock(*as_role(hub, "worker"))
+    assert flood.status()
+    assert other.status()
+    revoke(hub.keys, "flood")
+    heartbeat = encode(Packet(messages.Heartbeat()))
+    with suppress(zmq.Again):
+        for _ in range(100_000):
+            flood.socket.send_multipart(heartbeat, zmq.DONTWAIT)
+    assert happened(flood, zmq.Event.HANDSHAKE_FAILED_AUTH)
+    refused("revoked key", by=100)
+    assert other.poll_status()
+
+
+def test_a_revoked_presser_presses_no_more(hub, refused):
+    hub.new_key("leaver", Role.PRESSER)
+    with hub.client("leaver") as client:
+        assert client.status(timeout=20)
+        revoke(hub.keys, "leaver")
+        until(lambda: hub.log.read_text() and _unanswered(client))
+        with pytest.raises(ClientTimeoutError, match="revoked"):
+            client.press("attack", timeout=1)
+    refused("revoked key")
+
+
+def _unanswered(client):
+    try:
+        client.status(timeout=1)
+    except ClientTimeoutError:
+        return True
+    return False
+
+
+def test_a_revoked_subscriber_hears_no_more_and_the_others_do(hub, knock, refused):
+    hub.new_key("spy", Role.SUBSCRIBER)
+    spy, other = (knock(*as_role(hub, name, zmq.SUB)) for name in ("spy", "subscriber"))
+    for one in (spy, other):
+        one.socket.subscribe("status")
+        assert one.socket.poll(10_000)
+    revoke(hub.keys, "spy")
+    assert happened(spy, zmq.Event.DISCONNECTED)
+    assert happened(spy, zmq.Event.HANDSHAKE_FAILED_AUTH)
+    refused("unknown key")
+    while spy.socket.poll(0):
+        spy.socket.recv_multipart()
+    while other.socket.poll(0):
+        other.socket.recv_multipart()
+    for _ in range(3):
+        assert other.socket.poll(10_000)
+        other.socket.recv_multipart()
+    assert spy.silent(0)
+
+
+def test_a_client_that_follows_is_told(hub):
+    hub.new_key("reader", Role.SUBSCRIBER)
+    with hub.client("reader") as client:
+        after = client.status(timeout=20).sequence
+        revoked = threading.Timer(0.5, revoke, (hub.keys, "reader"))
+        revoked.start()
+        with pytest.raises(KeyRefusedError, match="revoked"):
+            next(client.published(after=after, timeout=30))
+        revoked.join()
+
+
+# --- the wrong role
+
+ROLES = [
+    ("subscriber", PRESS),
+    ("worker", PRESS),
+    ("sensor", PRESS),
+    ("operator", PRESS),
+    ("worker", messages.GetFace(request=1, capture_id="first")),
+    ("sensor", messages.GetFace(request=1, capture_id="first")),
+    ("operator", messages.GetFace(request=1, capture_id="first")),
+    ("worker", messages.GetNext(request=1, after=0)),
+    ("presser", messages.GetNext(request=1, after=0)),
+    ("presser", messages.GetFace(request=1, capture_id="foreign")),
+    ("presser", messages.Purge(request=1, everything=True)),
+    ("subscriber", messages.Purge(request=1, everything=True)),
+    ("worker", messages.DropDead(request=1, capture_id="first")),
+    ("presser", messages.SensorReady(name="evil", source="x")),
+    ("worker", messages.SensorReady(name="evil", source="x")),
+    ("subscriber", messages.WorkerReady(name="evil", credit=0)),
+    ("sensor", messages.WorkerReady(name="evil", credit=0)),
+    ("presser", messages.Goodbye()),
+]
+
+
+@pytest.mark.parametrize(("role", "message"), ROLES, ids=[f"{a}-{b.kind}" for a, b in ROLES])
+def test_the_wrong_role_is_told_so(hub, knock, refused, role, message):
+    if message.kind == "get_face" and message.capture_id == "foreign":
+        _foreign(hub, knock)
+    peer = knock(*as_role(hub, role))
+    peer.say(message)
+    kind = "request_failed" if isinstance(message, messages.Request) else "denied"
+    said = peer.hears(kind).message.message
+    assert said.startswith(f"refused: {message.kind} needs the role ")
+    assert said.endswith(f"the key {role} has {role}")
+    refused("role")
+    status = hub.status()
+    assert "evil" not in status.sensors + status.workers
+
+
+@pytest.mark.parametrize(("role", "message", "arrays"), [
+    ("worker", messages.Frame(capture_id="attack", frame=FRAME), FRAME_ARRAYS),
+    ("presser", messages.Frame(capture_id="attack", frame=FRAME), FRAME_ARRAYS),
+    ("sensor", messages.Result(capture_id="first", settings_hash="0", frame_sha256="0" * 64,
+                               face=FACE), FACE_ARRAYS),
+    ("subscriber", messages.Result(capture_id="first", settings_hash="0", frame_sha256="0" * 64,
+                                   face=FACE), FACE_ARRAYS),
+])
+def test_frames_and_faces_come_from_their_makers(hub, knock, refused, role, message, arrays):
+    peer = knock(*as_role(hub, role))
+    peer.say(message, arrays)
+    assert "needs the role" in peer.hears("denied").message.message
+    refused("role")
+
+
+def _foreign(hub, knock):
+    """Have another key press and accept that capture."""
+    hub.new_key("somebody", Role.PRESSER)
+    sensor, presser = knock(*as_role(hub, "sensor")), knock(*as_role(hub, "somebody"))
+    sensor.say(messages.SensorReady(name="s", source="x"))
+    until(lambda: hub.status().sensors)
+    presser.say(messages.Press(request=1, capture_id="foreign"))
+    sensor.hears("take")
+    sensor.say(messages.Frame(capture_id="foreign", frame=FRAME), FRAME_ARRAYS)
+    presser.hears("press_accepted")
+    assert presser.ask(messages.GetFace(request=2, capture_id="foreign")).kind == "capture_pending"
+    sensor.say(messages.Goodbye())
+
+
+@pytest.mark.parametrize("role", ["worker", "sensor", "presser", "operator"])
+def test_only_a_subscriber_may_come_to_the_topics(hub, knock, refused, role):
+    peer = knock(*as_role(hub, role, zmq.SUB))
+    peer.socket.subscribe("")
+    assert happened(peer, zmq.Event.HANDSHAKE_FAILED_AUTH)
+    refused("role")
+    assert peer.silent(0)
+
+
+def test_other_topics_are_nobody_s(hub, knock, refused):
+    peer = knock(*as_role(hub, "subscriber", zmq.SUB))
+    peer.socket.subscribe("")
+    peer.socket.subscribe("f")
+    refused("malformed", by=2)
+    assert peer.silent(600)
