@@ -10,8 +10,10 @@ __all__ = ["Board", "Picture"]
 
 @dataclass(frozen=True)
 class Picture:
-    """The hub at one moment; nothing in it changes any more."""
+    """The hub at one moment, its last heartbeat; nothing in it changes any more."""
 
+    taken: float
+    """Seconds of `time.monotonic`."""
     status: Status
     counts: tuple[tuple[str, str, int], ...]
     """Name, label, number."""
@@ -21,9 +23,7 @@ class Picture:
 
 
 class Board:
-    """Written by the hub's loop, read by others; each field is replaced as a whole."""
+    """Written by the hub's loop, read by others; the picture is replaced as a whole."""
 
     def __init__(self) -> None:
         self.picture: Picture | None = None
-        self.ticked = float("-inf")
-        """When the loop last went round, seconds of `time.monotonic`."""

@@ -47,11 +47,10 @@ class Health:
 
     def _missing(self) -> list[str]:
         picture, found = self._board.picture, []
-        silence = self._clock() - self._board.ticked
         if picture is None:
             found.append("hub: has not said how it is yet")
-        elif silence > self._stall_s:
-            found.append(f"hub: its loop stands still for {silence:.0f} s")
+        elif (silence := self._clock() - picture.taken) > self._stall_s:
+            found.append(f"hub: has not said how it is for {silence:.0f} s")
         if why := self._unwritable():
             found.append(f"store: {why}")
         if picture is None:

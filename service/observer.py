@@ -54,15 +54,14 @@ class Observer:
     def ticked(
         self, now: float, outputs: Sequence[Output], subscriptions: Mapping[str, int]
     ) -> None:
-        """Show that the loop goes round and, at each status, how things stand."""
+        """Show how things stand, at each status that a tick gave out."""
         self._measured(now)
         for output in outputs:
             message = output.packet.message
             if isinstance(output, Publish) and isinstance(message, Status):
                 self.board.picture = Picture(
-                    message, tuple(self.figures.counters.items()),
+                    now, message, tuple(self.figures.counters.items()),
                     self.figures.latencies.stages(), dict(subscriptions))
-        self.board.ticked = now
 
     def _measured(self, now: float) -> None:
         if self._measure.ended():

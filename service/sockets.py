@@ -60,13 +60,18 @@ def publish_parts(publisher: "zmq.Socket[bytes]", parts: list[bytes]) -> bool:
     what is counted is how often a subscriber fell behind, not how much it missed.
     """
     publisher.set(zmq.XPUB_NODROP, 1)
-    try:
-        publisher.send_multipart(parts, flags=zmq.DONTWAIT)
-    except zmq.Again:
-        publisher.set(zmq.XPUB_NODROP, 0)
-        publisher.send_multipart(parts, flags=zmq.DONTWAIT)
-        return False
-    return True
+    for _ in range(2):
+        try:
+            publisher.send_multipart(parts, flags=zmq.DONTWAIT)
+        except zmq.Again:
+            # Has libzmq take note of what was read meanwhile: it does not look at every sending,
+            # and would take a subscriber that keeps up for one that does not.
+            publisher.get(zmq.EVENTS)
+        else:
+            return True
+    publisher.set(zmq.XPUB_NODROP, 0)
+    publisher.send_multipart(parts, flags=zmq.DONTWAIT)
+    return False
 
 
 def receive_parts(

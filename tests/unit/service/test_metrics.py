@@ -27,9 +27,8 @@ def board():
         latencies.observe("press_to_published", seconds)
     board = Board()
     board.picture = Picture(
-        status(), (("accepted", "", 9), ("press_refused", "disk", 2), ("drops", "faces", 1),
+        100.0, status(), (("accepted", "", 9), ("press_refused", "disk", 2), ("drops", "faces", 1),
                    ("refused", "unknown key", 7)), latencies.stages(), {"faces": 1, "preview": 0})
-    board.ticked = 100.0
     return board
 
 
@@ -89,13 +88,13 @@ def test_all_is_well(board):
     ({"free_bytes": None}, "disk: its free room is not known"),
 ])
 def test_what_is_missing_has_a_name(board, changed, missing):
-    board.picture = Picture(status(**changed), (), {})
+    board.picture = Picture(100.0, status(**changed), (), {})
     well, said = judged(board)
     assert (well, said["healthy"], said["missing"]) == (False, False, [missing])
 
 
-def test_a_loop_that_stands_still_a_store_and_everything(board):
-    assert judged(board, now=130.0)[1]["missing"] == ["hub: its loop stands still for 30 s"]
+def test_a_hub_that_is_silent_a_store_and_everything(board):
+    assert judged(board, now=130.0)[1]["missing"] == ["hub: has not said how it is for 30 s"]
     assert judged(board, why="no")[1]["missing"] == ["store: no"]
     assert judged(Board(), why="no") == (False, {
         "healthy": False, "missing": ["hub: has not said how it is yet", "store: no"],
