@@ -26,7 +26,7 @@ _STOPPING_S = 15.0
 
 PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_RESEND_S": "0.3",
         "DENSEFACE_TAKE_TIMEOUT_S": "3", "DENSEFACE_JOB_TIMEOUT_S": "10",
-        "DENSEFACE_RETENTION": "off"}
+        "DENSEFACE_ATTEMPTS": "10", "DENSEFACE_RETENTION": "off"}
 """Settings of the service that let a fault show in tenths of seconds."""
 
 

@@ -183,7 +183,8 @@ def test_slow_and_dead_subscribers_hurt_only_themselves(scene):
 
 
 def test_a_worker_told_to_stop_hands_back_what_it_cannot_finish(scene):
-    running = scene(actions={"worker.job.computing": "hang"})
+    running = scene(actions={"worker.job.computing": "hang"},
+                    environment={"DENSEFACE_HEARTBEAT_S": "1"})
     fail_at(running, "worker.job.computing")
     (worker,) = running.cluster.workers
     worker.end()
