@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 
 from capture.frame import Calibration, CameraModel, RgbdFrame
-from recon._heap import keep_freed_memory
 from recon.densify import densify
 from recon.detail import add_detail
 from recon.detect import detect_face
 from recon.errors import NoFaceError
+from recon.heap import keep_freed_memory
 from recon.neighbors import mean_spacing
 from recon.rbf import fit_surface
 from recon.registration import register
@@ -28,7 +28,7 @@ _BOX = (58, 38, 44, 44)
 def warm() -> None:
     """Go once through every stage, with a ball for a face; does nothing when repeated.
 
-    From then on the process keeps memory that a frame frees for the next: `recon._heap`.
+    From then on the process keeps memory that a frame frees for the next: `recon.heap`.
     """
     keep_freed_memory()
     settings = Settings()

@@ -6,12 +6,12 @@ import sys
 
 import pytest
 
-from recon._heap import keep_freed_memory
+from recon.heap import keep_freed_memory
 
 _PROGRAM = """
 import resource, sys
 import numpy as np
-from recon._heap import keep_freed_memory
+from recon.heap import keep_freed_memory
 
 def faults():
     before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
