@@ -1,6 +1,7 @@
 """How far what a box shows bulges toward the camera."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from recon.face import Box
 from recon.registration import Registration
@@ -11,6 +12,8 @@ __all__ = ["bulge_mm"]
 _HEAD_MM = 120.0
 # Fewer depths do not tell a bulge from noise.
 _LEAST_DEPTHS = 12
+_BEFORE_MM = 20.0
+_FITS = 3
 
 
 def bulge_mm(registered: Registration, box: Box, depth_mm: float) -> float:
@@ -38,5 +41,18 @@ def bulge_mm(registered: Registration, box: Box, depth_mm: float) -> float:
         return np.inf
     u, v, z = (one[inside].astype(np.float64) for one in (u, v, z - np.float32(depth_mm)))
     terms = np.stack([np.ones_like(u), u, v, u * u + v * v])
-    fitted, *_ = np.linalg.lstsq(terms @ terms.T, terms @ z, rcond=None)
-    return float(fitted[3])
+    best = -np.inf
+    # A hand before the chin takes the bulge away: what is so far before all else is left out.
+    for _ in range(_FITS):
+        fitted = _fitted(terms, z)
+        best = max(best, float(fitted[3]))
+        behind = z - fitted @ terms > -_BEFORE_MM
+        if behind.all() or np.count_nonzero(behind) < _LEAST_DEPTHS:
+            break
+        terms, z = terms[:, behind], z[behind]
+    return best
+
+
+def _fitted(terms: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
+    found, *_ = np.linalg.lstsq(terms @ terms.T, terms @ z, rcond=None)
+    return np.asarray(found)

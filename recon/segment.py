@@ -33,8 +33,9 @@ _ROUNDNESS = 2.5
 # ears at the top, the jaw, then the chin, behind which neck and chest begin.
 _BELOW = np.array([0.20, 0.35, 0.50, 0.60, 0.70, 0.75, 0.80])
 _BEHIND = np.array([0.75, 0.60, 0.48, 0.415, 0.30, 0.20, 0.0])
-# A box that is wider than this is larger than its face.
+# A box that is wider or narrower than this is larger or smaller than its face.
 _BROADEST_MM = 165.0
+_NARROWEST_MM = 130.0
 # The part of the box, each way from its centre, in which the front is sought.
 _FRONT_PART = 0.3
 # Two clusters are parts of one surface unless this much empty depth lies between them.
@@ -191,7 +192,8 @@ def keep_face(
     middle = face & (np.abs(across) < _FRONT_PART) & (np.abs(down) < _FRONT_PART)
     front = float(np.percentile(z[middle if middle.any() else face], 2))
     box_mm = box[2] * front / focal_px
-    cut_depth(face, z, down, front, _BELOW, min(box_mm, _BROADEST_MM) * _BEHIND)
+    cut_depth(face, z, down, front, _BELOW,
+              min(max(box_mm, _NARROWEST_MM), _BROADEST_MM) * _BEHIND)
     return face & _smooth_outline(
         face | cover, registered.valid & ~face, start, _EAR * box_mm * px, px)
 

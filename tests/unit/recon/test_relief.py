@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from recon._relief import bulge_mm
@@ -24,6 +24,7 @@ def plane(across=0.0, down=0.0):
     return 700 + across * (u - 80) + down * (v - 60)
 
 
+@settings(deadline=None)
 @given(st.floats(-2, 2), st.floats(-2, 2))
 def test_a_plane_has_none_however_slanted(across, down):
     assert abs(bulge(plane(across, down))) < 1
@@ -46,3 +47,10 @@ def test_a_few_depths_do_not_tell():
     depth = np.zeros((120, 160))
     depth[58:61, 78:81] = 700
     assert bulge(depth) == np.inf
+
+
+def test_a_hand_before_the_chin_does_not_flatten_a_face():
+    v, u = np.mgrid[:120, :160]
+    depth = plane() + 30 * ((u - 79.5) ** 2 + (v - 59.5) ** 2) / 20**2
+    depth[72:90, 66:94] = 655
+    assert bulge(depth) == pytest.approx(30, abs=3)
