@@ -38,6 +38,10 @@ _BROADEST_MM = 165.0
 _NARROWEST_MM = 130.0
 # The part of the box, each way from its centre, in which the front is sought.
 _FRONT_PART = 0.3
+# The part in which the slant of a lifted face is measured, and the most of it, mm a pixel.
+_SLANT_PART = 0.4
+_MOST_SLANT = 1.0
+_SLANT_ROWS = 4
 # Two clusters are parts of one surface unless this much empty depth lies between them.
 _GAP_MM = 60.0
 # From pixel to pixel a face's surface steps less than this, where pixels are coarse less than the
@@ -183,12 +187,13 @@ def keep_face(
     cover = _frames_of_glasses(z, cluster, px)
     wanted = cluster & ~cover
     start = _nearest_pixel(registered, wanted, box)
-    face = _connected(z, wanted, cover, start, px)
+    across, down = _in_box(registered, box)
+    upright = _upright(z, wanted & (np.abs(across) < _SLANT_PART) & (np.abs(down) < _SLANT_PART))
+    face = _connected(upright, wanted, cover, start, px)
     hand = _before(z, registered.valid, face, px)
     if hand.any():
         cover |= hand
-        face = _connected(z, wanted, cover, start, px)
-    across, down = _in_box(registered, box)
+        face = _connected(upright, wanted, cover, start, px)
     middle = face & (np.abs(across) < _FRONT_PART) & (np.abs(down) < _FRONT_PART)
     front = float(np.percentile(z[middle if middle.any() else face], 2))
     box_mm = box[2] * front / focal_px
@@ -196,6 +201,21 @@ def keep_face(
               min(max(box_mm, _NARROWEST_MM), _BROADEST_MM) * _BEHIND)
     return face & _smooth_outline(
         face | cover, registered.valid & ~face, start, _EAR * box_mm * px, px)
+
+
+def _upright(z: NDArray[np.float32], middle: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """The depths without the slant of a face that is lifted or lowered; 0 stays 0."""
+    rows = np.flatnonzero(middle.any(axis=1))[::_SLANT_ROWS]
+    if len(rows) < 2:
+        return z
+    # Of the rows' medians, the median slope between their upper and their lower half: a hand
+    # before the chin does not tilt it.
+    medians = np.array([np.median(z[row][middle[row]]) for row in rows])
+    half = len(rows) // 2
+    slant = np.median((medians[half:2 * half] - medians[:half])
+                      / (rows[half:2 * half] - rows[:half]))
+    tilt = (np.arange(len(z)) - rows[0]) * min(max(slant, -_MOST_SLANT), _MOST_SLANT)
+    return np.where(z > 0, z - tilt[:, None].astype(np.float32), np.float32(0))
 
 
 def _connected(
