@@ -90,7 +90,6 @@ class Entrance:
             door.cut_revoked()
         if used := self._memory.beyond():
             self._cut_all("memory", f"{used >> 20} MB in use")
-            self._memory.trim()
         if used := self._descriptors.beyond():
             self._cut_all("connections", f"{used} descriptors in use")
         else:  # libzmq ends the process where it has no descriptor to bind with

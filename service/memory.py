@@ -24,9 +24,13 @@ class MemoryWatch:
 
     def beyond(self) -> int:
         """Give the bytes in use where they are too many, else 0."""
-        used = int(os.pread(self._statm, 256, 0).split()[1]) * _PAGE
+        used = self._used()
+        if used > self._limit:
+            # What was freed stays with the process, and libzmq frees some time after a cut.
+            self._trim()
+            used = self._used()
         if self._cut:
-            # What was freed may stay with the process: only what grows from here is new.
+            # What is left may be in use for long: only what grows from here is new.
             self._cut = False
             self._ceiling = max(self._limit, int(used * _GROWTH))
         elif used < self._limit:
@@ -40,8 +44,11 @@ class MemoryWatch:
         """Watch no more."""
         os.close(self._statm)
 
+    def _used(self) -> int:
+        return int(os.pread(self._statm, 256, 0).split()[1]) * _PAGE
+
     @staticmethod
-    def trim() -> None:
+    def _trim() -> None:
         """Give freed memory back to the system, where the C library can."""
         trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
         if trim is not None:
