@@ -13,7 +13,7 @@ from zmq.utils.monitor import parse_monitor_message
 
 from service.refusals import Refusals
 
-__all__ = ["Handshakes"]
+__all__ = ["Handshakes", "address_of"]
 
 _BURST = 64
 _E = zmq.Event
@@ -62,7 +62,7 @@ class Handshakes:
 
     def _note(self, event: zmq.Event, value: int) -> None:
         if event is _E.ACCEPTED:
-            self._open[value] = _address(value)
+            self._open[value] = address_of(value)
         elif event is _E.HANDSHAKE_SUCCEEDED:
             # It does not say whose: where several knock at once, another may be named later.
             if self._open:
@@ -86,9 +86,22 @@ class Handshakes:
             self._refusals.note("handshake", address=address, detail="not ZeroMQ, or broken off")
 
 
-def _address(descriptor: int) -> str:
-    with suppress(OSError):
-        with socket.socket(fileno=os.dup(descriptor)) as connection:
+def address_of(descriptor: int) -> str:
+    """Say who is at the other end of a connection, "gone" where it is closed.
+
+    The number may be that of another file by now, or of a socket of another kind.
+    """
+    try:
+        copy = os.dup(descriptor)
+    except OSError:
+        return "gone"
+    try:
+        connection = socket.socket(fileno=copy)
+    except OSError:
+        os.close(copy)
+        return "gone"
+    with connection, suppress(OSError):
+        if connection.family in (socket.AF_INET, socket.AF_INET6):
             host, port, *_ = connection.getpeername()
-        return f"{host}:{port}"
+            return f"{host}:{port}"
     return "gone"
