@@ -2,6 +2,7 @@
 
 import ast
 import errno
+import os
 import signal
 import subprocess
 import sys
@@ -78,6 +79,7 @@ def test_a_process_ends_or_stops_at_the_third_time(action, number):
     ) as process:
         said = [process.stdout.readline() for _ in range(3)]
         if action == "stop":
+            os.waitid(os.P_PID, process.pid, os.WSTOPPED)
             process.send_signal(signal.SIGCONT)
             assert process.wait(20) == 0
             said.append(process.stdout.readline())
