@@ -16,7 +16,7 @@ from capture.frame import MAX_SIDE, RgbdFrame
 __all__ = ["RecordingSource"]
 
 _FILE_WAIT_S = 2.0
-_SETTLE_S = 0.03
+_SETTLE_S = 0.1
 
 
 class RecordingSource(OpenNI2Source):
