@@ -5,7 +5,10 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["read_between", "share_out"]
+__all__ = ["BILINEAR_VARIANCE", "read_between", "share_out"]
+
+BILINEAR_VARIANCE = 1 / 6
+"""What bilinear weights blur by on average, squared pixels."""
 
 
 @compiled

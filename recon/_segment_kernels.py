@@ -19,6 +19,9 @@ def within_reach(
 ) -> NDArray[np.bool_]:
     """Say which valid pixels lie in a superellipse of power 2.5 about the origin.
 
+    That is between an ellipse (2) and the box itself: a head is round, and the corners of its box
+    hold shoulders.
+
     reach : (3,), sideward, upward, downward
     """
     rows, columns = valid.shape

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._image_kernels import collect
+from recon._scatter_kernels import BILINEAR_VARIANCE
 from recon.colors import average_neighbors
 from recon.detail import DetailedSurface
 from recon.face import DenseCloud
@@ -28,8 +29,7 @@ LookUp = Callable[[NDArray[np.float32]], tuple[NDArray[np.uint8], NDArray[np.boo
 # A colour is the mean of the seeds around it, weighted by a Gaussian of this radius.
 _COLOR_RADIUS = 0.58
 _COLOR_STEP = 0.6
-# Variance, in squared pixels, that bilinear weights add on average; no blur is less than the last.
-_BILINEAR = 1 / 6
+# In pixels; no blur is less.
 _LEAST_RADIUS = 0.4
 _COARSE = 0.5
 # Farther than this from every seed, over (X, Y), a point is in a hole.
@@ -107,7 +107,8 @@ def _colors(
     """The seeds' mean colour on a grid of its own, (rows, columns, 3)."""
     places = ((seeds.points[:, 1::-1] - origin[::-1]) / step).astype(np.float32)
     # Sharing a colour among four pixels, and reading between four, blurs by as much.
-    radius = np.sqrt(max((_COLOR_RADIUS * spacing / step) ** 2 - 2 * _BILINEAR, _LEAST_RADIUS**2))
+    radius = np.sqrt(max((_COLOR_RADIUS * spacing / step) ** 2 - 2 * BILINEAR_VARIANCE,
+                         _LEAST_RADIUS**2))
     return average_neighbors(seeds.colors, places, wanted, float(radius), spacing / step)
 
 

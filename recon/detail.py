@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._image_kernels import add_between
-from recon._scatter_kernels import read_between, share_out
+from recon._scatter_kernels import BILINEAR_VARIANCE, read_between, share_out
 from recon.rbf import Surface
 from recon.support import support_on_grid
 
@@ -38,8 +38,6 @@ _WINDOW_MM = 8.0
 _COARSER = 4
 # The smoothest part of a face shows what noise alone adds to the detail.
 _NOISE_PERCENTILE = 20
-# Variance, in squared pixels, that bilinear weights add on average.
-_BILINEAR = 1 / 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +145,7 @@ class _Seeded:
         given = np.ones_like(self.columns) if values is None else values
         share_out(self.columns, self.rows, given, sums)
         # Sharing a value among four pixels blurs by as much already.
-        return _blur(sums, math.sqrt(sigma * sigma - _BILINEAR))
+        return _blur(sums, math.sqrt(sigma * sigma - BILINEAR_VARIANCE))
 
     def at_seeds(self, image: Image) -> Image:
         """Interpolate an image, (n,)."""

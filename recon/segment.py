@@ -26,9 +26,6 @@ __all__ = ["Seeds", "cluster_depths", "crop_to_box", "keep_face", "segment_face"
 _REACH_SIDE = 0.68
 _REACH_UP = 0.74
 _REACH_DOWN = 0.80
-# A superellipse of this power, between an ellipse (2) and the box itself: a head is round, and
-# the corners of its box hold shoulders.
-_ROUNDNESS = 2.5
 # How far behind its front a face reaches, in widths of the box, by how far below the centre: the
 # ears at the top, the jaw, then the chin, behind which neck and chest begin.
 _BELOW = np.array([0.20, 0.35, 0.50, 0.60, 0.70, 0.75, 0.80])
