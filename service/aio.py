@@ -145,14 +145,14 @@ class AsyncClient:
 
     async def _do(self, step: Step, ear: Ear | None) -> Packet | None:
         if isinstance(step, Ask):
-            return await self._ask(step.message, step.timeout)
+            return await self._ask(step.message, step.timeout, ear)
         if ear is None:
             raise TypeError("there is no subscription to hear")
         await self._wait(ear, step.timeout)
         return ear.receive()
 
-    async def _ask(self, message: Request, timeout: float) -> Packet:
-        """Send until answered."""
+    async def _ask(self, message: Request, timeout: float, ear: Ear | None = None) -> Packet:
+        """Send until answered, or until it is known that the hub lets us in no more."""
         self._check_open()
         parts = encode(Packet(message))
         answer = self._waiting[message.request] = asyncio.get_running_loop().create_future()
@@ -160,6 +160,8 @@ class AsyncClient:
         try:
             while (left := until - time.monotonic()) > 0:
                 self._knock.check()
+                if ear:  # a key revoked meanwhile is cut off there, and not answered here
+                    ear.knock.check()
                 wait = self._resend_s if send_parts(self._socket, parts) else UNCONNECTED_S
                 self._watch()
                 await asyncio.wait([answer], timeout=min(left, wait))

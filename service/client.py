@@ -208,7 +208,7 @@ class Client:
 
     def _do(self, step: Step, ear: Ear | None) -> Packet | None:
         if isinstance(step, Ask):
-            return self._ask(step.message, step.timeout)
+            return self._ask(step.message, step.timeout, ear)
         if ear is None:
             raise TypeError("there is no subscription to hear")
         self._wait(ear, step.timeout)
@@ -222,14 +222,16 @@ class Client:
             if time.monotonic() >= until:
                 raise ClientTimeoutError("nothing was published in the time allowed")
 
-    def _ask(self, message: messages.Request, timeout: float) -> Packet:
-        """Send until answered."""
+    def _ask(self, message: messages.Request, timeout: float, ear: Ear | None = None) -> Packet:
+        """Send until answered, or until it is known that the hub lets us in no more."""
         if self._context.closed:
             raise ClientClosedError(f"{self.address}: the client was closed")
         parts = encode(Packet(message))
         until = time.monotonic() + timeout
         while (left := until - time.monotonic()) > 0:
             self._knock.check()
+            if ear:  # a key revoked meanwhile is cut off there, and not answered here
+                ear.knock.check()
             wait = self._resend_s if send_parts(self._socket, parts) else UNCONNECTED_S
             answer = self._answer(message.request, min(left, wait))
             if answer is None:

@@ -1,0 +1,80 @@
+"""The asyncio client through a guarded door: let in, told why not, and cut off while it follows."""
+
+import asyncio
+from contextlib import aclosing
+
+import numpy as np
+import pytest
+
+from service.aio import AsyncClient
+from service.errors import KeyRefusedError, RequestFailedError
+from service.keyring import Role, revoke
+from tests.system.guarded import guarded_hub, press_through
+from tests.unit.service.faces import small_face
+
+
+@pytest.fixture(scope="module")
+def hub(tmp_path_factory):
+    with guarded_hub(tmp_path_factory.mktemp("hub")) as hub:
+        yield hub
+
+
+def _client(hub, name):
+    return AsyncClient(hub.address, key=hub.secret(name), hub_key=hub.hub_key)
+
+
+def _run(main):
+    return asyncio.run(asyncio.wait_for(main, 100))
+
+
+def test_a_subscriber_follows_what_is_published(hub):
+    async def main():
+        async with _client(hub, "subscriber") as client:
+            after = (await client.status(timeout=20)).sequence
+            async with aclosing(client.published(after=after, timeout=30)) as published:
+                pressing = asyncio.create_task(asyncio.to_thread(press_through, hub, "awaited"))
+                outcome = await anext(published)
+                await pressing
+            assert outcome.capture_id == "awaited"
+            np.testing.assert_array_equal(outcome.face.dense.points, small_face().dense.points)
+            assert len((await client.get("awaited", timeout=20)).dense) == len(outcome.face.dense)
+
+    _run(main())
+
+
+def test_the_wrong_role_is_told_so(hub):
+    async def main():
+        async with _client(hub, "subscriber") as client:
+            with pytest.raises(RequestFailedError, match="press needs the role presser"):
+                await client.press("never", timeout=20)
+        async with _client(hub, "presser") as client, aclosing(client.previews()) as previews:
+            with pytest.raises(KeyRefusedError, match="not allowed there for this"):
+                await anext(previews)
+
+    _run(main())
+
+
+def test_a_key_that_is_not_allowed_is_told_so(hub):
+    hub.new_key("aio-stranger")
+
+    async def main():
+        async with _client(hub, "aio-stranger") as client:
+            with pytest.raises(KeyRefusedError, match="not allowed"):
+                await client.status(timeout=20)
+
+    _run(main())
+
+
+def test_a_key_revoked_while_it_follows_ends_the_iteration(hub):
+    hub.new_key("aio-former", Role.SUBSCRIBER)
+
+    async def main():
+        async with _client(hub, "aio-former") as client, aclosing(
+                client.published(timeout=60)) as published:
+            following = asyncio.create_task(anext(published))
+            assert (await client.status(timeout=20)).epoch
+            revoke(hub.keys, "aio-former")
+            with pytest.raises(KeyRefusedError, match="revoked"):
+                await following
+
+    _run(main())
