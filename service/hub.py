@@ -233,6 +233,8 @@ class Hub:
         known = self._roster.workers.get(peer)
         if known is None:
             self._log.info("worker ready", name=name)
+        elif credit == known.foreseen:
+            known.foreseen = None
         elif credit <= known.credit:
             self._refusals.note("replayed", name=name, detail=f"credit {credit}")
         worker = self._roster.worker_ready(peer, name, credit, now)

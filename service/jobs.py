@@ -127,8 +127,7 @@ class Jobs:
         worker = self._roster.workers.get(peer)
         if (worker and worker.job == answer.capture_id
                 and self._of_use(answer, CaptureEvent.RESULT)):
-            worker.job, worker.free = None, True
-            worker.credit += 1
+            self._roster.answered(worker)
             yield from self.dispatch(now)
 
     def result(

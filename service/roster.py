@@ -28,7 +28,9 @@ class Worker:
     seen: float
     """When it was last known to be alive and, where it has a job, to hold it; seconds."""
     credit: int = -1
-    """The last `WorkerReady.credit` heard."""
+    """The last `WorkerReady.credit` heard, or foreseen."""
+    foreseen: int | None = None
+    """The credit that an answer implied; to hear it once is no replay."""
     free: bool = False
     job: str | None = None
     """The capture that it was given."""
@@ -58,6 +60,12 @@ class Roster:
         if credit > worker.credit:
             worker.credit, worker.free, worker.seen = credit, True, now
         return worker
+
+    def answered(self, worker: Worker) -> None:
+        """Note that a worker is free by its answer, before it says so."""
+        worker.job, worker.free = None, True
+        worker.credit += 1
+        worker.foreseen = worker.credit
 
     def heartbeat(self, peer: bytes, holding: str | None, now: float) -> bool:
         """Note a sign of life; False where the hub cannot do with it what it might.

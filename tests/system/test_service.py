@@ -77,6 +77,7 @@ def test_subscribers_get_every_face_in_order(running, tmp_path):
         assert [outcome.capture_id for outcome in found] == pressed
         assert all(isinstance(outcome, PublishedFace) for outcome in found)
         assert [b.sequence - a.sequence for a, b in itertools.pairwise(found)] == [1, 1]
+        assert client.status().refused == {}  # nothing in an ordinary day looks like an attack
         missed = client.published(after=found[0].sequence, timeout=10)
         assert [next(missed).capture_id, next(missed).capture_id] == pressed[1:]
     saved = running.run("subscribe", "--save", tmp_path, "--count", "1", "--after",

@@ -36,6 +36,19 @@ def test_the_next_frame_goes_out_while_the_answer_is_not_yet_kept(bench):
     assert bench.store.find("b").attempts == 1
 
 
+def test_what_it_then_says_of_itself_is_a_replay_only_the_second_time(bench):
+    bench.accepted("a", "b")
+    bench.worker()
+    for credit, capture_id in enumerate(("a", "b"), start=1):
+        packet = answer(bench, capture_id)
+        bench.hub.next_job(bench.now, WORKER, packet)
+        bench._sent(bench.hub.receive(bench.now, WORKER, packet))
+        bench.worker(credit=credit)
+    assert bench.hub._refusals.counts() == {}
+    bench.worker(credit=2)
+    assert bench.hub._refusals.counts() == {"replayed": 1}
+
+
 def test_with_nothing_to_do_it_is_free_until_the_next_press(bench):
     bench.accepted("a")
     bench.worker()
