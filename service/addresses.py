@@ -6,9 +6,9 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from service.errors import AddressError, HubRunningError
-from service.settings import private_folder
+from service.settings import private_folder, runtime_folder
 
-__all__ = ["check_bindable", "is_local", "publications_of", "socket_file"]
+__all__ = ["check_bindable", "check_connectable", "is_local", "publications_of", "socket_file"]
 
 _MAX_SOCKET_PATH = 107 - len(".publications")
 _PUBLICATIONS = ".publications"
@@ -83,6 +83,24 @@ def check_bindable(address: str) -> None:
         except OSError:
             return
     raise HubRunningError(f"{address}: another hub is listening there")
+
+
+def check_connectable(address: str) -> None:
+    """Refuse a malformed address, and a default one where somebody else might be the hub.
+
+    The folder of the default address is made if it is not there: in a temporary folder anyone
+    could make it meanwhile, and be sent faces.
+
+    Raises
+    ------
+    AddressError
+        As `socket_file`.
+    SettingsError
+        Where the folder is not this user's.
+    """
+    path = socket_file(address)
+    if path and path.parent == runtime_folder():
+        private_folder(path.parent)
 
 
 def _host_and_port(address: str) -> tuple[str, int]:

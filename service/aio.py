@@ -17,7 +17,7 @@ from typing import Self, TypeVar
 import zmq
 
 from recon.face import Face
-from service.addresses import publications_of
+from service.addresses import check_connectable, publications_of
 from service.credentials import Credentials, connect
 from service.ears import LOOK_S, Ear
 from service.errors import ClientClosedError, ClientTimeoutError, ProtocolError
@@ -48,6 +48,7 @@ class AsyncClient:
         settings = ServiceSettings.of(os.environ, address=address, key=key, hub_key=hub_key)
         self.address = settings.address
         self._resend_s = settings.resend_s
+        check_connectable(self.address)
         self._publications = publications_of(self.address)
         self._keys = Credentials.of(settings)
         self._talks = Talks(settings.resend_s)

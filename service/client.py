@@ -18,7 +18,7 @@ import zmq
 
 from recon.face import Face
 from service import messages
-from service.addresses import publications_of
+from service.addresses import check_connectable, publications_of
 from service.credentials import Credentials, connect
 from service.ears import LOOK_S, Ear
 from service.errors import ClientClosedError, ClientTimeoutError, ProtocolError
@@ -56,7 +56,8 @@ class Client:
     Raises
     ------
     SettingsError
-        Where the address is malformed or a key file cannot be used.
+        Where the address is malformed, the folder of the default one is someone else's, or a key
+        file cannot be used.
     """
 
     def __init__(
@@ -65,6 +66,7 @@ class Client:
         settings = ServiceSettings.of(os.environ, address=address, key=key, hub_key=hub_key)
         self.address = settings.address
         self._resend_s = settings.resend_s
+        check_connectable(self.address)
         self._publications = publications_of(self.address)
         self._keys = Credentials.of(settings)
         self._talks = Talks(settings.resend_s)

@@ -9,6 +9,7 @@ from typing import Any, Self
 import structlog
 import zmq
 
+from service.addresses import check_connectable
 from service.background import Background
 from service.credentials import Credentials, connect
 from service.errors import ProtocolError
@@ -29,11 +30,13 @@ class HubLink:
     """Sends heartbeats by itself while `packets` waits."""
 
     def __init__(self, settings: ServiceSettings, name: str) -> None:
+        check_connectable(settings.address)
+        keys = Credentials.of(settings)
         self._heartbeat_s = settings.heartbeat_s
         self._log = structlog.get_logger(name)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._socket, self._knock = connect(
-            self._context, zmq.DEALER, settings.address, Credentials.of(settings))
+            self._context, zmq.DEALER, settings.address, keys)
         self._denied = ""
 
     def __enter__(self) -> Self:

@@ -30,7 +30,7 @@ _Seconds = Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
 def runtime_folder() -> Path:
     """Give this user's socket folder: `$XDG_RUNTIME_DIR/denseface`, else a temporary one.
 
-    It is created by `private_folder` when the hub binds, not here.
+    It is created by `private_folder` when the hub binds or someone connects, not here.
     """
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     if runtime and Path(runtime).is_dir():

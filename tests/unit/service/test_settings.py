@@ -5,8 +5,10 @@ import socket
 import pytest
 
 from service.addresses import check_bindable, is_local, publications_of, socket_file
+from service.aio import AsyncClient
+from service.client import Client
 from service.errors import AddressError, HubRunningError, SettingsError
-from service.settings import ServiceSettings, private_folder
+from service.settings import ServiceSettings, default_address, private_folder
 
 
 def test_a_flag_wins_over_the_environment_and_that_over_the_default(tmp_path):
@@ -69,3 +71,15 @@ def test_a_private_folder_is_private(tmp_path):
     (tmp_path / "link").symlink_to(folder)
     with pytest.raises(SettingsError, match="must be a folder"):
         private_folder(tmp_path / "link")
+
+
+def test_nobody_connects_by_a_default_folder_that_another_may_have_made(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "denseface").symlink_to(tmp_path / "elsewhere")
+    for connect in (Client, lambda: AsyncClient(default_address())):
+        with pytest.raises(SettingsError, match="must be a folder of user"):
+            connect()
+    (tmp_path / "denseface").unlink()
+    with Client(), Client(f"ipc://{tmp_path}/elsewhere/hub"):
+        assert (tmp_path / "denseface").stat().st_mode & 0o777 == 0o700
