@@ -5,37 +5,96 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["connect", "cut_depth", "large_parts", "within_reach"]
+__all__ = ["connect", "cut_depth", "large_parts", "nearest_to", "row_medians", "within",
+           "within_reach"]
 
 _EMPTY, _HIDDEN, _WANTED, _FOUND, _BLOCKED = 0, 1, 2, 3, 4
 
 
 @compiled
 def within_reach(
-    valid: NDArray[np.bool_],
-    across: NDArray[np.float32],
-    down: NDArray[np.float32],
+    valid: NDArray[np.bool_], pixels: NDArray[np.float32], middle: tuple[float, float],
     reach: NDArray[np.float32],
 ) -> NDArray[np.bool_]:
-    """Say which valid pixels lie in a superellipse of power 2.5 about the origin.
+    """Say which valid pixels are seen in a superellipse of power 2.5 about a place.
 
     That is between an ellipse (2) and the box itself: a head is round, and the corners of its box
     hold shoulders.
 
-    reach : (3,), sideward, upward, downward
+    pixels : (H, W, 2), where each is seen; middle : that place, (u, v)
+    reach : (3,), sideward, upward, downward, pixels
     """
     rows, columns = valid.shape
+    u, v = np.float32(middle[0]), np.float32(middle[1])
     inside = np.zeros((rows, columns), np.bool_)
     for row in range(rows):
         for column in range(columns):
             if valid[row, column]:
-                a = abs(across[row, column]) / reach[0]
-                d = down[row, column]
+                a = abs(pixels[row, column, 0] - u) / reach[0]
+                d = pixels[row, column, 1] - v
                 b = -d / reach[1] if d < 0 else d / reach[2]
                 if a >= 1 or b >= 1:
                     continue
                 inside[row, column] = a * a * np.sqrt(a) + b * b * np.sqrt(b) < 1
     return inside
+
+
+@compiled
+def within(
+    among: NDArray[np.bool_], pixels: NDArray[np.float32], middle: tuple[float, float],
+    reach: float,
+) -> NDArray[np.bool_]:
+    """Say which pixels of some are seen in a square about a place, to `reach` pixels each way."""
+    rows, columns = among.shape
+    u, v, most = np.float32(middle[0]), np.float32(middle[1]), np.float32(reach)
+    inside = np.zeros((rows, columns), np.bool_)
+    for row in range(rows):
+        for column in range(columns):
+            if among[row, column]:
+                inside[row, column] = (abs(pixels[row, column, 0] - u) < most
+                                       and abs(pixels[row, column, 1] - v) < most)
+    return inside
+
+
+@compiled
+def nearest_to(
+    among: NDArray[np.bool_], visible: NDArray[np.bool_], pixels: NDArray[np.float32],
+    middle: tuple[float, float],
+) -> tuple[int, int]:
+    """Find the visible pixel of some that is seen nearest to a place; (-1, -1) where none is."""
+    u, v = np.float32(middle[0]), np.float32(middle[1])
+    least, found = np.float32(1e30), (-1, -1)
+    for row in range(among.shape[0]):
+        for column in range(among.shape[1]):
+            if among[row, column] and visible[row, column]:
+                a, b = pixels[row, column, 0] - u, pixels[row, column, 1] - v
+                away = a * a + b * b
+                if away < least:
+                    least, found = away, (row, column)
+    return found
+
+
+@compiled
+def row_medians(
+    z: NDArray[np.float32], among: NDArray[np.bool_], every: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Give every so many of the rows that hold some, and the median of their z there."""
+    rows, columns = among.shape
+    at, medians = np.empty(rows, np.int64), np.empty(rows, np.float64)
+    held = np.empty(columns, np.float32)
+    seen = taken = 0
+    for row in range(rows):
+        count = 0
+        for column in range(columns):
+            if among[row, column]:
+                held[count] = z[row, column]
+                count += 1
+        if count:
+            if seen % every == 0:
+                at[taken], medians[taken] = row, np.median(held[:count])
+                taken += 1
+            seen += 1
+    return at[:taken], medians[:taken]
 
 
 @compiled
@@ -154,24 +213,24 @@ def large_parts(image: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
 def cut_depth(
     face: NDArray[np.bool_],
     z: NDArray[np.float32],
-    down: NDArray[np.float32],
+    pixels: NDArray[np.float32],
     front: float,
     below: NDArray[np.float64],
     behind: NDArray[np.float64],
 ) -> None:
-    """Drop from `face` what lies deeper than front + a line through (below, behind), by `down`."""
+    """Drop from `face` what lies deeper than front + a line through (below, behind), by its v."""
     for row in range(face.shape[0]):
         for column in range(face.shape[1]):
             if face[row, column]:
-                d = down[row, column]
+                v = pixels[row, column, 1]
                 k = 0
-                while k < len(below) and d >= below[k]:
+                while k < len(below) and v >= below[k]:
                     k += 1
                 if k == 0:
                     most = behind[0]
                 elif k == len(below):
                     most = behind[-1]
                 else:
-                    share = (d - below[k - 1]) / (below[k] - below[k - 1])
+                    share = (v - below[k - 1]) / (below[k] - below[k - 1])
                     most = behind[k - 1] + share * (behind[k] - behind[k - 1])
                 face[row, column] = z[row, column] < front + most

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from recon._compiled import compiled
+
 __all__ = ["Cluster", "split_depths"]
 
 # The best cuts are sought among so many places, then moved to the millimetre.
@@ -39,14 +41,15 @@ def split_depths(z: NDArray[np.floating]) -> list[Cluster]:
     whole = np.rint(z).astype(np.int64)
     start = int(whole.min())
     counts = np.bincount(whole - start)
-    depth = np.arange(len(counts))
+    depth = np.arange(float(len(counts)))
     # The sums over the bins before each.
     sums = np.zeros((3, len(counts) + 1))
     weighted = counts.astype(np.float64)
     for power in range(3):
         np.cumsum(weighted, out=sums[power, 1:])
         weighted *= depth
-    cuts = _refined(_best_cuts(sums), sums)
+    places = np.unique(np.linspace(0, len(counts), _PLACES).astype(np.int64))
+    cuts = _refined(*_best_cuts(sums, places), sums)
     clusters = []
     for first, end in zip((0, *cuts), (*cuts, len(counts)), strict=True):
         before, up_to = sums[0][first], sums[0][end]
@@ -58,35 +61,41 @@ def split_depths(z: NDArray[np.floating]) -> list[Cluster]:
     return clusters
 
 
-def _best_cuts(sums: NDArray[np.float64]) -> tuple[int, int]:
+@compiled
+def _best_cuts(sums: NDArray[np.float64], at: NDArray[np.int64]) -> tuple[int, int]:
     """Try every pair of some places, (first of the second cluster, first of the third)."""
-    at = np.unique(np.linspace(0, sums.shape[1] - 1, _PLACES).astype(np.int64))
-    n, s, q = sums[:, at]
-    spread = _spread(n[None, :] - n[:, None], s[None, :] - s[:, None], q[None, :] - q[:, None])
-    total = spread[0, :, None] + spread + spread[None, :, -1]
-    total[np.tril_indices(len(at), -1)] = np.inf
-    first, second = np.unravel_index(np.argmin(total), total.shape)
-    return int(at[first]), int(at[second])
+    least, best = 1e300, (at[0], at[0])
+    for first in at:
+        for second in at:
+            if second >= first:
+                total = (_spread(sums, 0, first) + _spread(sums, first, second)
+                         + _spread(sums, second, sums.shape[1] - 1))
+                if total < least:
+                    least, best = total, (first, second)
+    return best
 
 
-def _spread(
-    count: NDArray[np.float64], total: NDArray[np.float64], squares: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Sum of squared distances from the mean."""
-    return squares - total**2 / np.maximum(count, 1)
+@compiled
+def _spread(sums: NDArray[np.float64], first: int, end: int) -> float:
+    """Sum of the bins' squared distances from their mean."""
+    total = sums[1, end] - sums[1, first]
+    return float(sums[2, end] - sums[2, first]
+                 - total * total / max(sums[0, end] - sums[0, first], 1.0))
 
 
-def _refined(cuts: tuple[int, int], sums: NDArray[np.float64]) -> tuple[int, int]:
+@compiled
+def _refined(second: int, third: int, sums: NDArray[np.float64]) -> tuple[int, int]:
     """Lloyd's rounds: each cut goes to the middle between the means on its sides."""
     end = sums.shape[1] - 1
     for _ in range(_ROUNDS):
-        edges = [0, *cuts, end]
-        n, s = sums[0][edges], sums[1][edges]
-        if not np.diff(n).all():
-            break
-        means = np.diff(s) / np.diff(n)
+        means = np.empty(3)
+        for k, (begin, stop) in enumerate(((0, second), (second, third), (third, end))):
+            count = sums[0, stop] - sums[0, begin]
+            if count == 0:
+                return second, third
+            means[k] = (sums[1, stop] - sums[1, begin]) / count
         moved = (int(np.ceil((means[0] + means[1]) / 2)), int(np.ceil((means[1] + means[2]) / 2)))
-        if moved == cuts:
+        if moved == (second, third):
             break
-        cuts = moved
-    return cuts
+        second, third = moved
+    return second, third

@@ -4,14 +4,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._image_kernels import blur, divide, fill, halve, scatter
+from recon._color_kernels import means, planes, scatter
 
-__all__ = ["average_neighbors"]
+__all__ = ["average_missing", "average_neighbors"]
 
 _LEAST_WEIGHT = 0.05
 # The blur's, in units of its radius.
 _REACH = 4
-_SMALLEST = 4
 
 
 def average_neighbors(
@@ -42,23 +41,25 @@ def average_neighbors(
     """
     if not len(colors):
         raise ValueError("colors must not be empty")
-    # Channel 3 counts the colours: a mean is sum over count, blurred alike.
     sums = scatter(colors, np.ascontiguousarray(places, np.float32), *wanted.shape)
-    mean = _mean(sums, wanted, radius, _LEAST_WEIGHT / spacing**2)
-    return np.asarray(cv2.convertScaleAbs(mean), np.uint8)  # rounds
+    return means(sums, wanted, _taps(radius), _LEAST_WEIGHT / spacing**2)
 
 
-def _mean(
-    sums: NDArray[np.float32], wanted: NDArray[np.bool_], radius: float, least: float
-) -> NDArray[np.float32]:
-    """Blur; where there is too little near, ask the same of the image at half its size."""
-    reach = round(_REACH * radius)
-    taps = np.asarray(cv2.getGaussianKernel(2 * reach + 1, radius, cv2.CV_32F), np.float32)
-    blurred = blur(sums, taps.ravel())
-    smallest = max(wanted.shape) <= _SMALLEST
-    mean, missing = divide(blurred, wanted, 0.0 if smallest else least)
-    if missing.any() and not smallest:
-        half, below = halve(blurred, missing)
-        coarse = _mean(half, cv2.dilate(below, np.ones((5, 5), np.uint8)) > 0, radius, least)
-        fill(mean, missing, coarse)
-    return mean
+def average_missing(
+    image: NDArray[np.uint8], known: NDArray[np.bool_], missing: NDArray[np.bool_]
+) -> None:
+    """Fill an image's missing colours with the mean of the known ones around them.
+
+    Parameters
+    ----------
+    image : (rows, columns, 3) uint8, RGB; changed where `missing`
+    known, missing : (rows, columns) bool; at least one is known
+    """
+    if missing.any():
+        mean = means(planes(image, known), missing, _taps(1.0), _LEAST_WEIGHT)
+        np.copyto(image, mean, where=missing[..., None])
+
+
+def _taps(radius: float) -> NDArray[np.float32]:
+    size = 2 * round(_REACH * radius) + 1
+    return np.asarray(cv2.getGaussianKernel(size, radius, cv2.CV_32F), np.float32).ravel()

@@ -4,8 +4,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._image_kernels import box_sums
-from recon.colors import average_neighbors
+from recon._seed_color_kernels import box_sums, take_out
+from recon.colors import average_missing
+from recon.masks import at_pixels
 from recon.registration import Registration
 
 __all__ = ["seed_colors"]
@@ -51,7 +52,7 @@ def seed_colors(
     solid : (H, W) uint8, 0 or 1, the same with its holes filled: holes have no outline
     """
     if not face.any():
-        return registered.colors[face]
+        return at_pixels(registered.colors, face)
     window = _window(face)
     face, solid = face[window], solid[window]
     colors = registered.colors[window].copy()
@@ -59,21 +60,17 @@ def seed_colors(
     inner = seen & (cv2.erode(solid, _RIM) > 0)
     inner = inner if inner.any() else seen
     if not inner.any():
-        return colors[face]
+        return at_pixels(colors, face)
     deep = inner & (cv2.erode(solid, _FRAYED) > 0)
     deep = deep if deep.any() else inner
     behind = _behind(registered, window, face, solid)
     own = inner.copy()
     edge = seen & ~deep
-    near, some = _local_mean(colors, deep, edge, _INSIDE)
-    far, any_behind = _local_mean(colors, behind, edge, _BESIDE)
-    told = some & any_behind
-    edge[edge] = told
-    if edge.any():
-        colors[edge], own[edge] = _without(colors[edge], near[told], far[told], ~inner[edge])
-    lost = face & ~own
-    colors[lost] = average_neighbors(colors[own], np.argwhere(own), lost, 1, 1)[lost]
-    return colors[face]
+    take_out(colors, own, edge, box_sums(colors, deep, edge, _INSIDE // 2),
+             box_sums(colors, behind, edge, _BESIDE // 2), _ALIKE, _SHARE, _ASIDE, _ASIDE_LEAST,
+             _CONTRAST)
+    average_missing(colors, own, face & ~own)
+    return at_pixels(colors, face)
 
 
 def _window(face: NDArray[np.bool_]) -> tuple[slice, slice]:
@@ -92,30 +89,3 @@ def _behind(
     behind: NDArray[np.bool_] = (
         registered.visible[window] & (solid == 0) & (z > farthest + np.float32(_BEHIND_MM)))
     return behind
-
-
-def _local_mean(
-    colors: NDArray[np.uint8], among: NDArray[np.bool_], wanted: NDArray[np.bool_], width: int
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """The mean colour of the pixels `among` those near each wanted one, (n, 3), if any, (n,)."""
-    total = box_sums(colors, among, wanted, width // 2).astype(np.float32)
-    count = total[:, 3:]
-    return np.asarray(total[:, :3] / np.maximum(count, 1), np.float32), count[:, 0] > 0
-
-
-def _without(
-    colors: NDArray[np.uint8], near: NDArray[np.float32], far: NDArray[np.float32],
-    rim: NDArray[np.bool_],
-) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
-    """Take out of the `rim`'s colours, (n, 3), what of `far` is in them besides `near`.
-
-    Also says of which colours something of the face's own is left.
-    """
-    way, off = far - near, colors - near
-    length = np.maximum((way * way).sum(axis=1), np.float32(_ALIKE**2))
-    share = np.maximum((off * way).sum(axis=1) / length, np.float32(0))
-    aside = ((off - share[:, None] * way) ** 2).sum(axis=1)
-    share[aside > np.maximum(_ASIDE**2 * length, _ASIDE_LEAST**2)] = 0
-    own = (share < _SHARE) | (~rim & (length < _CONTRAST**2))
-    cleared = colors - (share * (rim & own))[:, None] * way
-    return np.clip(np.rint(cleared), 0, 255).astype(np.uint8), own

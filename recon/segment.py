@@ -10,7 +10,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._segment_kernels import connect, cut_depth, large_parts, within_reach
+from recon._percentile import percentile
+from recon._segment_kernels import (
+    connect,
+    cut_depth,
+    large_parts,
+    nearest_to,
+    row_medians,
+    within,
+    within_reach,
+)
 from recon.clusters import split_depths
 from recon.errors import FaceWithoutDepthError
 from recon.face import Box
@@ -148,8 +157,9 @@ def crop_to_box(registered: Registration, box: Box) -> NDArray[np.bool_]:
 
     Gives (H, W) bool.
     """
-    return within_reach(registered.valid, *_in_box(registered, box),
-                        np.array((_REACH_SIDE, _REACH_UP, _REACH_DOWN), np.float32))
+    reach = box[2] * np.array((_REACH_SIDE, _REACH_UP, _REACH_DOWN))
+    return within_reach(registered.valid, registered.pixels, _middle(box),
+                        reach.astype(np.float32))
 
 
 def cluster_depths(
@@ -184,17 +194,17 @@ def keep_face(
     cover = _frames_of_glasses(z, cluster, px)
     wanted = cluster & ~cover
     start = _nearest_pixel(registered, wanted, box)
-    across, down = _in_box(registered, box)
-    upright = _upright(z, wanted & (np.abs(across) < _SLANT_PART) & (np.abs(down) < _SLANT_PART))
+    middle, width = _middle(box), box[2]
+    upright = _upright(z, within(wanted, registered.pixels, middle, _SLANT_PART * width))
     face = _connected(upright, wanted, cover, start, px)
     hand = _before(z, registered.valid, face, px)
     if hand.any():
         cover |= hand
         face = _connected(upright, wanted, cover, start, px)
-    middle = face & (np.abs(across) < _FRONT_PART) & (np.abs(down) < _FRONT_PART)
-    front = float(np.percentile(z[middle if middle.any() else face], 2))
-    box_mm = box[2] * front / focal_px
-    cut_depth(face, z, down, front, _BELOW,
+    inner = z[within(face, registered.pixels, middle, _FRONT_PART * width)]
+    front = percentile(inner if len(inner) else z[face], 2)
+    box_mm = width * front / focal_px
+    cut_depth(face, z, registered.pixels, front, middle[1] + width * _BELOW,
               min(max(box_mm, _NARROWEST_MM), _BROADEST_MM) * _BEHIND)
     return face & _smooth_outline(
         face | cover, registered.valid & ~face, start, _EAR * box_mm * px, px)
@@ -202,12 +212,11 @@ def keep_face(
 
 def _upright(z: NDArray[np.float32], middle: NDArray[np.bool_]) -> NDArray[np.float32]:
     """The depths without the slant of a face that is lifted or lowered; 0 stays 0."""
-    rows = np.flatnonzero(middle.any(axis=1))[::_SLANT_ROWS]
+    rows, medians = row_medians(z, middle, _SLANT_ROWS)
     if len(rows) < 2:
         return z
     # Of the rows' medians, the median slope between their upper and their lower half: a hand
     # before the chin does not tilt it.
-    medians = np.array([np.median(z[row][middle[row]]) for row in rows])
     half = len(rows) // 2
     slant = np.median((medians[half:2 * half] - medians[:half])
                       / (rows[half:2 * half] - rows[:half]))
@@ -237,7 +246,7 @@ def _before(
     z: NDArray[np.float32], valid: NDArray[np.bool_], face: NDArray[np.bool_], px: float
 ) -> NDArray[np.bool_]:
     """A hand, or what else stands before the face, and its shadow in which nothing is measured."""
-    nearer = (valid & ~face & (z < np.median(z[face]))).view(np.uint8)
+    nearer = (valid & ~face & (z < percentile(z[face], 50))).view(np.uint8)
     side = 2 * round(_FINGER_MM * px / 2) + 1
     hand = cv2.morphologyEx(nearer, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
     side = 2 * round(_SHADOW_MM * px) + 1
@@ -245,25 +254,19 @@ def _before(
     return around & ~face & ((hand > 0) | ~valid)
 
 
-def _in_box(
-    registered: Registration, box: Box
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Where each depth pixel is seen from the box's centre, rightward and down, in box widths."""
+def _middle(box: Box) -> tuple[float, float]:
     x, y, width, height = box
-    return ((registered.pixels[..., 0] - np.float32(x + width / 2)) / np.float32(width),
-            (registered.pixels[..., 1] - np.float32(y + height / 2)) / np.float32(width))
+    return x + width / 2, y + height / 2
 
 
 def _nearest_pixel(
     registered: Registration, among: NDArray[np.bool_], box: Box
 ) -> tuple[int, int]:
     """The depth pixel of `among` that is seen nearest the middle of the box."""
-    seen = among & registered.visible
-    if not seen.any():
+    row, column = nearest_to(among, registered.visible, registered.pixels, _middle(box))
+    if row < 0:
         raise FaceWithoutDepthError("no depth was measured where the colour camera sees the face")
-    across, down = _in_box(registered, box)
-    nearest = int(np.argmin(np.where(seen, across * across + down * down, np.float32(np.inf))))
-    return nearest // seen.shape[1], nearest % seen.shape[1]
+    return row, column
 
 
 def _smooth_outline(

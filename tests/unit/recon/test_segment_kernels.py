@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from recon._segment_kernels import connect, within_reach
+from recon._segment_kernels import connect, nearest_to, row_medians, within, within_reach
 
 STEP, RISE, GAP, COVERED = 12.0, 25.0, 5, 12
 
@@ -42,10 +42,47 @@ def test_what_is_not_wanted_is_not_followed():
     assert found.tolist() == [[True, True, False, False, False]]
 
 
+def seen_at(count):
+    """Where the pixels of a square image are seen: 3 apart, from (-10, 40)."""
+    row, column = np.mgrid[:count, :count]
+    return np.dstack([3 * column - 10, 3 * row + 40]).astype(np.float32)
+
+
 def test_the_reach_is_a_superellipse():
-    down, across = np.mgrid[-1:1:81j, -1:1:81j].astype(np.float32)
-    inside = within_reach(across < 0.5, across, down, np.array((0.7, 0.5, 0.9), np.float32))
-    reach = np.where(down < 0, 0.5, 0.9)
-    expected = np.abs(across / 0.7) ** 2.5 + np.abs(down / reach) ** 2.5
+    pixels = seen_at(81)
+    (u, v), (side, up, down) = (100.0, 150.0), (75, 60, 100)
+    valid = pixels[..., 0] < 150
+    inside = within_reach(valid, pixels, (u, v), np.array((side, up, down), np.float32))
+    below = pixels[..., 1] - v
+    expected = (np.abs((pixels[..., 0] - u) / side) ** 2.5
+                + np.abs(below / np.where(below < 0, up, down)) ** 2.5)
     clear = np.abs(expected - 1) > 1e-3
-    np.testing.assert_array_equal(inside[clear], ((expected < 1) & (across < 0.5))[clear])
+    np.testing.assert_array_equal(inside[clear], ((expected < 1) & valid)[clear])
+
+
+def test_a_square_is_as_wide_as_it_is_high():
+    pixels = seen_at(40)
+    among = np.random.default_rng(0).random((40, 40)) < 0.7
+    expected = among & (np.abs(pixels - (51, 90)) < 25).all(axis=2)
+    assert expected.any()
+    np.testing.assert_array_equal(within(among, pixels, (51.0, 90.0), 25.0), expected)
+
+
+def test_the_nearest_is_one_that_is_seen():
+    pixels = seen_at(40)
+    rng = np.random.default_rng(1)
+    among, visible = rng.random((2, 40, 40)) < 0.3
+    away = np.where(among & visible, np.hypot(*(pixels - (51.3, 90.1)).transpose(2, 0, 1)), np.inf)
+    assert nearest_to(among, visible, pixels, (51.3, 90.1)) == divmod(int(away.argmin()), 40)
+    assert nearest_to(among, np.zeros_like(among), pixels, (51.3, 90.1)) == (-1, -1)
+
+
+def test_each_second_of_the_rows_that_hold_some_has_a_median():
+    rng = np.random.default_rng(2)
+    z = rng.normal(700, 20, (12, 9)).astype(np.float32)
+    among = rng.random((12, 9)) < 0.6
+    among[[0, 5]] = False
+    rows, medians = row_medians(z, among, 2)
+    held = np.flatnonzero(among.any(axis=1))[::2]
+    np.testing.assert_array_equal(rows, held)
+    np.testing.assert_allclose(medians, [np.median(z[row][among[row]]) for row in held])

@@ -1,0 +1,94 @@
+"""The loops over the colours along a face's outline, compiled."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recon._compiled import compiled
+
+__all__ = ["box_sums", "take_out"]
+
+
+@compiled
+def box_sums(
+    colors: NDArray[np.uint8], among: NDArray[np.bool_], wanted: NDArray[np.bool_], reach: int
+) -> NDArray[np.int32]:
+    """Sum the colours `among` those at most `reach` rows and columns from each wanted pixel.
+
+    Gives (n, 4), the fourth is their number; n wanted pixels, row by row.
+    """
+    rows, columns = among.shape
+    # Sums of all that is above and left: any box is then four of them.
+    total = np.zeros((rows + 1, columns + 1, 4), np.int32)
+    for row in range(rows):
+        line = np.zeros(4, np.int32)
+        for column in range(columns):
+            if among[row, column]:
+                for c in range(3):
+                    line[c] += colors[row, column, c]
+                line[3] += 1
+            for c in range(4):
+                total[row + 1, column + 1, c] = total[row, column + 1, c] + line[c]
+    out = np.empty((np.count_nonzero(wanted), 4), np.int32)
+    i = 0
+    for row in range(rows):
+        for column in range(columns):
+            if wanted[row, column]:
+                top, bottom = max(row - reach, 0), min(row + reach + 1, rows)
+                left, right = max(column - reach, 0), min(column + reach + 1, columns)
+                for c in range(4):
+                    out[i, c] = (total[bottom, right, c] - total[top, right, c]
+                                 - total[bottom, left, c] + total[top, left, c])
+                i += 1
+    return out
+
+
+@compiled
+def take_out(
+    colors: NDArray[np.uint8], own: NDArray[np.bool_], edge: NDArray[np.bool_],
+    near: NDArray[np.int32], far: NDArray[np.int32], alike: float, share: float, aside: float,
+    aside_least: float, contrast: float,
+) -> None:
+    """Take what of the colour behind is in the edge's colours out of them.
+
+    A colour c is taken for near + s (far - near), unless it lies aside of that line, by more than
+    `aside` of the line and than `aside_least`: then s is 0. With s below `share` it becomes the
+    face's own, and s (far - near) is taken out of it. One that was its own already keeps its
+    colour, and with a larger s it stays its own only where near and far differ by less than
+    `contrast`. Where nothing is near, or nothing far, a pixel stays as it is.
+
+    colors : (H, W, 3); own, edge : (H, W)
+    near, far : (n, 4), for each pixel of the edge the sums of the colours beside it on the face,
+        and behind it, and their number: `box_sums`
+    alike : two colours nearer than this are not told apart
+    """
+    i = -1
+    way, off = np.empty(3, np.float32), np.empty(3, np.float32)
+    for row in range(edge.shape[0]):
+        for column in range(edge.shape[1]):
+            if not edge[row, column]:
+                continue
+            i += 1
+            if near[i, 3] == 0 or far[i, 3] == 0:
+                continue
+            length = along = np.float32(0)
+            for c in range(3):
+                mean = np.float32(near[i, c]) / np.float32(near[i, 3])
+                way[c] = np.float32(far[i, c]) / np.float32(far[i, 3]) - mean
+                off[c] = np.float32(colors[row, column, c]) - mean
+                length += way[c] * way[c]
+                along += way[c] * off[c]
+            length = max(length, np.float32(alike * alike))
+            part = max(along / length, np.float32(0))
+            away = np.float32(0)
+            for c in range(3):
+                away += (off[c] - part * way[c]) ** 2
+            if away > max(np.float32(aside * aside) * length, np.float32(aside_least**2)):
+                part = np.float32(0)
+            inner = own[row, column]
+            own[row, column] = part < np.float32(share) or (
+                inner and length < np.float32(contrast * contrast))
+            if own[row, column] and not inner:
+                for c in range(3):
+                    cleared = np.float32(colors[row, column, c]) - part * way[c]
+                    colors[row, column, c] = np.uint8(
+                        min(max(cleared, np.float32(0)), np.float32(255)) + np.float32(0.5))
