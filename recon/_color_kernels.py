@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["blur", "divide", "fill", "halve", "means", "planes", "scatter", "widen"]
+__all__ = ["average", "blur", "divide", "fill", "halve", "planes", "scatter", "widen"]
 
 _SMALLEST = 4
 
@@ -58,10 +58,11 @@ def planes(image: NDArray[np.uint8], known: NDArray[np.bool_]) -> NDArray[np.flo
 
 
 @compiled
-def means(
+def average(
     sums: NDArray[np.float32], wanted: NDArray[np.bool_], taps: NDArray[np.float32], least: float,
-) -> NDArray[np.uint8]:
-    """Average where that is wanted, (rows, columns, 3), zero elsewhere.
+    image: NDArray[np.uint8],
+) -> None:
+    """Set the wanted pixels of an image, (rows, columns, 3), to the mean of the colours around.
 
     Sums are blurred; where what is counted is not more than `least`, the same is asked of the image
     at half its size, and so on.
@@ -69,23 +70,26 @@ def means(
     sums : (rows, columns, 4); taps : of the blur
     """
     found, lacking = [], []
+    asked = wanted
     while True:
         blurred = blur(sums, taps)
-        smallest = max(wanted.shape) <= _SMALLEST
-        mean, missing, count = divide(blurred, wanted, 0.0 if smallest else least)
+        smallest = max(asked.shape) <= _SMALLEST
+        mean, missing, count = divide(blurred, asked, 0.0 if smallest else least)
         found.append(mean)
         lacking.append(missing)
         if count == 0 or smallest:
             break
         sums, below = halve(blurred, missing)
-        wanted = widen(below, 2)
+        asked = widen(below, 2)
     for level in range(len(found) - 2, -1, -1):
         fill(found[level], lacking[level], found[level + 1])
-    rounded = np.empty(found[0].shape, np.uint8)
-    flat, given = rounded.ravel(), found[0].ravel()
-    for i in range(len(flat)):
-        flat[i] = np.uint8(np.int32(given[i] + np.float32(0.5)))
-    return rounded
+    mean = found[0]
+    for row in range(wanted.shape[0]):
+        for column in range(wanted.shape[1]):
+            if wanted[row, column]:
+                for c in range(3):
+                    image[row, column, c] = np.uint8(
+                        np.int32(mean[row, column, c] + np.float32(0.5)))
 
 
 @compiled

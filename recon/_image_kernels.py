@@ -1,11 +1,15 @@
-"""The loops over the dense grid, compiled."""
+"""The loops over the dense grid, compiled.
+
+What is known at fewer points is read between them along the rows first, once for each of its own
+rows, then from row to row.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["add_between", "collect"]
+__all__ = ["add_between", "collect", "farther"]
 
 
 @compiled
@@ -15,21 +19,53 @@ def add_between(
 ) -> None:
     """Add another image, bilinear, to one, (m, k).
 
-    rows, columns : (m,), (k,), places in `coarse`, inside it
+    rows, columns : (m,), (k,), places in `coarse`, inside it, rising
     """
-    last = coarse.shape[1] - 1
-    line = np.empty(last + 2, np.float32)
+    count = len(columns)
+    left, part = np.empty(count, np.uint32), np.empty(count, np.float32)
+    for j in range(count):
+        left[j] = min(int(columns[j]), coarse.shape[1] - 2)
+        part[j] = columns[j] - np.float32(left[j])
+    upper, lower = np.empty(count, np.float32), np.empty(count, np.float32)
+    known = -2
     for i in range(len(rows)):
-        above = int(rows[i])
-        below = min(above + 1, coarse.shape[0] - 1)
-        part = rows[i] - np.float32(above)
-        for j in range(last + 1):
-            line[j] = coarse[above, j] + part * (coarse[below, j] - coarse[above, j])
-        line[last + 1] = line[last]
+        above = min(int(rows[i]), coarse.shape[0] - 2)
+        if above == known + 1:
+            upper, lower = lower, upper
+        elif above != known:
+            _along(coarse[above], left, part, 1, upper)
+        if above != known:
+            _along(coarse[above + 1], left, part, 1, lower)
+            known = above
+        down = rows[i] - np.float32(above)
         own = image[i]
-        for j in range(len(columns)):
-            left = int(columns[j])
-            own[j] += line[left] + (columns[j] - np.float32(left)) * (line[left + 1] - line[left])
+        for j in range(count):
+            own[j] += upper[j] + down * (lower[j] - upper[j])
+
+
+@compiled
+def _along(
+    line: NDArray[np.float32], left: NDArray[np.uint32], part: NDArray[np.float32],
+    channels: int, out: NDArray[np.float32],
+) -> None:
+    """Read a row between its points; `left` and `part` of each value."""
+    right = np.uint32(channels)
+    for j in range(len(out)):
+        here = line[left[j]]
+        out[j] = here + part[j] * (line[left[j] + right] - here)
+
+
+@compiled
+def _steps(
+    every: int, channels: int, count: int
+) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+    """Give `_along`'s places for so many points, of which every so many are known."""
+    left, part = np.empty(channels * count, np.uint32), np.empty(channels * count, np.float32)
+    for j in range(count):
+        for c in range(channels):
+            left[channels * j + c] = channels * (j // every) + c
+            part[channels * j + c] = np.float32(j % every) / np.float32(every)
+    return left, part
 
 
 @compiled
@@ -42,40 +78,97 @@ def collect(
     slopes_y: NDArray[np.float32],
     colors: NDArray[np.uint8],
     every: int,
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8], NDArray[np.int32]]:
-    """Gather the grid's supported points, row by row: points, normals, colours, cells.
+    sigma: NDArray[np.float32],
+    each: int,
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8], NDArray[np.float32],
+           NDArray[np.int32]]:
+    """Gather the grid's supported points, row by row: points, normals, colours, sigma, cells.
 
-    colors : at every so many points each way, bilinear between; one more than covers the grid
+    colors, sigma : at every so many points each way, at each so many, bilinear between; both have
+        one more row and column than cover the grid
     """
+    rows, columns = support.shape
     n = np.count_nonzero(support)
     points, normals = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
     rgb, cells = np.empty((n, 3), np.uint8), np.empty((n, 2), np.int32)
-    line = np.empty(3 * colors.shape[1], np.float32)
-    whole = np.empty(3 * support.shape[1], np.float32)
+    error = np.empty(n, np.float32)
+    x = xs.astype(np.float32)
+    color_left, color_part = _steps(every, 3, columns)
+    sigma_left, sigma_part = _steps(each, 1, columns)
+    color_above, color_below = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
+    sigma_above, sigma_below = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    whole, lengths = np.empty(3 * columns, np.uint8), np.empty(columns, np.float32)
     i = 0
-    for row in range(support.shape[0]):
+    for row in range(rows):
         above = row // every
-        part = np.float32(row - above * every) / np.float32(every)
-        one, other = colors[above].ravel(), colors[above + 1].ravel()
-        for j in range(len(line)):
-            line[j] = np.float32(0.5) + one[j] + part * (np.float32(other[j]) - one[j])
-        for offset in range(every):
-            part = np.float32(offset) / np.float32(every)
-            for left in range((support.shape[1] - 1 - offset) // every + 1):
-                at = 3 * (left * every + offset)
-                for c in range(3):
-                    here = line[3 * left + c]
-                    whole[at + c] = here + part * (line[3 * left + 3 + c] - here)
-        for column in range(support.shape[1]):
-            if support[row, column]:
-                cells[i, 0], cells[i, 1] = row, column
-                points[i, 0], points[i, 1] = xs[column], ys[row]
-                points[i, 2] = heights[row, column]
-                dx, dy = slopes_x[row, column], slopes_y[row, column]
-                length = np.sqrt(dx * dx + dy * dy + np.float32(1))
-                normals[i, 0], normals[i, 1] = dx / length, dy / length
-                normals[i, 2] = np.float32(-1) / length
-                for c in range(3):
-                    rgb[i, c] = np.uint8(np.int32(whole[3 * column + c]))
-                i += 1
-    return points, normals, rgb, cells
+        if row % every == 0:
+            color_above, color_below = color_below, color_above
+            if row == 0:
+                _along(colors[0].ravel().astype(np.float32), color_left, color_part, 3,
+                       color_above)
+            _along(colors[above + 1].ravel().astype(np.float32), color_left, color_part, 3,
+                   color_below)
+        if row % each == 0:
+            sigma_above, sigma_below = sigma_below, sigma_above
+            if row == 0:
+                _along(sigma[0], sigma_left, sigma_part, 1, sigma_above)
+            _along(sigma[row // each + 1], sigma_left, sigma_part, 1, sigma_below)
+        on = support[row]
+        first, end = 0, columns
+        while first < columns and not on[first]:
+            first += 1
+        while end > first and not on[end - 1]:
+            end -= 1
+        down = np.float32(row % every) / np.float32(every)
+        upper, lower = color_above[3 * first:3 * end], color_below[3 * first:3 * end]
+        between = whole[3 * first:3 * end]
+        for j in range(len(between)):
+            between[j] = np.uint8(np.int32(
+                upper[j] + down * (lower[j] - upper[j]) + np.float32(0.5)))
+        down = np.float32(row % each) / np.float32(each)
+        # Slices, since an index that might be negative keeps a loop from being vectorised.
+        while first < end:
+            stop = first
+            while stop < end and on[stop]:
+                stop += 1
+            count = stop - first
+            flat = points[i:i + count].ravel()
+            across, z = x[first:stop], heights[row, first:stop]
+            for j in range(count):
+                flat[3 * j], flat[3 * j + 1], flat[3 * j + 2] = across[j], ys[row], z[j]
+            flat = normals[i:i + count].ravel()
+            dx, dy = slopes_x[row, first:stop], slopes_y[row, first:stop]
+            for j in range(count):
+                lengths[j] = 1 / np.sqrt(dx[j] * dx[j] + dy[j] * dy[j] + np.float32(1))
+            for j in range(count):
+                flat[3 * j], flat[3 * j + 1] = dx[j] * lengths[j], dy[j] * lengths[j]
+                flat[3 * j + 2] = -lengths[j]
+            taken, seen = rgb[i:i + count].ravel(), whole[3 * first:3 * stop]
+            for j in range(3 * count):
+                taken[j] = seen[j]
+            off, upper, lower = (
+                error[i:i + count], sigma_above[first:stop], sigma_below[first:stop])
+            for j in range(count):
+                off[j] = upper[j] + down * (lower[j] - upper[j])
+            place = cells[i:i + count].ravel()
+            for j in range(count):
+                place[2 * j], place[2 * j + 1] = row, first + j
+            i += count
+            first = stop
+            while first < end and not on[first]:
+                first += 1
+    return points, normals, rgb, error, cells
+
+
+@compiled
+def farther(
+    away: NDArray[np.float32], cells: NDArray[np.int32], limit: float
+) -> NDArray[np.int64]:
+    """Give the indices of the cells where an image of every second point is above a limit."""
+    out = np.empty(len(cells), np.int64)
+    count, most = 0, np.float32(limit)
+    for i in range(len(cells)):
+        if away[np.uint32(cells[i, 0]) >> 1, np.uint32(cells[i, 1]) >> 1] > most:
+            out[count] = i
+            count += 1
+    return out[:count].copy()

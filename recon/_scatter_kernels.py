@@ -5,10 +5,28 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["BILINEAR_VARIANCE", "read_between", "share_out"]
+__all__ = ["BILINEAR_VARIANCE", "mark", "read_between", "share_out"]
 
 BILINEAR_VARIANCE = 1 / 6
 """What bilinear weights blur by on average, squared pixels."""
+
+
+@compiled
+def mark(
+    points: NDArray[np.float32], origin: tuple[float, float], step: float, rows: int, columns: int
+) -> NDArray[np.uint8]:
+    """Set the pixel nearest to each point, (n, 3); gives (rows, columns), 0 or 1.
+
+    origin, step : where the first pixel's middle is, (x, y), and the distance of pixels, mm; no
+        point is farther than half of it outside of the image
+    """
+    image = np.zeros((rows, columns), np.uint8)
+    per_step = 1 / step
+    for i in range(len(points)):
+        row = np.uint32((points[i, 1] - origin[1]) * per_step + 0.5)
+        column = np.uint32((points[i, 0] - origin[0]) * per_step + 0.5)
+        image[row, column] = 1
+    return image
 
 
 @compiled
@@ -21,7 +39,8 @@ def share_out(
     columns, rows : (n,), places inside `image`, not on its last row or column
     """
     for i in range(len(values)):
-        left, above = int(columns[i]), int(rows[i])
+        # Unsigned: a number that might be negative costs a question at each look.
+        left, above = np.uint32(columns[i]), np.uint32(rows[i])
         right_part, lower_part = columns[i] - np.float32(left), rows[i] - np.float32(above)
         lower = values[i] * lower_part
         upper = values[i] - lower
@@ -38,10 +57,10 @@ def read_between(
     """Read an image at places, (n,), bilinear; places as of `share_out`."""
     out = np.empty(len(columns), np.float32)
     for i in range(len(columns)):
-        left, above = int(columns[i]), int(rows[i])
+        left, above = np.uint32(columns[i]), np.uint32(rows[i])
         right_part, lower_part = columns[i] - np.float32(left), rows[i] - np.float32(above)
-        upper = image[above, left] + right_part * (image[above, left + 1] - image[above, left])
-        lower = image[above + 1, left] + right_part * (
-            image[above + 1, left + 1] - image[above + 1, left])
+        one, two = image[above, left], image[above + 1, left]
+        upper = one + right_part * (image[above, left + 1] - one)
+        lower = two + right_part * (image[above + 1, left + 1] - two)
         out[i] = upper + lower_part * (lower - upper)
     return out

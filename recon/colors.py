@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._color_kernels import means, planes, scatter
+from recon._color_kernels import average, planes, scatter
 
 __all__ = ["average_missing", "average_neighbors"]
 
@@ -42,7 +42,9 @@ def average_neighbors(
     if not len(colors):
         raise ValueError("colors must not be empty")
     sums = scatter(colors, np.ascontiguousarray(places, np.float32), *wanted.shape)
-    return means(sums, wanted, _taps(radius), _LEAST_WEIGHT / spacing**2)
+    image = np.zeros((*wanted.shape, 3), np.uint8)
+    average(sums, wanted, _taps(radius), _LEAST_WEIGHT / spacing**2, image)
+    return image
 
 
 def average_missing(
@@ -56,8 +58,7 @@ def average_missing(
     known, missing : (rows, columns) bool; at least one is known
     """
     if missing.any():
-        mean = means(planes(image, known), missing, _taps(1.0), _LEAST_WEIGHT)
-        np.copyto(image, mean, where=missing[..., None])
+        average(planes(image, known), missing, _taps(1.0), _LEAST_WEIGHT, image)
 
 
 def _taps(radius: float) -> NDArray[np.float32]:

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._image_kernels import collect
-from recon._scatter_kernels import BILINEAR_VARIANCE
+from recon._image_kernels import collect, farther
+from recon._scatter_kernels import BILINEAR_VARIANCE, mark
 from recon.colors import average_neighbors
 from recon.detail import DetailedSurface
 from recon.face import DenseCloud
@@ -56,48 +56,54 @@ def densify(
     look_up : tells the colours of points in holes; None, and their border's colours fill them
     """
     # Filled holes add to the support: a coarse try tells how much, and the step follows.
-    _, _, support = support_on_grid(seeds.points, spacing, _COARSE * spacing)
-    area = np.count_nonzero(support) * (_COARSE * spacing) ** 2
+    area = surface.area if isinstance(surface, DetailedSurface) else _supported_area(
+        seeds.points, spacing)
     step = float(np.sqrt(area / (ratio * len(seeds.points))))
     xs, ys, support = support_on_grid(seeds.points, spacing, step)
+    origin = float(xs[0]), float(ys[0])
 
     heights, slopes_x, slopes_y = surface.sampled(xs, ys)
+    sources = sources_of_error(
+        seeds.points, support, heights, (slopes_x, slopes_y), origin, step, spacing)
+    sigma = np.asarray(cv2.copyMakeBorder(
+        standard_error(sources, share), 0, 1, 0, 1, cv2.BORDER_REPLICATE), np.float32)
     # Colours have no detail finer than the seeds: every so many points are enough.
     every = max(1, round(_COLOR_STEP * spacing / step))
-    colors = _colors(seeds, (xs[0], ys[0]), every * step, spacing, _coarser(support, every))
-    points, normals, colors, cells = collect(
-        support, xs, ys, heights, slopes_x, slopes_y, colors, every)
+    colors = _colors(seeds, origin, every * step, spacing, _coarser(support, every))
+    points, normals, colors, sigma, cells = collect(
+        support, xs, ys, heights, slopes_x, slopes_y, colors, every, sigma, sources.every)
     if look_up is not None:
-        hole = _far_from_seeds(
-            seeds, (xs[0], ys[0]), step, support, _HOLE * spacing)
-        if hole.any():
+        hole = _far_from_seeds(seeds, origin, step, cells, support.shape, _HOLE * spacing)
+        if len(hole):
             own, seen = look_up(points[hole])
-            colors[hole] = np.where(seen[:, None], own, colors[hole])
-    sources = sources_of_error(
-        seeds.points, support, heights, (slopes_x, slopes_y), (float(xs[0]), float(ys[0])), step,
-        spacing)
+            colors[hole[seen]] = own[seen]
     return DenseCloud(
         points=points,
         colors=colors,
         normals=normals,
-        sigma=standard_error(sources, cells, share),
+        sigma=sigma,
         cells=cells,
         grid_shape=support.shape,
         grid_step_mm=step,
     )
 
 
+def _supported_area(points: NDArray[np.float32], spacing: float) -> float:
+    step = _COARSE * spacing
+    _, _, support = support_on_grid(points, spacing, step)
+    return float(np.count_nonzero(support) * step**2)
+
+
 def _far_from_seeds(
-    seeds: Seeds, origin: tuple[float, float], step: float, support: NDArray[np.bool_],
-    radius: float,
-) -> NDArray[np.bool_]:
-    """Which of the supported points have no seed within a radius, mm, to a grid point."""
-    empty = np.ones([side // 2 + 1 for side in support.shape], np.uint8)
-    columns, rows = np.rint((seeds.points[:, :2] - origin) / step).astype(np.intp).T // 2
-    empty[rows, columns] = 0
-    far = cv2.distanceTransform(empty, cv2.DIST_L2, cv2.DIST_MASK_3) * (2 * step) > radius
-    rows, columns = support.shape
-    return np.asarray(far.repeat(2, axis=0)[:rows].repeat(2, axis=1)[:, :columns][support])
+    seeds: Seeds, origin: tuple[float, float], step: float, cells: NDArray[np.int32],
+    shape: tuple[int, int], radius: float,
+) -> NDArray[np.int64]:
+    """Which cells, by their indices, have no seed within a radius, mm, to a grid point."""
+    rows, columns = (side // 2 + 1 for side in shape)
+    seeded = mark(seeds.points, (origin[0] + step / 2, origin[1] + step / 2), 2 * step, rows,
+                  columns)
+    away = cv2.distanceTransform(1 - seeded, cv2.DIST_L2, cv2.DIST_MASK_3)
+    return farther(np.asarray(away, np.float32), cells, radius / (2 * step))
 
 
 def _colors(

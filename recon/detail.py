@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._image_kernels import add_between
+from recon._percentile import percentile
 from recon._scatter_kernels import BILINEAR_VARIANCE, read_between, share_out
 from recon.rbf import Surface
 from recon.support import support_on_grid
@@ -47,11 +48,12 @@ class DetailedSurface:
     Attributes
     ----------
     base : the fit, mm, depth camera frame
-    detail : (3, rows, columns) float32: height, mm, and its slopes along x and y, on a grid that
-        begins at `origin`
+    detail : (3, rows, columns) float32: height to add, mm, and the slopes of the sum along x and
+        y, on a grid that begins at `origin`
     origin : (x, y) of that grid's first point, mm
     step : distance of its points, mm
     noise : standard deviation of the seeds about the surface, mm
+    area : of the places that the seeds support, mm^2
     """
 
     base: Surface
@@ -59,6 +61,7 @@ class DetailedSurface:
     origin: tuple[float, float]
     step: float
     noise: float
+    area: float
 
     def on_grid(self, xs: NDArray[np.float64], ys: NDArray[np.float64]) -> NDArray[np.float64]:
         """Evaluate on an axis-aligned grid: (k,), (m,) mm -> (m, k) mm."""
@@ -74,7 +77,9 @@ class DetailedSurface:
 
         As `Surface.sampled`: (k,), (m,) mm -> (m, k) each.
         """
-        found = self.base.sampled(xs, ys)
+        # The broad fit has no slopes that the detail's grid could not tell.
+        heights = self.base.heights(xs, ys)
+        found = heights, np.zeros_like(heights), np.zeros_like(heights)
         rows, columns = self._places(ys, 1), self._places(xs, 0)
         for one, added in zip(found, self.detail, strict=True):
             add_between(one, added, rows, columns)
@@ -103,7 +108,8 @@ def add_detail(
     columns, rows = (((points[:, axis] - low) / step).astype(np.float32)
                      for axis, low in ((0, xs[0]), (1, ys[0])))
     grid = _Seeded(columns, rows, support.shape)
-    rest = points[:, 2] - grid.at_seeds(base.on_grid(xs, ys).astype(np.float32))
+    heights, *slopes = base.sampled(xs, ys)
+    rest = points[:, 2] - grid.at_seeds(heights)
     usual = np.float32(_FINENESS**-2)
     weight = grid.spread(None, radius / step)
     detail = grid.spread(rest, radius / step) / (weight + usual * np.float32(_FADING))
@@ -113,11 +119,13 @@ def add_detail(
                       None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
     detail += missing * (wide[:detail.shape[0], :detail.shape[1]] - detail)
     detail *= _gain(detail, support, step)
-    slopes = [cv2.Sobel(detail, cv2.CV_32F, right, 1 - right, ksize=1, scale=0.5 / step,
-                        borderType=cv2.BORDER_REPLICATE) for right in (1, 0)]
+    for slope, right in zip(slopes, (1, 0), strict=True):
+        slope += cv2.Sobel(detail, cv2.CV_32F, right, 1 - right, ksize=1, scale=0.5 / step,
+                           borderType=cv2.BORDER_REPLICATE)
     return DetailedSurface(
         base, np.stack([detail, *slopes]).astype(np.float32, copy=False),
-        (float(xs[0]), float(ys[0])), step, noise=float((rest - grid.at_seeds(detail)).std()))
+        (float(xs[0]), float(ys[0])), step, noise=float((rest - grid.at_seeds(detail)).std()),
+        area=float(np.count_nonzero(support) * step**2))
 
 
 class _Seeded:
@@ -175,7 +183,7 @@ def _gain(detail: Image, support: NDArray[np.bool_], step: float) -> Image:
         for one in (energy, inside))
     local /= np.maximum(covered, np.float32(1e-6))
     seen = cv2.resize(inside, small, interpolation=cv2.INTER_NEAREST) > 0
-    noise = np.float32(np.percentile(local[seen], _NOISE_PERCENTILE) if seen.any() else 0)
+    noise = np.float32(percentile(local[seen], _NOISE_PERCENTILE) if seen.any() else 0)
     gain = np.clip(1 - noise / np.maximum(local, np.float32(1e-12)), 0, 1)
     return np.asarray(cv2.resize(gain, detail.shape[::-1], interpolation=cv2.INTER_LINEAR),
                       np.float32)

@@ -61,7 +61,7 @@ class DenseCloud(PointCloud):
         super().__post_init__()
         _check("normals", self.normals, np.float32, (len(self.points), 3))
         _check("sigma", self.sigma, np.float32, (len(self.points),))
-        if (self.sigma <= 0).any():
+        if len(self.sigma) and self.sigma.min() <= 0:
             raise ValueError("sigma must be positive")
         _check("cells", self.cells, np.int32, (len(self.points), 2))
         rows, columns = self.cells[:, 0], self.cells[:, 1]
@@ -131,5 +131,8 @@ def _check(name: str, array: NDArray[Any], dtype: type[np.generic], shape: tuple
         raise ValueError(
             f"{name} must be {np.dtype(dtype)} {shape}, found {array.dtype} {array.shape}"
         )
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite")
+    if array.dtype.kind == "f":
+        flat = array.ravel()
+        # A finite sum of squares has finite parts, and takes half the time to tell.
+        if not (np.isfinite(flat @ flat) or np.isfinite(flat).all()):
+            raise ValueError(f"{name} must be finite")

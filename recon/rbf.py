@@ -85,9 +85,15 @@ class Surface:
         -------
         (m, k) float64, mm
         """
-        (across, _), (down, _) = (
-            self._factors(xs, 0, np.float64), self._factors(ys, 1, np.float64))
+        across, down = self._factors(xs, 0, np.float64), self._factors(ys, 1, np.float64)
         heights: NDArray[np.float64] = (down @ self._weights()) @ across.T
+        return heights
+
+    def heights(self, xs: NDArray[np.float64], ys: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Evaluate as `on_grid` does, in single precision: (k,), (m,) mm -> (m, k) mm."""
+        across, down = (self._factors(values, axis, np.float32)
+                        for axis, values in enumerate((xs, ys)))
+        heights: NDArray[np.float32] = (down @ self._weights().astype(np.float32)) @ across.T
         return heights
 
     def sampled(
@@ -103,8 +109,8 @@ class Surface:
         -------
         heights, slopes_x, slopes_y : (m, k) float32, mm and unitless
         """
-        (across, slope_x), (down, slope_y) = (
-            self._factors(xs, 0, np.float32), self._factors(ys, 1, np.float32))
+        across, down = self._factors(xs, 0, np.float32), self._factors(ys, 1, np.float32)
+        slope_x, slope_y = self._slopes(xs, 0, across), self._slopes(ys, 1, down)
         weights: NDArray[np.float32] = self._weights().astype(np.float32)
         lines: NDArray[np.float32] = down @ weights
         heights: NDArray[np.float32] = lines @ across.T
@@ -115,19 +121,35 @@ class Surface:
 
     def _factors(
         self, values: NDArray[np.float64], axis: int, kind: type[_Float]
-    ) -> tuple[NDArray[_Float], NDArray[_Float]]:
-        """The nodes' Gaussians and 1, t, t^2 of the polynomial along one axis, and their slopes."""
-        nodes = self.nodes_y if axis else self.nodes_x
-        count = len(nodes)
-        gap = ((values[:, None] - nodes) / self.r0).astype(kind)
-        t = (values - self.center[axis]) / self.scale
-        factors, slopes = (np.empty((len(values), count + 3), kind) for _ in range(2))
+    ) -> NDArray[_Float]:
+        """The nodes' Gaussians and 1, t, t^2 of the polynomial along one axis."""
+        gap = self._gaps(values, axis, kind)
+        count = gap.shape[1]
+        factors = np.empty((len(values), count + 3), kind)
         np.exp(kind(-_NODE) * gap * gap, out=factors[:, :count])
-        np.multiply(kind(-2 * _NODE / self.r0) * gap, factors[:, :count], out=slopes[:, :count])
+        t = (values - self.center[axis]) / self.scale
         factors[:, count], factors[:, count + 1], factors[:, count + 2] = 1, t, t * t
+        return factors
+
+    def _slopes(
+        self, values: NDArray[np.float64], axis: int, factors: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """The slopes of the factors."""
+        gap = self._gaps(values, axis, np.float32)
+        count = gap.shape[1]
+        slopes = np.empty_like(factors)
+        np.multiply(np.float32(-2 * _NODE / self.r0) * gap, factors[:, :count],
+                    out=slopes[:, :count])
         slopes[:, count], slopes[:, count + 1] = 0, 1 / self.scale
-        slopes[:, count + 2] = 2 * t / self.scale
-        return factors, slopes
+        slopes[:, count + 2] = 2 / self.scale * factors[:, count + 1]
+        return slopes
+
+    def _gaps(
+        self, values: NDArray[np.float64], axis: int, kind: type[_Float]
+    ) -> NDArray[_Float]:
+        """The distances of the nodes along one axis, in units of R0."""
+        nodes = self.nodes_y if axis else self.nodes_x
+        return np.subtract.outer(values / self.r0, nodes / self.r0).astype(kind)
 
     def _weights(self) -> NDArray[np.float64]:
         """What stands between the factors of y and those of x."""

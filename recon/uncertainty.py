@@ -127,21 +127,19 @@ def sources_of_error(
                    rim=np.asarray(across * slope * edge, np.float32), every=every)
 
 
-def standard_error(
-    sources: Sources, cells: NDArray[np.int32], share: float
-) -> NDArray[np.float32]:
-    """Give sigma at cells of the dense grid.
+def standard_error(sources: Sources, share: float) -> NDArray[np.float32]:
+    """Give sigma on the nodes of its sources.
 
     Parameters
     ----------
     sources : of this face
-    cells : (n, 2) int32, row and column
     share : k, of the settings that the surface was fitted with
 
     Returns
     -------
-    (n,) float32, mm: 68 % of the errors along the viewing ray are within it, 95 % within twice
+    (rows, columns) float32, mm: 68 % of the errors along the viewing ray are within it, 95 % within
+    twice
     """
-    variance = (share * (sources.noise + _HOLE * sources.hole)
-                + _SLOPE * sources.slope + _RIM * sources.rim)
-    return sources.at(np.maximum(np.sqrt(variance), np.float32(_LEAST_MM)), cells)
+    variance = (np.float32(share) * (sources.noise + np.float32(_HOLE) * sources.hole)
+                + np.float32(_SLOPE) * sources.slope + np.float32(_RIM) * sources.rim)
+    return np.asarray(np.maximum(np.sqrt(variance), np.float32(_LEAST_MM)), np.float32)

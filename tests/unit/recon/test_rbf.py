@@ -51,6 +51,7 @@ def test_grid_and_scattered_evaluation_agree():
     heights, along_x, along_y = surface.sampled(xs, ys)
     assert heights.dtype == along_x.dtype == along_y.dtype == np.float32
     np.testing.assert_allclose(heights, surface.on_grid(xs, ys), atol=1e-3)
+    np.testing.assert_array_equal(surface.heights(xs, ys), heights)
 
 
 def test_gradient_is_the_derivative():

@@ -1,0 +1,36 @@
+"""Between scattered points and pixels."""
+
+import numpy as np
+
+from recon._scatter_kernels import mark, read_between, share_out
+
+
+def test_the_pixel_nearest_to_a_point_is_marked():
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-0.4, 3.4, (20, 3)).astype(np.float32) * 2 + (10, -20, 0)
+    points = points.astype(np.float32)
+    image = mark(points, (10.0, -20.0), 2.0, 4, 4)
+    expected = np.zeros((4, 4), np.uint8)
+    columns, rows = np.rint((points[:, :2] - (10, -20)) / 2).astype(int).T
+    expected[rows, columns] = 1
+    np.testing.assert_array_equal(image, expected)
+
+
+def test_what_is_shared_out_keeps_its_sum_and_its_middle():
+    rng = np.random.default_rng(1)
+    columns, rows = rng.uniform(0, 5.9, (2, 30)).astype(np.float32)
+    values = rng.normal(size=30).astype(np.float32)
+    image = np.zeros((7, 7), np.float32)
+    share_out(columns, rows, values, image)
+    i, j = np.mgrid[:7, :7]
+    for found, expected in ((image, values), (i * image, rows * values), (j * image,
+                                                                         columns * values)):
+        np.testing.assert_allclose(found.sum(), expected.sum(), atol=1e-4)
+
+
+def test_between_pixels_a_ramp_goes_on():
+    rng = np.random.default_rng(2)
+    columns, rows = rng.uniform(0, 5.9, (2, 30)).astype(np.float32)
+    i, j = np.mgrid[:7, :7].astype(np.float32)
+    np.testing.assert_allclose(
+        read_between(3 * i - 2 * j, columns, rows), 3 * rows - 2 * columns, atol=1e-5)
