@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["EMPTY", "look", "project"]
+__all__ = ["EMPTY", "look", "project", "see"]
 
 EMPTY = np.float32(1e30)
 """Where nothing is in the z-buffer, mm; no infinity, which compiled code may take for no number."""
@@ -18,7 +18,7 @@ def project(
     translation: NDArray[np.float64], camera: NDArray[np.float64], pitch: float,
     points: NDArray[np.float32], pixels: NDArray[np.float32], color_depth: NDArray[np.float32],
     nearest: NDArray[np.float32],
-) -> None:
+) -> tuple[int, int, int, int]:
     """Back-project each measured depth, move it to the colour camera, and project it there.
 
     depth : (H, W), the pixels `begin`, `begin + step`, ... of the image that `rays` is of
@@ -27,68 +27,104 @@ def project(
     points, pixels, color_depth : (H, W, 3), (H, W, 2), (H, W), written where there is a depth
         (the last two: and the colour camera is before it)
     nearest : the z-buffer, lowered to what falls into its cells inside the image
+
+    Gives the first row, the last, the first column and the last of the cells that were lowered; of
+    none, the first is behind the last.
     """
     width, height, fx, fy, cx, cy, k1, k2, p1, p2, k3 = camera
+    r00, r01, r02 = rotation[0]
+    r10, r11, r12 = rotation[1]
+    r20, r21, r22 = rotation[2]
+    t0, t1, t2 = translation
+    offset, per_cell = np.float32(offset_mm), np.float32(1) / np.float32(pitch)
+    columns = depth.shape[1]
+    across, along = np.empty(columns), np.empty(columns)
+    px, py, pz, us, vs, fars = np.empty((6, columns), np.float32)
+    top, bottom, left, right = nearest.shape[0], -1, nearest.shape[1], -1
     for i in range(depth.shape[0]):
-        for j in range(depth.shape[1]):
-            if depth[i, j] == 0:
-                continue
-            z = np.float32(depth[i, j]) + np.float32(offset_mm)
-            ray = rays[begin[0] + i * step[0], begin[1] + j * step[1]]
-            px, py = np.float32(ray[0] * z), np.float32(ray[1] * z)
-            points[i, j, 0], points[i, j, 1], points[i, j, 2] = px, py, z
-            far = rotation[2, 0] * px + rotation[2, 1] * py + rotation[2, 2] * z + translation[2]
-            if far <= 0:
-                continue
-            x = (rotation[0, 0] * px + rotation[0, 1] * py + rotation[0, 2] * z
-                 + translation[0]) / far
-            y = (rotation[1, 0] * px + rotation[1, 1] * py + rotation[1, 2] * z
-                 + translation[1]) / far
+        for j in range(columns):
+            row, column = begin[0] + i * step[0], begin[1] + j * step[1]
+            across[j], along[j] = rays[row, column, 0], rays[row, column, 1]
+        # All of a row at once, measured or not, takes less time than to ask for each.
+        line = depth[i]
+        for j in range(columns):
+            z = np.float32(line[j]) + offset
+            x0, y0 = np.float32(across[j] * z), np.float32(along[j] * z)
+            px[j], py[j], pz[j] = x0, y0, z
+            far = r20 * x0 + r21 * y0 + r22 * z + t2
+            share = 1 / (far if far > 0 else 1.0)
+            x = (r00 * x0 + r01 * y0 + r02 * z + t0) * share
+            y = (r10 * x0 + r11 * y0 + r12 * z + t1) * share
             r2 = x * x + y * y
             radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-            u = fx * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx
-            v = fy * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy
+            us[j] = fx * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx
+            vs[j] = fy * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy
+            fars[j] = far
+        for j in range(columns):
+            if line[j] == 0:
+                continue
+            points[i, j, 0], points[i, j, 1], points[i, j, 2] = px[j], py[j], pz[j]
+            far, u, v = fars[j], us[j], vs[j]
+            if far <= 0:
+                continue
             pixels[i, j, 0], pixels[i, j, 1] = u, v
             color_depth[i, j] = far
-            if _inside(np.float32(u), np.float32(v), width, height):
-                row, column = _cell(np.float32(u), np.float32(v), pitch)
-                nearest[row, column] = min(nearest[row, column], np.float32(far))
+            if _inside(u, v, width, height):
+                row, column = _cell(u, v, per_cell)
+                if far < nearest[row, column]:
+                    nearest[row, column] = far
+                top, bottom = min(top, row), max(bottom, row)
+                left, right = min(left, column), max(right, column)
+    return top, bottom, left, right
 
 
 @compiled
-def look(
+def see(
     pixels: NDArray[np.float32], color_depth: NDArray[np.float32], nearest: NDArray[np.float32],
-    pitch: float, hidden_mm: float, hidden_share: float, image: NDArray[np.uint8],
-) -> tuple[NDArray[np.bool_], NDArray[np.uint8]]:
-    """Say which points are inside the image and hidden by none, and give their colours, bilinear.
+    pitch: float, hidden_mm: float, hidden_share: float, width: int, height: int,
+) -> NDArray[np.bool_]:
+    """Say which points are inside an image of that size and hidden by none.
 
     nearest : the z-buffer, each cell lowered to the least of the cells around it
     """
-    shape = color_depth.shape
-    visible, colors = np.zeros(shape, np.bool_), np.zeros((*shape, 3), np.uint8)
-    height, width = image.shape[:2]
-    for i in range(shape[0]):
-        for j in range(shape[1]):
+    visible = np.zeros(color_depth.shape, np.bool_)
+    per_cell, share = np.float32(1) / np.float32(pitch), np.float32(hidden_share)
+    for i in range(visible.shape[0]):
+        for j in range(visible.shape[1]):
             z = color_depth[i, j]
             if z <= 0:
                 continue
             u, v = pixels[i, j]
-            if not _inside(u, v, width, height):
+            if _inside(u, v, width, height):
+                row, column = _cell(u, v, per_cell)
+                visible[i, j] = z <= nearest[row, column] + max(np.float32(hidden_mm), share * z)
+    return visible
+
+
+@compiled
+def look(
+    pixels: NDArray[np.float32], visible: NDArray[np.bool_], image: NDArray[np.uint8]
+) -> NDArray[np.uint8]:
+    """Give the colours of the visible points, bilinear: (H, W, 3), zero for the others."""
+    height, width = image.shape[:2]
+    colors = np.zeros((*visible.shape, 3), np.uint8)
+    for i in range(visible.shape[0]):
+        for j in range(visible.shape[1]):
+            if not visible[i, j]:
                 continue
-            row, column = _cell(u, v, pitch)
-            if z > nearest[row, column] + max(np.float32(hidden_mm), np.float32(hidden_share) * z):
-                continue
-            visible[i, j] = True
-            u = min(max(u, np.float32(0)), np.float32(width - 1))
-            v = min(max(v, np.float32(0)), np.float32(height - 1))
-            left, top = int(u), int(v)
-            right, bottom = min(left + 1, width - 1), min(top + 1, height - 1)
+            u = min(max(pixels[i, j, 0], np.float32(0)), np.float32(width - 1))
+            v = min(max(pixels[i, j, 1], np.float32(0)), np.float32(height - 1))
+            left, top = np.uint32(u), np.uint32(v)
+            right, bottom = min(left + 1, np.uint32(width - 1)), min(top + 1,
+                                                                     np.uint32(height - 1))
             across, down = u - np.float32(left), v - np.float32(top)
             for c in range(3):
-                upper = (1 - across) * image[top, left, c] + across * image[top, right, c]
-                lower = (1 - across) * image[bottom, left, c] + across * image[bottom, right, c]
-                colors[i, j, c] = np.uint8((1 - down) * upper + down * lower + np.float32(0.5))
-    return visible, colors
+                one, other = np.float32(image[top, left, c]), np.float32(image[bottom, left, c])
+                upper = one + across * (np.float32(image[top, right, c]) - one)
+                lower = other + across * (np.float32(image[bottom, right, c]) - other)
+                colors[i, j, c] = np.uint8(np.int32(
+                    upper + down * (lower - upper) + np.float32(0.5)))
+    return colors
 
 
 @compiled
@@ -97,6 +133,5 @@ def _inside(u: np.float32, v: np.float32, width: float, height: float) -> bool:
 
 
 @compiled
-def _cell(u: np.float32, v: np.float32, pitch: float) -> tuple[int, int]:
-    return int((v + np.float32(0.5)) / np.float32(pitch)), int(
-        (u + np.float32(0.5)) / np.float32(pitch))
+def _cell(u: np.float32, v: np.float32, per_cell: np.float32) -> tuple[int, int]:
+    return int((v + np.float32(0.5)) * per_cell), int((u + np.float32(0.5)) * per_cell)

@@ -5,7 +5,7 @@ The matrices here are thin: more threads only wait for each other, and round oth
 
 from collections.abc import Callable
 from functools import cache, wraps
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from threadpoolctl import ThreadpoolController
 
@@ -20,11 +20,19 @@ def _libraries() -> ThreadpoolController:
     return ThreadpoolController()
 
 
+@cache
+def _blas() -> tuple[Any, ...]:
+    return tuple(library for library in _libraries().lib_controllers
+                 if library.user_api == "blas")
+
+
 def one_blas_thread(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Make a function run with one BLAS thread, whatever the process is set to."""
 
     @wraps(function)
     def limited(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        if all(library.num_threads == 1 for library in _blas()):
+            return function(*args, **kwargs)
         with _libraries().limit(limits=1, user_api="blas"):
             return function(*args, **kwargs)
 

@@ -37,12 +37,10 @@ def mean_spacing(
     """
     if len(points) < 2:
         raise ValueError(f"points must be at least 2 to have a spacing, got {len(points)}")
+    if how is Neighbors.LATTICE:
+        return lattice_spacing(points, pixels)
     xy = np.ascontiguousarray(points[:, :2])
-    if how is Neighbors.RANDOMIZED:
-        return randomized_spacing(xy)
-    if how is Neighbors.EXACT:
-        return exact_spacing(xy)
-    return lattice_spacing(xy, pixels)
+    return randomized_spacing(xy) if how is Neighbors.RANDOMIZED else exact_spacing(xy)
 
 
 def randomized_neighbors(
@@ -83,43 +81,51 @@ def exact_spacing(xy: NDArray[np.float32]) -> float:
     return float(distances[:, 1].mean())
 
 
-def lattice_spacing(xy: NDArray[np.float32], pixels: NDArray[np.int32]) -> float:
-    """Mean nearest-neighbour distance of (n, 2) points, mm, from the 24 pixels around each.
+def lattice_spacing(points: NDArray[np.float32], pixels: NDArray[np.int32]) -> float:
+    """Mean nearest-neighbour distance over (X, Y), mm, from the 24 pixels around each point.
 
     Seeds without another seed among those pixels do not count: they are stray, and there are few.
     Where no seed has one, the exact tree decides.
+
+    points : (n, 2 or 3) float32, mm; pixels : (n, 2) int32
     """
-    low = pixels.min(axis=0)
-    nearest = _nearest_around(xy, pixels - low, *(int(most) for most in pixels.max(axis=0) - low))
-    found = nearest[nearest < _FAR]
-    return float(np.sqrt(found).mean(dtype=np.float64)) if len(found) else exact_spacing(xy)
+    total, count = _nearest_around(points, pixels)
+    return total / count if count else exact_spacing(np.ascontiguousarray(points[:, :2]))
 
 
 @compiled
 def _nearest_around(
-    xy: NDArray[np.float32], places: NDArray[np.int32], last_row: int, last_column: int
-) -> NDArray[np.float32]:
-    """The squared distance of each seed to the nearest among the 24 pixels around it; else 1e12."""
+    points: NDArray[np.float32], pixels: NDArray[np.int32]
+) -> tuple[float, int]:
+    """Sum the distances of the seeds to the nearest among the 24 pixels around; of how many."""
+    top, left = pixels[0]
+    bottom, right = top, left
+    for i in range(len(pixels)):
+        top, bottom = min(top, pixels[i, 0]), max(bottom, pixels[i, 0])
+        left, right = min(left, pixels[i, 1]), max(right, pixels[i, 1])
     # Where there is no seed, the plane is far away; so it is on two pixels all around.
-    rows, columns = last_row + 5, last_column + 5
+    rows, columns = bottom - top + 5, right - left + 5
     x, y = np.full((rows, columns), _NOWHERE), np.full((rows, columns), _NOWHERE)
-    for i in range(len(places)):
-        row, column = places[i, 0] + 2, places[i, 1] + 2
-        x[row, column], y[row, column] = xy[i, 0], xy[i, 1]
+    for i in range(len(pixels)):
+        row, column = pixels[i, 0] - top + 2, pixels[i, 1] - left + 2
+        x[row, column], y[row, column] = points[i, 0], points[i, 1]
     nearest = np.full((rows, columns), _FAR)
     for row in range(2, rows - 2):
         for down in range(3):
-            for right in range(-2 if down else 1, 3):
-                here, there = slice(2, columns - 2), slice(2 + right, columns - 2 + right)
+            for across in range(-2 if down else 1, 3):
+                here, there = slice(2, columns - 2), slice(2 + across, columns - 2 + across)
                 x1, x2 = x[row, here], x[row + down, there]
                 y1, y2 = y[row, here], y[row + down, there]
                 least, other = nearest[row, here], nearest[row + down, there]
                 for k in range(columns - 4):
-                    across, along = x1[k] - x2[k], y1[k] - y2[k]
-                    gap = across * across + along * along
+                    dx, dy = x1[k] - x2[k], y1[k] - y2[k]
+                    gap = dx * dx + dy * dy
                     least[k] = min(least[k], gap)
                     other[k] = min(other[k], gap)
-    squared = np.empty(len(places), np.float32)
-    for i in range(len(places)):
-        squared[i] = nearest[places[i, 0] + 2, places[i, 1] + 2]
-    return squared
+    total, count = 0.0, 0
+    for i in range(len(pixels)):
+        gap = nearest[pixels[i, 0] - top + 2, pixels[i, 1] - left + 2]
+        if gap < _FAR:
+            total += np.sqrt(gap)
+            count += 1
+    return total, count

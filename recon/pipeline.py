@@ -16,7 +16,7 @@ from recon._threads import one_blas_thread
 from recon.densify import densify
 from recon.detail import DetailedSurface, add_detail
 from recon.detect import detect_face
-from recon.errors import TooLittleDepthError
+from recon.errors import NoDepthError, TooLittleDepthError
 from recon.face import Face, PointCloud, Report
 from recon.neighbors import mean_spacing
 from recon.rbf import MIN_SEEDS, Surface, fit_surface
@@ -96,9 +96,10 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
 def _overview(frame: RgbdFrame, depth_offset_mm: float) -> Registration:
     """Every so many pixels registered, or all where none of those has a depth."""
     sparse = slice(None, None, _SPARSE)
-    if frame.depth[sparse, sparse].any():
-        return register(frame, depth_offset_mm, sparse, sparse)
-    return register(frame, depth_offset_mm)
+    try:
+        return register(frame, depth_offset_mm, sparse, sparse, colors=False)
+    except NoDepthError:
+        return register(frame, depth_offset_mm, colors=False)
 
 
 @cache

@@ -17,6 +17,7 @@ loop over pairs:  g(x - t) g(x - t') = exp(-|t - t'|^2 / R0^2) exp(-4 |x - (t + 
 The sums over seeds that are left are products of thin matrices too, see `recon._gridding`.
 """
 
+import math
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -36,12 +37,12 @@ MIN_SEEDS = 50
 # The sharpness, over R0^2, of a node's Gaussian and of its square, which the matrix is made of.
 _NODE = 2.0
 _DENSITY = 4.0
-_NODE_STEP = 0.45
+_NODE_STEP = 0.50
 _NODE_STEP_SHARP = 0.40
 _SHARP_BELOW = 0.3
-_NEGLIGIBLE = 1e-5
+_NEGLIGIBLE = 3e-5
 # Of the preconditioned residual.
-_TOLERANCE = 1e-5
+_TOLERANCE = 3e-5
 _MOST_ITERATIONS = 1000
 # Below this ratio of the principal extents, the seeds lie on a line.
 _COLLINEAR = 1e-3
@@ -324,13 +325,16 @@ def _checked(
         if not (np.isfinite(value) and value > 0):
             raise ValueError(f"{name} must be positive and finite, got {value}")
     W: NDArray[np.float64] = np.ones(len(points)) if weights is None else np.array(weights, float)
-    if W.shape != (len(points),) or not np.isfinite(W).all() or (W <= 0).any():
+    if weights is not None and (
+            W.shape != (len(points),) or not np.isfinite(W).all() or (W <= 0).any()):
         raise ValueError(f"weights must be ({len(points)},), positive and finite")
     if len(points) < MIN_SEEDS:
         raise TooLittleDepthError(f"{len(points)} seeds, a fit needs at least {MIN_SEEDS}")
     centered = checked[:2] - checked[:2].mean(axis=1, keepdims=True)
-    least, most = np.linalg.eigvalsh(centered @ centered.T)
-    if least <= _COLLINEAR**2 * most:
+    (a, b), (_, c) = (centered @ centered.T).tolist()
+    # The larger principal extent, squared; the product of both is the determinant.
+    most = (a + c) / 2 + math.hypot((a - c) / 2, b)
+    if a * c - b * b <= (_COLLINEAR * most) ** 2:
         raise TooLittleDepthError(f"the {len(points)} seeds lie on a line: no surface to fit")
     x, y, z = checked
     return x, y, z, W

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from capture.frame import RgbdFrame
-from recon._registration_kernels import EMPTY, look, project
+from recon._registration_kernels import EMPTY, look, project, see
 from recon.errors import NoDepthError
 
 __all__ = ["Registration", "look_up", "register"]
@@ -33,7 +33,7 @@ class Registration:
     pixels : (H, W, 2) float32, (u, v) in the colour image; NaN where not `valid`
     color_depth : (H, W) float32, mm, z in the colour camera's frame; zero where not `valid`
     visible : (H, W) bool, inside the colour image and not hidden by a nearer surface
-    colors : (H, W, 3) uint8, RGB, bilinear; zero where not `visible`
+    colors : (H, W, 3) uint8, RGB, bilinear; zero where not `visible`, or not looked up
     pitch : side of the z-buffer's cells, pixels of the colour image
     nearest : (rows, columns) float32, mm, the z-buffer: nearest z in the colour camera's frame in
         each cell and the cells around it, 1e30 where nothing
@@ -57,6 +57,8 @@ def register(
     depth_offset_mm: float = 0.0,
     rows: slice = _ALL,
     columns: slice = _ALL,
+    *,
+    colors: bool = True,
 ) -> Registration:
     """Tie depth to colour through both cameras' intrinsics, distortion and relative pose.
 
@@ -68,6 +70,7 @@ def register(
     frame : depth, mm, and colour with their calibration
     depth_offset_mm : added to each depth, mm
     rows, columns : the part of the depth image to register, every pixel or every k-th
+    colors : whether to look them up; zero otherwise
 
     Raises
     ------
@@ -85,17 +88,22 @@ def register(
         part.indices(side) for part, side in zip((rows, columns), frame.depth.shape, strict=True))
     camera, moved = frame.calibration.color, frame.depth_to_color
     pitch = max(1.0, camera.fx / frame.depth_camera.fx * row_step)
-    nearest = np.full([int(np.ceil(side / pitch)) + 1 for side in frame.color.shape[:2]], EMPTY)
-    project(depth, depth_offset_mm, frame.depth_camera.rays(), (first_row, first_column),
-            (row_step, column_step), np.array(moved.rotation, np.float64),
-            np.array(moved.translation_mm, np.float64),
-            np.array((camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
-                      *camera.distortion)), pitch, points, pixels, color_depth, nearest)
+    height, width = frame.color.shape[:2]
+    nearest = np.full([int(np.ceil(side / pitch)) + 1 for side in (height, width)], EMPTY)
+    top, bottom, left, right = project(
+        depth, depth_offset_mm, frame.depth_camera.rays(), (first_row, first_column),
+        (row_step, column_step), np.array(moved.rotation, np.float64),
+        np.array(moved.translation_mm, np.float64),
+        np.array((camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
+                  *camera.distortion)), pitch, points, pixels, color_depth, nearest)
     # Each point covers about its cell and the next: without this, a far surface would shine
     # through between the samples of a near one.
-    covered = np.asarray(cv2.erode(nearest, np.ones((3, 3), np.uint8)), np.float32)
-    visible, colors = look(pixels, color_depth, covered, pitch, _HIDDEN_MM, _HIDDEN_SHARE,
-                           _read_only(frame.color))
+    if bottom >= 0:
+        part = (slice(max(top - 1, 0), bottom + 2), slice(max(left - 1, 0), right + 2))
+        nearest[part] = cv2.erode(nearest[part], np.ones((3, 3), np.uint8))
+    visible = see(pixels, color_depth, nearest, pitch, _HIDDEN_MM, _HIDDEN_SHARE, width, height)
+    seen = look(pixels, visible, _read_only(frame.color)) if colors else np.zeros(
+        (*depth.shape, 3), np.uint8)
     return Registration(
         rows=rows,
         columns=columns,
@@ -105,9 +113,9 @@ def register(
         pixels=pixels,
         color_depth=color_depth,
         visible=visible,
-        colors=colors,
+        colors=seen,
         pitch=pitch,
-        nearest=covered,
+        nearest=nearest,
     )
 
 
@@ -132,9 +140,10 @@ def look_up(
     pixels = np.zeros((1, len(points), 2), np.float32)
     pixels[0, ahead] = frame.calibration.color.project(moved[ahead])
     z = np.where(ahead, moved[:, 2], 0).astype(np.float32)[None]
-    seen, colors = look(pixels, z, registered.nearest, registered.pitch, _HIDDEN_MM, _HIDDEN_SHARE,
-                        _read_only(frame.color))
-    return colors[0], seen[0]
+    height, width = frame.color.shape[:2]
+    seen = see(pixels, z, registered.nearest, registered.pitch, _HIDDEN_MM, _HIDDEN_SHARE, width,
+               height)
+    return look(pixels, seen, _read_only(frame.color))[0], seen[0]
 
 
 def _read_only(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
