@@ -22,9 +22,9 @@ def scatter(
 
     places : (n, 2), (row, column), inside the image
 
-    Gives (rows, columns, 4).
+    Gives (rows + 1, columns + 1, 4): nothing falls into the last row and column, but so nothing
+    need be asked for each colour.
     """
-    # A row and a column more: nothing falls beyond the last, but nothing is asked for each point.
     sums = np.zeros((rows + 1, columns + 1, 4), np.float32)
     for i in range(len(colors)):
         row, column = np.uint32(places[i, 0]), np.uint32(places[i, 1])
@@ -40,7 +40,7 @@ def scatter(
                 pixel[1] += weight * green
                 pixel[2] += weight * blue
                 pixel[3] += weight
-    return sums[:rows, :columns]
+    return sums
 
 
 @compiled
@@ -67,7 +67,7 @@ def average(
     Sums are blurred; where what is counted is not more than `least`, the same is asked of the image
     at half its size, and so on.
 
-    sums : (rows, columns, 4); taps : of the blur
+    sums : (rows, columns, 4), or more; taps : of the blur
     """
     found, lacking = [], []
     asked = wanted
@@ -101,7 +101,7 @@ def blur(image: NDArray[np.float32], taps: NDArray[np.float32]) -> NDArray[np.fl
     rows, columns, channels = image.shape
     reach = len(taps) // 2
     length = columns * channels
-    lines = np.ascontiguousarray(image).reshape(rows, length)
+    lines = image.reshape(rows, length)
     out = np.empty((rows, length), np.float32)
     # One row at a time stays in the processor's nearest cache.
     padded = np.zeros(length + 2 * reach * channels, np.float32)

@@ -32,14 +32,17 @@ def project(
     none, the first is behind the last.
     """
     width, height, fx, fy, cx, cy, k1, k2, p1, p2, k3 = camera
-    r00, r01, r02 = rotation[0]
-    r10, r11, r12 = rotation[1]
-    r20, r21, r22 = rotation[2]
+    r00, r01, r02 = rotation[0, 0], rotation[0, 1], rotation[0, 2]
+    r10, r11, r12 = rotation[1, 0], rotation[1, 1], rotation[1, 2]
+    r20, r21, r22 = rotation[2, 0], rotation[2, 1], rotation[2, 2]
     t0, t1, t2 = translation
     offset, per_cell = np.float32(offset_mm), np.float32(1) / np.float32(pitch)
     columns = depth.shape[1]
     across, along = np.empty(columns), np.empty(columns)
-    px, py, pz, us, vs, fars = np.empty((6, columns), np.float32)
+    px, py, pz = (np.empty(columns, np.float32), np.empty(columns, np.float32),
+                  np.empty(columns, np.float32))
+    us, vs, fars = (np.empty(columns, np.float32), np.empty(columns, np.float32),
+                    np.empty(columns, np.float32))
     top, bottom, left, right = nearest.shape[0], -1, nearest.shape[1], -1
     for i in range(depth.shape[0]):
         for j in range(columns):
@@ -89,12 +92,12 @@ def see(
     """
     visible = np.zeros(color_depth.shape, np.bool_)
     per_cell, share = np.float32(1) / np.float32(pitch), np.float32(hidden_share)
-    for i in range(visible.shape[0]):
-        for j in range(visible.shape[1]):
+    for i in range(color_depth.shape[0]):
+        for j in range(color_depth.shape[1]):
             z = color_depth[i, j]
             if z <= 0:
                 continue
-            u, v = pixels[i, j]
+            u, v = pixels[i, j, 0], pixels[i, j, 1]
             if _inside(u, v, width, height):
                 row, column = _cell(u, v, per_cell)
                 visible[i, j] = z <= nearest[row, column] + max(np.float32(hidden_mm), share * z)

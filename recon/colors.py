@@ -57,8 +57,7 @@ def average_missing(
     image : (rows, columns, 3) uint8, RGB; changed where `missing`
     known, missing : (rows, columns) bool; at least one is known
     """
-    if missing.any():
-        average(planes(image, known), missing, _taps(1.0), _LEAST_WEIGHT, image)
+    average(planes(image, known), missing, _taps(1.0), _LEAST_WEIGHT, image)
 
 
 def _taps(radius: float) -> NDArray[np.float32]:

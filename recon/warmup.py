@@ -1,7 +1,7 @@
 """What the first frame would otherwise wait for: compiled loops, cascades, memory."""
 
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from recon.errors import NoFaceError
 from recon.heap import keep_freed_memory
 from recon.neighbors import mean_spacing
 from recon.rbf import fit_surface
-from recon.registration import register
+from recon.registration import look_up, register
 from recon.segment import segment_face
 from recon.settings import Settings
 
@@ -40,7 +40,7 @@ def warm() -> None:
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     fit = fit_surface(seeds.points, settings.r0_factor * spacing, settings.smoothing)
     surface = add_detail(fit, seeds.points, spacing, spacing)
-    densify(seeds, surface, spacing, settings.ratio, share=1.0)
+    densify(seeds, surface, spacing, settings.ratio, 1.0, partial(look_up, frame, registered))
 
 
 def _ball() -> RgbdFrame:
