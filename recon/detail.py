@@ -24,7 +24,7 @@ __all__ = ["DetailedSurface", "add_detail"]
 Image = NDArray[np.float32]
 
 # Points of the detail's grid for each spacing.
-_FINENESS = 2
+_FINENESS = 1.5
 # Below this share of the usual weight lies a hole, or the rim.
 _FULL = 0.4
 # There a wider average is taken, and again of what it leaves: like a fit, that carries the slope
@@ -36,7 +36,7 @@ _FADING = 0.005
 _FADING_WIDE = 0.05
 # Over what radius detail counts as local (standard deviation), and how coarsely that is told.
 _WINDOW_MM = 8.0
-_COARSER = 4
+_COARSER = 3
 # The smoothest part of a face shows what noise alone adds to the detail.
 _NOISE_PERCENTILE = 20
 
