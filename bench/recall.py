@@ -12,6 +12,7 @@ import numpy as np
 from bench.accuracy import RECORDINGS
 from bench.recall_scenes import CHOOSING, REPORTING, View, empty_views, face_views, taken
 from capture import RgbdFrame, open_source
+from recon import Settings
 from recon.detect import Detection, detect_face
 from recon.errors import ReconstructionError
 from recon.registration import register
@@ -28,7 +29,7 @@ _COLUMNS = ("faces", "found", "of it near the middle", "something else", "nothin
 
 def _detected(frame: RgbdFrame) -> tuple[Detection | None, float]:
     """Detect as the pipeline does; and say how long that took, ms."""
-    registered = register(frame, 0.0, _SPARSE, _SPARSE)
+    registered = register(frame, Settings().depth_offset_mm, _SPARSE, _SPARSE)
     start = time.perf_counter()
     try:
         found = detect_face(frame.color, registered, frame.calibration.color.fx)

@@ -1,16 +1,18 @@
-"""OpenCV's cascades over a part of an image, rolled and mirrored as wanted."""
+"""Looks for faces over a part of an image, rolled and mirrored as wanted."""
 
-from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from recon._haar import load_cascade, passing_boxes
 from recon.face import Box
 
-__all__ = ["Look", "find_boxes", "look_for_faces"]
+__all__ = ["Look", "Middles", "look_for_faces"]
+
+# How much two boxes may differ to be of one face: OpenCV's own.
+_ALIKE = 0.2
 
 
 class Look(NamedTuple):
@@ -26,21 +28,16 @@ class Look(NamedTuple):
     mirrored: bool = False
 
 
-def find_boxes(
-    gray: NDArray[np.uint8],
-    cascade: str,
-    smallest: float,
-    largest: float,
-    scale_step: float = 1.1,
-    min_neighbors: int = 5,
-) -> list[Box]:
-    """Run one cascade over a (H, W) uint8 image for boxes between two widths, pixels."""
-    widest = max(gray.shape)  # and beyond it may be more than OpenCV's integers hold
-    low, high = int(min(smallest, widest)), int(np.ceil(min(largest, widest)))
-    found = _cascade(cascade).detectMultiScale(
-        gray, scaleFactor=scale_step, minNeighbors=min_neighbors,
-        minSize=(low, low), maxSize=(high, high))
-    return [(int(x), int(y), int(w), int(h)) for x, y, w, h in found]
+class Middles(NamedTuple):
+    """Where in an image the middle of a box may be."""
+
+    wanted: NDArray[np.bool_]
+    """(rows, columns), cells of the image."""
+    side: float
+    """Of a cell, pixels."""
+    left: float = 0.0
+    top: float = 0.0
+    """Where the first cell begins, pixels, counted from the image's corner."""
 
 
 def look_for_faces(
@@ -49,6 +46,7 @@ def look_for_faces(
     look: Look,
     ordinary: float,
     sizes: tuple[float, float],
+    middles: Middles,
 ) -> list[Box]:
     """Find faces in a part of an image.
 
@@ -59,6 +57,7 @@ def look_for_faces(
     look : how
     ordinary : how wide a face of ordinary size is there, pixels of the image
     sizes : the smallest and the largest box, pixels of the image
+    middles : where in the image a box's middle may be
 
     Returns
     -------
@@ -80,11 +79,14 @@ def look_for_faces(
         back = back @ np.vstack([turned_back, (0, 0, 1)])
     if look.mirrored:
         small = np.ascontiguousarray(small[:, ::-1])
+        back = back @ np.array([[-1, 0, small.shape[1] - 1], [0, 1, 0], [0, 0, 1]])
+    to_cells = back.copy()
+    to_cells[:, 2] += 0.5 - np.array((middles.left, middles.top))
+    boxes = passing_boxes(small, load_cascade(look.cascade), sizes[0] * shrink, sizes[1] * shrink,
+                          look.scale_step, middles.wanted, to_cells / middles.side)
+    grouped, _ = cv2.groupRectangles(boxes, look.min_neighbors, _ALIKE)
     found = []
-    for left, top, w, h in find_boxes(small, look.cascade, sizes[0] * shrink, sizes[1] * shrink,
-                                      look.scale_step, look.min_neighbors):
-        if look.mirrored:
-            left = small.shape[1] - left - w
+    for left, top, w, h in grouped:
         u, v = back @ (left + (w - 1) / 2, top + (h - 1) / 2, 1)
         wide, high = w / across, h / down
         found.append((round(u - (wide - 1) / 2), round(v - (high - 1) / 2),
@@ -104,12 +106,3 @@ def _turned(
     turned = cv2.warpAffine(image, there, (wide, high), flags=cv2.INTER_LINEAR,
                             borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(turned, np.uint8), np.asarray(cv2.invertAffineTransform(there), np.float64)
-
-
-@cache
-def _cascade(name: str) -> cv2.CascadeClassifier:
-    path = Path(cv2.__file__).parent / "data" / f"{name}.xml"
-    classifier = cv2.CascadeClassifier(str(path))
-    if classifier.empty():
-        raise RuntimeError(f"{path}: OpenCV ships no such cascade (version 5 has none)")
-    return classifier

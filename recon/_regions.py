@@ -6,21 +6,26 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from recon._detect_kernels import fill_layers
 from recon.errors import NoDepthError
 from recon.face import Box
 from recon.registration import Registration
 
-__all__ = ["Region", "regions_by_depth"]
+__all__ = ["CELLS", "Region", "regions_by_depth"]
 
 # A face farther away has under 2,000 depth pixels and noise of over 5 mm: no face worth having.
 _NEAREST_MM, _FARTHEST_MM = 300.0, 2000.0
 _LAYERS = 7
-# Cells of the colour image, so many across, in which depth is looked at.
-_CELLS = 80
+CELLS = 80
+"""Cells of the colour image, so many across, in which depth is looked at."""
+
 # A piece of a layer that is smaller, both ways, can not hold a face.
 _LEAST_MM = 90.0
 # A face's middle is in the layer, its sides may be in the next.
 _HALF_FACE_MM = 90.0
+# Of a square about its middle, so wide, at least such a share holds depth of the layer.
+_MIDDLE_MM = 80.0
+_LEAST_SHARE = 0.2
 
 
 class Region(NamedTuple):
@@ -29,10 +34,13 @@ class Region(NamedTuple):
     part: Box
     near_mm: float
     far_mm: float
+    middles: NDArray[np.bool_]
+    """(rows, CELLS) of the whole image: where the middle of a face can be."""
 
 
 def regions_by_depth(
-    registered: Registration, shape: tuple[int, int], focal_px: float
+    registered: Registration, shape: tuple[int, int], focal_px: float,
+    nearer_than_mm: float = _FARTHEST_MM,
 ) -> list[Region]:
     """Cut the scene into layers of depth, and each layer into what hangs together in the image.
 
@@ -41,6 +49,7 @@ def regions_by_depth(
     registered : the depth tied to the colour image; every k-th pixel is enough
     shape : rows and columns of the colour image
     focal_px : its focal length, pixels
+    nearer_than_mm : what is farther is left out
 
     Raises
     ------
@@ -49,32 +58,27 @@ def regions_by_depth(
     """
     if not (registered.color_depth > 0).any():
         raise NoDepthError("no depth lies before the colour camera: is the calibration right?")
-    z = registered.color_depth[registered.visible]
     edges = np.geomspace(_NEAREST_MM, _FARTHEST_MM, _LAYERS + 1)
-    layer = np.searchsorted(edges, z) - 1
-    cell = shape[1] / _CELLS
-    rows, columns = (int(np.ceil(side / cell)) for side in shape)
-    column, row = ((registered.pixels[registered.visible].T + 0.5) / cell).astype(np.int64)
+    edges = np.append(edges[edges < nearer_than_mm], min(nearer_than_mm, _FARTHEST_MM))
+    cell = shape[1] / CELLS
+    filled = np.zeros((len(edges) - 1, int(np.ceil(shape[0] / cell)), CELLS), np.uint8)
+    fill_layers(registered.pixels, registered.color_depth, registered.visible, edges, cell, filled)
     regions = []
-    for k in range(_LAYERS):
-        inside = layer == k
-        if not inside.any():
+    for near, far, layer in zip(edges[:-1].tolist(), edges[1:].tolist(), filled, strict=True):
+        if not layer.any():
             continue
-        near, far = float(edges[k]), float(edges[k + 1])
-        filled = np.zeros((rows, columns), np.uint8)
-        filled[np.clip(row[inside], 0, rows - 1), np.clip(column[inside], 0, columns - 1)] = 1
-        for part in _pieces(filled, _LEAST_MM * focal_px / far / cell):
-            around = round(_HALF_FACE_MM * focal_px / near / cell)
-            regions.append(Region(_widened(part, around, cell, shape), near, far))
+        closed = cv2.morphologyEx(layer, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+        least = _LEAST_MM * focal_px / far / cell
+        side = 2 * round(_MIDDLE_MM * focal_px / np.sqrt(near * far) / cell / 2) + 1
+        middles = cv2.blur(255 * closed, (side, side), borderType=cv2.BORDER_CONSTANT
+                           ) > 255 * _LEAST_SHARE
+        around = round(_HALF_FACE_MM * focal_px / near / cell)
+        _, _, pieces, _ = cv2.connectedComponentsWithStats(closed, connectivity=8)
+        for x, y, w, h, _ in pieces[1:].tolist():
+            if w >= least and h >= least:
+                part = _widened((x, y, w, h), around, cell, shape)
+                regions.append(Region(part, near, far, middles))
     return regions
-
-
-def _pieces(filled: NDArray[np.uint8], least: float) -> list[Box]:
-    """The boxes of what hangs together, across gaps of a cell, and is large enough."""
-    closed = cv2.morphologyEx(filled, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    _, _, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=8)
-    return [(int(x), int(y), int(w), int(h)) for x, y, w, h, _ in stats[1:]
-            if w >= least and h >= least]
 
 
 def _widened(cells: Box, around: int, cell: float, shape: tuple[int, int]) -> Box:

@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from recon.face import Box
-from recon.registration import Registration
+from recon._detect_kernels import bulge_terms
 
 __all__ = ["bulge_mm"]
 
@@ -16,43 +15,29 @@ _BEFORE_MM = 20.0
 _FITS = 3
 
 
-def bulge_mm(registered: Registration, box: Box, depth_mm: float) -> float:
+def bulge_mm(depths: NDArray[np.float64], depth_mm: float) -> float:
     """Fit z = a + b u + c v + d (u^2 + v^2) to a box's depths, and give d at the box's sides.
 
     A wall, a cupboard or a photograph, however slanted, has none; a face about 30 mm.
 
     Parameters
     ----------
-    registered : the depth tied to the colour image
-    box : x, y, width, height; pixels of the colour image
+    depths : (n, 3), u and v from -1 to 1 in the box, and z, mm
     depth_mm : median z in the middle of the box
 
     Returns
     -------
     mm, positive where the middle is nearer than the sides; inf where depths are too few to tell
     """
-    x, y, w, h = box
-    half = np.float32(w / 2)
-    u = (registered.pixels[..., 0] - np.float32(x + w / 2)) / half
-    v = (registered.pixels[..., 1] - np.float32(y + h / 2)) / half
-    z = registered.color_depth
-    inside = registered.visible & (u * u + v * v < 1) & (np.abs(z - depth_mm) < _HEAD_MM)
-    if np.count_nonzero(inside) < _LEAST_DEPTHS:
-        return np.inf
-    u, v, z = (one[inside].astype(np.float64) for one in (u, v, z - np.float32(depth_mm)))
-    terms = np.stack([np.ones_like(u), u, v, u * u + v * v])
-    best = -np.inf
+    kept = np.ones(len(depths), np.bool_)
+    fitted: NDArray[np.float64] = np.zeros(4)
+    best, last = -np.inf, 0
     # A hand before the chin takes the bulge away: what is so far before all else is left out.
-    for _ in range(_FITS):
-        fitted = _fitted(terms, z)
-        best = max(best, float(fitted[3]))
-        behind = z - fitted @ terms > -_BEFORE_MM
-        if behind.all() or np.count_nonzero(behind) < _LEAST_DEPTHS:
+    for fit in range(_FITS):
+        before = _BEFORE_MM if fit else _HEAD_MM  # nothing is fitted yet
+        matrix, right, count = bulge_terms(depths, depth_mm, _HEAD_MM, fitted, before, kept)
+        if count < _LEAST_DEPTHS or count == last:
             break
-        terms, z = terms[:, behind], z[behind]
-    return best
-
-
-def _fitted(terms: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
-    found, *_ = np.linalg.lstsq(terms @ terms.T, terms @ z, rcond=None)
-    return np.asarray(found)
+        fitted = np.asarray(np.linalg.lstsq(matrix, right, rcond=None)[0], np.float64)
+        best, last = max(best, float(fitted[3])), count
+    return best if last else np.inf

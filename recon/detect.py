@@ -7,8 +7,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._cascades import Look, look_for_faces
-from recon._regions import Region, regions_by_depth
+from recon._cascades import Look, Middles, look_for_faces
+from recon._detect_kernels import depths_in_box
+from recon._regions import CELLS, Region, regions_by_depth
 from recon._relief import bulge_mm
 from recon.errors import FaceWithoutDepthError, NoFaceError
 from recon.face import Box, FaceCandidate
@@ -34,7 +35,8 @@ _PROFILE_WIDER = 1.09
 # A third of the resolution for a face at 0.8 m, half of it, then whatever there is.
 _THIRD, _HALF, _FULL = 28.0, 42.0, 96.0
 _ROLLED_PX = 32.0
-_FIRST = Look(_ALT2, _THIRD, 1.2, 3)
+_FIRST = Look(_ALT2, _THIRD, 1.18, 3)
+_ANYWHERE = Look(_ALT2, _THIRD, 1.2, 3)
 _SECOND = Look(_ALT2, _HALF)
 _ROLLED = tuple(Look(_ALT2, _ROLLED_PX, 1.2, 3, roll=degrees) for degrees in (-30, 30, -15, 15))
 _PROFILES = tuple(Look(_PROFILE, _HALF, mirrored=mirrored) for mirrored in (False, True))
@@ -45,12 +47,13 @@ _LADDER = (_FIRST, _SECOND, *_ROLLED, *_PROFILES, Look(_DEFAULT, _HALF, 1.1, 4),
 # back of an ear for a face there.
 _EVENED_LADDER = (_FIRST, _SECOND)
 # What stands this much nearer than the face found is searched once more, by so many looks.
-_NEARER_MM = 100.0
+_NEARER_MM = 40.0
 _NEARER_LOOKS = (_SECOND, *_ROLLED[:2])
-# The box found small is sought again at full size, around itself and of about its own size.
-_REFINED_STEP, _REFINED_NEIGHBORS = 1.05, 3
-_REFINE_AROUND = 0.2
-_REFINE_SIZES = (0.78, 1.2)
+# The box found small is sought again at full size, about its own middle, as wide as a face is at
+# its depth: its own width is that of a few coarse steps.
+_REFINED_STEP, _REFINED_NEIGHBORS = 1.08, 2
+_REFINED_MM = (120.0, 205.0)
+_REFINED_OFF = 0.1
 # The cascades were trained on 20-24 pixel faces and gain nothing beyond this width of the image.
 _WIDEST = 640
 # The middle of a box, where a face has depth: half of it each way.
@@ -125,7 +128,8 @@ class _Search:
             gray = cv2.resize(gray, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
         self.gray = np.asarray(gray, np.uint8)
         self.to_color = color.shape[1] / gray.shape[1]
-        self.regions = regions_by_depth(registered, color.shape[:2], focal_px)
+        self.shape = color.shape[:2]
+        self.regions = regions_by_depth(registered, self.shape, focal_px)
 
     def evened(self) -> NDArray[np.uint8]:
         """Give the image with its contrast evened out."""
@@ -140,7 +144,8 @@ class _Search:
             small, large = FACE_WIDTH_MM
             ordinary = self.focal_px * _ORDINARY_MM / np.sqrt(region.near_mm * region.far_mm)
             sizes = (self.focal_px * small / region.far_mm, self.focal_px * large / region.near_mm)
-            weighed = self._look(gray, region.part, look, ordinary, sizes)
+            middles = Middles(region.middles, self.gray.shape[1] / CELLS)
+            weighed = self._look(gray, region.part, look, ordinary, sizes, middles)
             self.seen += weighed
             faces = [c for c in weighed if c.verdict == "face"]
             if faces:
@@ -151,7 +156,12 @@ class _Search:
         self, found: FaceCandidate
     ) -> tuple[NDArray[np.uint8], Look, FaceCandidate] | None:
         """Look again, in other ways, at what stands well before a face."""
-        nearer = [r for r in self.regions if r.far_mm < _depth(found) - _NEARER_MM]
+        nearer = regions_by_depth(self.registered, self.shape, self.focal_px,
+                                  _depth(found) - _NEARER_MM)
+        x, y, w, h = (side * CELLS / self.shape[1] for side in found.box)
+        for region in nearer:
+            region.middles[max(round(y), 0):round(y + h), max(round(x), 0):round(x + w)] = False
+        nearer = [region for region in nearer if region.middles.any()]
         for look in _NEARER_LOOKS if nearer else ():
             missed = self.nearest(self.gray, look, nearer)
             if missed:
@@ -162,18 +172,22 @@ class _Search:
         self, gray: NDArray[np.uint8], look: Look, found: FaceCandidate
     ) -> Detection:
         """Give the result, with the box sought again with less rounding."""
-        x, y, w, h = _scaled(found.box, 1 / self.to_color)
-        around = round(_REFINE_AROUND * w)
-        left, top = max(x - around, 0), max(y - around, 0)
-        right, bottom = (min(far + around, side) for far, side in
-                         zip((x + w, y + h), gray.shape[::-1], strict=True))
-        part = _scaled((left, top, right - left, bottom - top), self.to_color)
+        wider = _PROFILE_WIDER if look.cascade == _PROFILE else 1.0
+        small, large = (wider * self.focal_px * mm / _depth(found) for mm in _REFINED_MM)
+        x, y, w, h = found.box
+        off = _REFINED_OFF * w
+        around = round(large / 2 + off)
+        u, v = x + w / 2, y + h / 2
+        height, width = (round(side * self.to_color) for side in gray.shape)
+        left, top = max(round(u) - around, 0), max(round(v) - around, 0)
+        part = (left, top, min(round(u) + around, width) - left,
+                min(round(v) + around, height) - top)
         again = look._replace(face_px=np.inf, scale_step=_REFINED_STEP,
                               min_neighbors=_REFINED_NEIGHBORS)
-        wide = found.box[2] * (_PROFILE_WIDER if look.cascade == _PROFILE else 1.0)
-        refined = [c for c in self._look(
-            gray, part, again, wide,
-            (_REFINE_SIZES[0] * wide, _REFINE_SIZES[1] * wide)) if c.verdict == "face"]
+        middle = Middles(np.ones((1, 1), np.bool_), 2 * off / self.to_color,
+                         (u - off) / self.to_color, (v - off) / self.to_color)
+        refined = [c for c in self._look(gray, part, again, wider * w, (small, large), middle)
+                   if c.verdict == "face"]
         chosen = max(refined, key=lambda c: c.box[2]) if refined else found
         others = sorted((c for c in self.seen if c is not found), key=_depth)
         candidates = (chosen.model_copy(update={"verdict": "chosen"}), *(
@@ -184,8 +198,9 @@ class _Search:
     def anywhere(self) -> None:
         """Look at the whole image, so that what is no face at its depth can be named."""
         height, width = (round(side * self.to_color) for side in self.gray.shape)
-        self.seen += self._look(self.gray, (0, 0, width, height), _FIRST,
-                                3 * _FIRST.face_px * self.to_color, (0.0, float(height)))
+        self.seen += self._look(self.gray, (0, 0, width, height), _ANYWHERE,
+                                3 * _ANYWHERE.face_px * self.to_color, (0.0, float(height)),
+                                Middles(np.ones((1, 1), np.bool_), float(width)))
 
     def failure(self) -> NoFaceError | FaceWithoutDepthError:
         """Say why there is no face."""
@@ -199,12 +214,12 @@ class _Search:
 
     def _look(
         self, gray: NDArray[np.uint8], part: Box, look: Look, ordinary: float,
-        sizes: tuple[float, float],
+        sizes: tuple[float, float], middles: Middles,
     ) -> list[FaceCandidate]:
         """Look at a part of the colour image and weigh what is there."""
         shrink = 1 / self.to_color
         found = look_for_faces(gray, _scaled(part, shrink), look, ordinary * shrink,
-                               (sizes[0] * shrink, sizes[1] * shrink))
+                               (sizes[0] * shrink, sizes[1] * shrink), middles)
         narrower = 1 / _PROFILE_WIDER if look.cascade == _PROFILE else 1.0
         return [self._weigh(_about_middle(_scaled(box, self.to_color), narrower)) for box in found]
 
@@ -212,18 +227,17 @@ class _Search:
         """Judge a box by the depth in it."""
         x, y, w, h = box
         registered = self.registered
-        u, v = registered.pixels[..., 0], registered.pixels[..., 1]
-        middle = registered.visible & (np.abs(u - (x + w / 2)) < _MIDDLE / 2 * w) & (
-            np.abs(v - (y + h / 2)) < _MIDDLE / 2 * h)
-        z = registered.color_depth[middle]
-        if len(z) < _LEAST_MIDDLE_SHARE * _expected(registered, w * h * _MIDDLE**2):
+        depths = depths_in_box(registered.pixels, registered.color_depth, registered.visible,
+                               float(x), float(y), float(w), float(h))
+        z = depths[(np.abs(depths[:, :2]) < _MIDDLE).all(axis=1), 2]
+        if len(z) < _LEAST_MIDDLE_SHARE * w * h * (_MIDDLE / registered.pitch)**2:
             return FaceCandidate(box=box, depth_mm=None, width_mm=None, verdict="no depth")
         depth = float(np.median(z))
         width = w * depth / self.focal_px
         verdict = "face"
         if not FACE_WIDTH_MM[0] <= width <= FACE_WIDTH_MM[1]:
             verdict = "not a face's size at its depth"
-        elif bulge_mm(registered, box, depth) < _LEAST_BULGE_MM:
+        elif bulge_mm(depths, depth) < _LEAST_BULGE_MM:
             verdict = "flat"
         return FaceCandidate(box=box, depth_mm=depth, width_mm=width, verdict=verdict)
 
@@ -249,14 +263,3 @@ def _about_middle(box: Box, factor: float) -> Box:
     x, y, w, h = box
     wide, high = round(w * factor), round(h * factor)
     return x + round((w - wide) / 2), y + round((h - high) / 2), wide, high
-
-
-def _expected(registered: Registration, color_area: float) -> float:
-    """How many depth pixels would cover an area of the colour image."""
-    height, width = registered.valid.shape
-    u = registered.pixels[..., 0][registered.visible]
-    v = registered.pixels[..., 1][registered.visible]
-    if len(u) < 2:
-        return color_area
-    covered = max(1.0, float(np.ptp(u)) * float(np.ptp(v)))
-    return color_area * min(1.0, float(height * width) / covered)

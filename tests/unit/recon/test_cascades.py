@@ -4,9 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from recon._cascades import Look, find_boxes, look_for_faces
+from recon._cascades import Look, Middles, look_for_faces
 
 ALT2 = "haarcascade_frontalface_alt2"
+ANYWHERE = Middles(np.ones((1, 1), np.bool_), 640.0)
 
 
 @pytest.fixture(scope="module")
@@ -16,7 +17,7 @@ def gray(shot):
 
 @pytest.fixture(scope="module")
 def straight(gray):
-    box, = find_boxes(gray, ALT2, 90, 140)
+    box, = look_for_faces(gray, (0, 0, 640, 480), Look(ALT2, np.inf), 110, (90, 140), ANYWHERE)
     return box
 
 
@@ -25,24 +26,12 @@ def middle(box):
     return np.array([x + (w - 1) / 2, y + (h - 1) / 2])
 
 
-def test_boxes_keep_to_their_bounds(gray):
-    for smallest, largest in ((90, 140), (20, 400)):
-        boxes = find_boxes(gray, ALT2, smallest, largest)
-        assert boxes
-        assert all(smallest <= w <= largest and w == h for _, _, w, h in boxes)
-    assert find_boxes(gray, ALT2, 200, 300) == []
-
-
-def test_a_cascade_that_is_not_shipped_is_named(gray):
-    with pytest.raises(RuntimeError, match="nothing_at_all"):
-        find_boxes(gray, "nothing_at_all", 40, 80)
-
-
 @pytest.mark.parametrize("face_px", [28.0, 42.0, 1000.0])
 def test_a_part_gives_boxes_in_pixels_of_the_image(gray, straight, face_px):
     x, y, w, h = straight
     part = (x - 31, y - 17, w + 60, h + 50)
-    box, = look_for_faces(gray, part, Look(ALT2, face_px, 1.1, 3), w, (0.7 * w, 1.4 * w))
+    box, = look_for_faces(gray, part, Look(ALT2, face_px, 1.1, 3), w, (0.7 * w, 1.4 * w),
+                          ANYWHERE)
     assert np.abs(middle(box) - middle(straight)).max() < 0.08 * w
     assert box[2] == pytest.approx(w, rel=0.15)
 
@@ -66,6 +55,12 @@ def test_a_turned_or_mirrored_look_gives_an_upright_box_about_the_same_middle(
     left, top = np.rint(there - (0.8 * w, 0.9 * w)).astype(int)
     look = Look(ALT2, 60, 1.1, 3, roll=-degrees if mirrored else degrees, mirrored=mirrored)
     box, = look_for_faces(tipped, (left, top, round(1.7 * w), round(1.9 * w)), look, w,
-                          (0.7 * w, 1.4 * w))
+                          (0.7 * w, 1.4 * w), ANYWHERE)
     assert np.abs(middle(box) - there).max() < 0.08 * w
     assert box[2] == pytest.approx(w, rel=0.15)
+    # Only where the middle of the upright image's box is wanted, whatever the look does to it.
+    near = Middles(np.ones((1, 1), np.bool_), 0.4 * w, *(there - 0.2 * w))
+    aside = near._replace(left=near.left - 0.4 * w)
+    part = (left, top, round(1.7 * w), round(1.9 * w))
+    assert look_for_faces(tipped, part, look, w, (0.7 * w, 1.4 * w), near)
+    assert look_for_faces(tipped, part, look, w, (0.7 * w, 1.4 * w), aside) == []

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from recon._regions import regions_by_depth
+from recon._regions import CELLS, regions_by_depth
 from recon.registration import register
 from tests.unit.frames import calibration, camera, frame
 
@@ -11,12 +11,12 @@ SIZE = 480, 640
 FOCAL_PX = 520.0
 
 
-def regions(depth, every=1):
+def regions(depth, every=1, **limit):
     one = camera(640, 480, FOCAL_PX)
     shown = frame(depth.astype(np.uint16), np.zeros((*SIZE, 3), np.uint8),
                   calibration(depth=one, color=one), registered=True)
     part = slice(None, None, every)
-    return regions_by_depth(register(shown, 0.0, part, part), SIZE, FOCAL_PX)
+    return regions_by_depth(register(shown, 0.0, part, part), SIZE, FOCAL_PX, **limit)
 
 
 @pytest.fixture
@@ -70,3 +70,28 @@ def test_each_region_lies_inside_the_image(two):
         assert y >= 0
         assert x + w <= 640
         assert y + h <= 480
+
+
+@pytest.mark.parametrize("every", [1, 4])
+def test_a_middle_of_a_face_is_where_a_thing_is(two, every):
+    near, far = regions(two, every)
+    side = 640 / CELLS
+    for region, (left, top, right, bottom), millimetres in (
+            (near, (100, 200, 220, 320), 700), (far, (400, 150, 500, 260), 1300)):
+        rows, columns = np.nonzero(region.middles)
+        inside = region.middles[round(top / side):round(bottom / side),
+                                round(left / side):round(right / side)]
+        assert inside.mean() > 0.95
+        out = 50 * FOCAL_PX / millimetres / side
+        assert columns.min() >= left / side - out
+        assert columns.max() <= right / side + out
+        assert rows.min() >= top / side - out
+        assert rows.max() <= bottom / side + out
+
+
+def test_what_is_farther_than_asked_is_left_out(two):
+    near, = regions(two, nearer_than_mm=1290)
+    assert near.near_mm <= 700 < near.far_mm
+    assert [r.far_mm for r in regions(two, nearer_than_mm=1310)] == [near.far_mm, 1310]
+    assert regions(two, nearer_than_mm=690) == []
+    assert regions(two, nearer_than_mm=100) == []

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from recon._detect_kernels import depths_in_box
 from recon._relief import bulge_mm
 from recon.registration import register
 from tests.unit.frames import calibration, camera, frame
@@ -16,7 +17,9 @@ GRAY = np.full((120, 160, 3), 128, np.uint8)
 def bulge(depth):
     shown = frame(np.rint(depth).astype(np.uint16), GRAY,
                   calibration(depth=camera(), color=camera()), registered=True)
-    return bulge_mm(register(shown), BOX, 700.0)
+    one = register(shown)
+    return bulge_mm(depths_in_box(one.pixels, one.color_depth, one.visible, *map(float, BOX)),
+                    700.0)
 
 
 def plane(across=0.0, down=0.0):
@@ -54,3 +57,7 @@ def test_a_hand_before_the_chin_does_not_flatten_a_face():
     depth = plane() + 30 * ((u - 79.5) ** 2 + (v - 59.5) ** 2) / 20**2
     depth[72:90, 66:94] = 655
     assert bulge(depth) == pytest.approx(30, abs=3)
+
+
+def test_no_depth_does_not_tell():
+    assert bulge(np.where(plane() > 0, 1200, 0) * (np.arange(160) < 40)) == np.inf
