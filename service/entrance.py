@@ -1,6 +1,6 @@
 """All doors of the hub, and the one authenticator before the guarded ones."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -37,7 +37,7 @@ class Entrance:
 
     def __init__(
         self, context: "zmq.Context[zmq.Socket[bytes]]", settings: ServiceSettings,
-        refusals: Refusals, wakes: _Wakes,
+        refusals: Refusals, wakes: Sequence[_Wakes],
     ) -> None:
         self._keyring: Keyring | None = None
         self._changes = 0
@@ -47,7 +47,8 @@ class Entrance:
         self._memory = MemoryWatch(settings.memory_mb << 20)
         self._descriptors = DescriptorWatch()
         self._poller = zmq.Poller()
-        self._poller.register(wakes, zmq.POLLIN)
+        for one in wakes:
+            self._poller.register(one, zmq.POLLIN)
         try:
             guarded = guarded_addresses(settings)
             if settings.address not in guarded:

@@ -26,11 +26,11 @@ TOKENS = "DENSEFACE_FAILPOINTS_TOKENS"
 NAMES = (
     "hub.take.sent", "capture.take.received", "capture.frame.taken", "capture.frame.sent",
     "hub.frame.received", "hub.frame.written", "hub.frame.synced", "hub.frame.renamed",
-    "hub.frame.stored", "hub.frame.acknowledged", "hub.press.acknowledged",
+    "hub.frame.named", "hub.frame.stored", "hub.frame.acknowledged", "hub.press.acknowledged",
     "hub.attempt.counted", "hub.job.sent",
     "worker.job.received", "worker.job.computing", "worker.job.computed", "worker.result.sent",
     "hub.result.received", "hub.face.written", "hub.face.synced", "hub.face.renamed",
-    "hub.outcome.stored", "hub.outcome.publishing", "hub.outcome.published",
+    "hub.face.named", "hub.outcome.stored", "hub.outcome.publishing", "hub.outcome.published",
 )
 """Every step of a capture's life, in order."""
 

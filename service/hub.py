@@ -5,7 +5,7 @@ durable goes through the store before the message that says so is given out. The
 is the table in `service.states`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from hashlib import sha256
 from importlib.metadata import version
 
@@ -18,6 +18,7 @@ from service.figures import Figures
 from service.intake import Intake
 from service.jobs import Jobs
 from service.keeper import Keeper
+from service.kept import FaceAbout, FrameAbout
 from service.outcomes import Outcomes
 from service.outputs import Output, Publish, Topic, send
 from service.refusals import Refusals
@@ -27,6 +28,7 @@ from service.states import CaptureState
 from service.stored import Store
 from service.viewfinder import Viewfinder
 from service.wire import Packet
+from service.writing import AtOnce, Writer, Written
 
 __all__ = ["Hub", "settings_hash"]
 
@@ -48,21 +50,25 @@ class Hub:
     recon : settings of every job accepted from now on
     figures : what the status says of this process
     refusals : counts what was not let through
+    writer : writes the files; what it has ended is taken at each call
     """
 
     def __init__(
         self, store: Store, settings: ServiceSettings, recon: Settings,
         figures: Figures | None = None, refusals: Refusals | None = None,
+        writer: Writer | None = None,
     ) -> None:
         self._store = store
+        self._writer = writer = writer or AtOnce()
         self._figures = figures or Figures()
         self._refusals = refusals or Refusals(self._figures.counters)
         self._settings = settings
         self._roster = Roster()
         self._outcomes = Outcomes(store, self._remake)
-        self._intake = Intake(store, self._roster, settings, recon, settings_hash(recon))
-        self._jobs = Jobs(store, self._roster, settings.attempts, self._outcomes.concluded,
-                          self._refusals)
+        self._jobs = Jobs(store, writer, self._roster, settings.attempts,
+                          self._outcomes.concluded, self._refusals)
+        self._intake = Intake(store, writer, self._roster, settings, recon, settings_hash(recon),
+                              self._jobs.add)
         self._keeper = Keeper(
             store, settings, self._intake, self._jobs, self._outcomes, self._figures.counters)
         self._viewfinder = Viewfinder(self._roster, settings.heartbeat_s)
@@ -88,7 +94,7 @@ class Hub:
         outputs: list[Output] = []
         try:
             outputs.extend(self._receive(now, peer, packet, key))
-            outputs.extend(self._jobs.dispatch(now))
+            outputs.extend(self._go_on(now))
         except DamagedDatabaseError:
             raise
         except ServiceError as error:
@@ -99,23 +105,41 @@ class Hub:
                     request=request, message=str(error))))
         return outputs
 
-    def next_job(self, now: float, peer: bytes, packet: Packet) -> list[Output]:
-        """Give what a worker gets for its answer, to be sent before `receive` keeps the answer.
+    def written(self, now: float, *, all_of_it: bool = False) -> list[Output]:
+        """Say what comes of the files that were written; raises as `receive`.
 
-        Raises
-        ------
-        DamagedDatabaseError
-            As `receive`.
+        Parameters
+        ----------
+        all_of_it : wait for those that are being written, and begin no other work
         """
         outputs: list[Output] = []
-        if isinstance(packet.message, messages.Result):
-            try:
-                outputs.extend(self._jobs.next_job(now, peer, packet.message))
-            except DamagedDatabaseError:
-                raise
-            except ServiceError as error:
-                self._log.error("no next job", reason=str(error))
+        try:
+            outputs.extend(self._settle(now) if all_of_it else self._go_on(now))
+        except DamagedDatabaseError:
+            raise
+        except ServiceError as error:
+            self._log.error("not kept", reason=str(error))
         return outputs
+
+    def _go_on(self, now: float) -> Iterator[Output]:
+        """Do what has become possible."""
+        written = self._writer.take()
+        while True:
+            yield from self._written(now, written)
+            yield from self._jobs.dispatch(now)
+            written = self._writer.take()
+            if not written:
+                return
+
+    def _written(self, now: float, written: Sequence[Written]) -> Iterator[Output]:
+        yield from self._intake.written(
+            [one for one in written if isinstance(one.draft.about, FrameAbout)])
+        yield from self._jobs.written(
+            now, [one for one in written if isinstance(one.draft.about, FaceAbout)])
+
+    def _settle(self, now: float) -> Iterator[Output]:
+        self._writer.settle()
+        yield from self._written(now, self._writer.take())
 
     def tick(self, now: float) -> list[Output]:
         """Do what is due: time-outs, silent peers, removals, status.
@@ -128,7 +152,7 @@ class Hub:
             outputs.extend(self._outcomes.tick(now))
             for peer in self._roster.silent(now - self._settings.silence_s):
                 outputs.extend(self._gone(peer, "silent"))
-            outputs.extend(self._jobs.dispatch(now))
+            outputs.extend(self._go_on(now))
             self._keeper.tick(now)
             outputs.extend(self._viewfinder.ask(now, busy=len(self._intake) > 0))
             if now >= self._status_due:
@@ -183,8 +207,10 @@ class Hub:
                 yield from self._outcomes.get_next(peer, message)
             case messages.FindStart() as message:
                 yield from self._outcomes.find_start(peer, message)
-            case messages.ListDead() | messages.RetryDead() | messages.DropDead() | \
-                    messages.Purge() as message:
+            case messages.ListDead() | messages.RetryDead() | messages.DropDead() as message:
+                yield from self._keeper.receive(peer, message)
+            case messages.Purge() as message:
+                yield from self._settle(now)  # so that nothing of it appears afterwards
                 yield from self._keeper.receive(peer, message)
             case messages.GetStatus(request=request):
                 yield send(peer, self._status(request))
@@ -203,21 +229,15 @@ class Hub:
                     self._jobs.handed_back(worker)
                 yield from self._gone(peer, "goodbye")
             case messages.Frame() as message:
-                yield from self._frame(peer, message, packet)
+                yield from self._intake.frame(peer, message, packet)
             case messages.PreviewFrame() as message:
                 yield from self._viewfinder.receive(peer, message, packet)
-            case messages.FrameFailed(capture_id=capture_id, message=reason):
-                yield from self._intake.refuse(capture_id, "sensor", reason)
+            case messages.FrameFailed() as message:
+                yield from self._intake.no_frame(message)
             case messages.Result() as message:
-                yield from self._jobs.result(now, peer, message, packet)
+                self._jobs.result(peer, message, packet)
             case messages.JobFailed() as message:
                 yield from self._jobs.failed(peer, message)
-
-    def _frame(self, peer: bytes, message: messages.Frame, packet: Packet) -> Iterator[Output]:
-        before = self._store.find(message.capture_id)
-        yield from self._intake.frame(peer, message, packet)
-        if before is None and self._store.find(message.capture_id):
-            self._jobs.add(message.capture_id)
 
     def _remake(self, error: DamagedFaceError, kept_before: bool) -> None:
         # One that is damaged as soon as it is written has used up an attempt.
@@ -233,13 +253,9 @@ class Hub:
         known = self._roster.workers.get(peer)
         if known is None:
             self._log.info("worker ready", name=name)
-        elif credit == known.foreseen:
-            known.foreseen = None
         elif credit <= known.credit:
             self._refusals.note("replayed", name=name, detail=f"credit {credit}")
-        worker = self._roster.worker_ready(peer, name, credit, now)
-        if worker.free and worker.job:
-            self._jobs.lost(worker)
+        self._roster.worker_ready(peer, name, credit, now)
 
     def _gone(self, peer: bytes, reason: str) -> Iterator[Output]:
         say = self._log.info if reason == "goodbye" else self._log.warning

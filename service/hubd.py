@@ -25,6 +25,7 @@ from service.stopping import StopSignal
 from service.store import FolderStore
 from service.viewfinder import PERIOD_S
 from service.wire import Packet, decode_to_hub, encode
+from service.writing import Threads
 
 __all__ = ["run"]
 
@@ -47,13 +48,13 @@ def run(settings: ServiceSettings, recon: Settings) -> int:
     os.umask(0o077)  # the database's files too are for this user alone
     keep_freed_memory()  # fetched anew for each face, it costs a third of the processor time
     log = structlog.get_logger("hub")
-    with StopSignal() as stop, FolderStore(settings.data) as store, \
+    with StopSignal() as stop, FolderStore(settings.data) as store, Threads() as writer, \
             Observer(settings.data) as observer, zmq.Context() as context:
         refusals = Refusals(observer.figures.counters)
-        entrance = Entrance(context, settings, refusals, stop)
+        entrance = Entrance(context, settings, refusals, (stop, writer))
         try:
-            hub = Hub(store, settings, recon, observer.figures, refusals)
-            loop = _Loop(entrance, hub, refusals, observer)
+            hub = Hub(store, settings, recon, observer.figures, refusals, writer)
+            loop = _Loop(entrance, hub, refusals, observer, writer)
             log.info("listening", address=" ".join(entrance.addresses), data=str(settings.data))
             with _scrapes(settings, observer):
                 loop.serve(stop)
@@ -78,8 +79,10 @@ def _scrapes(settings: ServiceSettings, observer: Observer) -> AbstractContextMa
 
 class _Loop:
     def __init__(
-        self, entrance: Entrance, hub: Hub, refusals: Refusals, observer: Observer
+        self, entrance: Entrance, hub: Hub, refusals: Refusals, observer: Observer,
+        writer: Threads,
     ) -> None:
+        self._writer = writer
         self._entrance = entrance
         self._hub = hub
         self._refusals = refusals
@@ -102,7 +105,11 @@ class _Loop:
                 self._give_out(outputs)
             for incoming in self._entrance.receive(max(0, math.ceil((due - now) * 1000))):
                 self._take_in(incoming)
+            if self._writer.drain():
+                self._give_out(self._hub.written(time.monotonic()))
             stop.drain()
+        # What is being written is kept and said; the sockets linger for it.
+        self._give_out(self._hub.written(time.monotonic(), all_of_it=True))
 
     def _drop_revoked(self) -> None:
         for peer in self._hub.peers():
@@ -124,7 +131,6 @@ class _Loop:
             self._refusals.note("role", **who, detail=lacks)
             self._give_out([_denied(incoming, message, lacks)])
             return
-        self._give_out(self._hub.next_job(time.monotonic(), incoming.peer, packet))
         self._give_out(self._hub.receive(
             time.monotonic(), incoming.peer, packet, incoming.key), packet)
 

@@ -1,13 +1,13 @@
 """The hub's first half: a press becomes a frame that is safe on the disk, or is refused."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import structlog
 
 from recon.settings import Settings
 from service import messages
-from service.errors import StoreError
+from service.errors import ServiceError, StoreError
 from service.failpoints import failpoint
 from service.outputs import Output, send
 from service.roster import Roster
@@ -15,16 +15,20 @@ from service.settings import ServiceSettings
 from service.states import CaptureEvent, CaptureState, advance
 from service.stored import Store
 from service.wire import Packet
+from service.writing import Writer, Written
 
 __all__ = ["Intake"]
 
 _MIB = 2**20
 _REFUSALS = 1000
+_MOST_KEEPING = 32
+"""Frames that may wait for the disk, which are in memory meanwhile; beyond it a press is refused.
+"""
 
 
 @dataclass
 class _Press:
-    """A press that waits for its frame; not on the disk, so it is lost with the hub."""
+    """A press whose frame is not yet on the disk, so it is lost with the hub."""
 
     sensor: bytes
     deadline: float
@@ -32,16 +36,21 @@ class _Press:
     """Fingerprint of the first presser's key; empty where it needed none."""
     pressers: dict[bytes, int] = field(default_factory=dict)
     """The last request of each client that pressed this id."""
+    giver: bytes | None = None
+    """The sensor whose frame is being written; None where none came."""
 
 
 class Intake:
-    """Presses that wait for their frame."""
+    """Presses that wait for their frame, or for their frame to be safe."""
 
     def __init__(
-        self, store: Store, roster: Roster, settings: ServiceSettings, recon: Settings,
-        recon_hash: str,
+        self, store: Store, writer: Writer, roster: Roster, settings: ServiceSettings,
+        recon: Settings, recon_hash: str, accepted: Callable[[str], None],
     ) -> None:
+        """Take presses; `accepted` is told of each frame that is safe."""
         self._store = store
+        self._writer = writer
+        self._accepted = accepted
         self._roster = roster
         self._settings = settings
         self._recon = recon
@@ -64,7 +73,7 @@ class Intake:
             yield send(peer, refused)
             return
         state = self._state(capture_id)
-        if state is CaptureState.PRESSED:
+        if state in (CaptureState.PRESSED, CaptureState.KEEPING):
             self._presses[capture_id].pressers[peer] = request
             return
         if state is not None:
@@ -86,6 +95,8 @@ class Intake:
     def _obstacle(self, queued: int) -> tuple[messages.PressReason, str] | None:
         if queued + len(self) >= self._settings.queue:
             return "queue", f"{self._settings.queue} frames wait for a worker already"
+        if sum(press.giver is not None for press in self._presses.values()) >= _MOST_KEEPING:
+            return "disk", f"{_MOST_KEEPING} frames wait for the disk already"
         try:
             free = self._store.free_bytes() // _MIB
         except StoreError as error:
@@ -97,27 +108,71 @@ class Intake:
         return None
 
     def frame(self, peer: bytes, message: messages.Frame, packet: Packet) -> Iterator[Output]:
-        """Keep a frame, then say so: to the sensor and to all who pressed."""
+        """Begin to keep a frame; what comes of it is said by `written`."""
         failpoint("hub.frame.received")
         capture_id = message.capture_id
         state = self._state(capture_id)
-        if advance(state, CaptureEvent.STORED) is None:
+        if state is CaptureState.KEEPING:  # a repeat; it is answered when the first is safe
+            return
+        if advance(state, CaptureEvent.RECEIVED) is None:
             yield send(peer, messages.FrameAccepted(capture_id=capture_id) if state else
                        messages.FrameRefused(capture_id=capture_id, message="nobody waits for it"))
             return
+        press = self._presses[capture_id]
+        press.giver = peer
         try:
-            self._store.accept(
-                packet, self._recon, self._recon_hash, self._presses[capture_id].key)
+            draft = self._store.frame_draft(packet, self._recon, self._recon_hash, press.key)
         except StoreError as error:
-            yield send(peer, messages.FrameRefused(capture_id=capture_id, message=str(error)))
-            yield from self.refuse(capture_id, "disk", str(error))
+            yield from self._not_kept(capture_id, error)
             return
+        self._writer.start(draft)
+
+    def written(self, frames: Sequence[Written]) -> Iterator[Output]:
+        """Say that frames are safe, or not: to the sensor and to all who pressed."""
+        for one in frames:
+            if isinstance(one.error, ServiceError):
+                yield from self._not_kept(one.draft.capture_id, one.error)
+            elif one.error:
+                raise one.error
+        good = [one for one in frames if one.error is None]
+        try:
+            if len(good) > 1:  # one sync of the database for all
+                self._store.accept(good)
+                for one in good:
+                    yield from self._kept(one.draft.capture_id)
+                return
+        except StoreError as error:
+            self._log.warning("frames are kept one by one", reason=str(error))
+        for one in good:
+            try:
+                self._store.accept([one])
+            except StoreError as error:
+                one.draft.discard()
+                yield from self._not_kept(one.draft.capture_id, error)
+            else:
+                yield from self._kept(one.draft.capture_id)
+
+    def _kept(self, capture_id: str) -> Iterator[Output]:
         self._log.info("accepted", capture_id=capture_id)
-        yield send(peer, messages.FrameAccepted(capture_id=capture_id))
-        for presser, request in self._presses.pop(capture_id).pressers.items():
+        press = self._presses.pop(capture_id)
+        self._accepted(capture_id)
+        if press.giver is not None:
+            yield send(press.giver, messages.FrameAccepted(capture_id=capture_id))
+        for presser, request in press.pressers.items():
             yield send(presser, messages.PressAccepted(request=request, capture_id=capture_id))
 
-    def refuse(
+    def _not_kept(self, capture_id: str, error: Exception) -> Iterator[Output]:
+        giver = self._presses[capture_id].giver
+        if giver is not None:
+            yield send(giver, messages.FrameRefused(capture_id=capture_id, message=str(error)))
+        yield from self._refuse(capture_id, "disk", str(error))
+
+    def no_frame(self, message: messages.FrameFailed) -> Iterator[Output]:
+        """Refuse a press for which the sensor has no frame."""
+        if self._state(message.capture_id) is CaptureState.PRESSED:
+            yield from self._refuse(message.capture_id, "sensor", message.message)
+
+    def _refuse(
         self, capture_id: str, reason: messages.PressReason, why: str
     ) -> Iterator[Output]:
         """Tell all who pressed that there is no capture."""
@@ -136,24 +191,26 @@ class Intake:
     def purge(self, capture_id: str | None) -> Iterator[Output]:
         """Refuse one press, or all where None, whose frame is no longer wanted."""
         for waiting in [capture_id] if capture_id else list(self._presses):
-            yield from self.refuse(waiting, "purged", "purged by an operator")
+            yield from self._refuse(waiting, "purged", "purged by an operator")
 
     def sensor_gone(self, peer: bytes, reason: str) -> Iterator[Output]:
         """Refuse what a sensor that went away was asked for."""
-        for capture_id in [key for key, press in self._presses.items() if press.sensor == peer]:
-            yield from self.refuse(
+        for capture_id in [key for key, press in self._presses.items()
+                           if press.sensor == peer and press.giver is None]:
+            yield from self._refuse(
                 capture_id, "sensor_gone", f"the sensor went away ({reason})")
 
     def tick(self, now: float) -> Iterator[Output]:
         """Refuse what took too long."""
-        late = [key for key, press in self._presses.items() if now >= press.deadline]
+        late = [key for key, press in self._presses.items()
+                if now >= press.deadline and press.giver is None]
         for capture_id in late:
             limit = self._settings.take_timeout_s
-            yield from self.refuse(
+            yield from self._refuse(
                 capture_id, "timeout", f"no frame from the sensor in {limit:g} s")
 
     def _state(self, capture_id: str) -> CaptureState | None:
-        if capture_id in self._presses:
-            return CaptureState.PRESSED
+        if press := self._presses.get(capture_id):
+            return CaptureState.PRESSED if press.giver is None else CaptureState.KEEPING
         stored = self._store.find(capture_id)
         return stored.state if stored else None

@@ -1,14 +1,16 @@
 """The hub's second half: a kept frame becomes an outcome, whatever happens to the workers."""
 
 from collections import deque
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import suppress
 
 import structlog
 from pydantic import ValidationError
 
 from recon.settings import Settings
 from service import messages
-from service.errors import CorruptFileError, ProtocolError, StoreError
+from service.errors import CorruptFileError, ProtocolError, ServiceError, StoreError
+from service.faces import Faces
 from service.failpoints import failpoint
 from service.outputs import Output, send
 from service.refusals import Refusals
@@ -16,11 +18,11 @@ from service.roster import Roster, Worker
 from service.states import CaptureEvent, CaptureState, advance
 from service.stored import Store, Stored
 from service.wire import Packet
+from service.writing import Writer, Written
 
 __all__ = ["Jobs"]
 
 _LOST = ("WorkerLost", "the worker that held it went away")
-_MOST_UNKEPT = 16
 _PAUSE_S = 1.0
 """Time until what the disk refused is tried again, seconds."""
 
@@ -29,7 +31,7 @@ class Jobs:
     """Frames that wait for a worker or are held by one."""
 
     def __init__(
-        self, store: Store, roster: Roster, attempts: int,
+        self, store: Store, writer: Writer, roster: Roster, attempts: int,
         concluded: Callable[[str], Iterator[Output]], refusals: Refusals,
     ) -> None:
         """Take up what the store has unfinished; `concluded` announces an outcome."""
@@ -40,8 +42,7 @@ class Jobs:
         self._refusals = refusals
         self._queue = deque(store.unfinished())
         self._reasons: dict[str, tuple[str, str]] = {}
-        self._unkept: deque[tuple[messages.Result, Packet]] = deque()
-        """Results that the disk refused; workers get nothing new meanwhile."""
+        self._faces = Faces(store, writer)
         self._paused_until = 0.0
         self._log = structlog.get_logger("hub")
         if self._queue:
@@ -55,7 +56,7 @@ class Jobs:
     @property
     def working(self) -> int:
         """Frames held by a worker."""
-        return sum(worker.job is not None for worker in self._roster.workers.values())
+        return sum(len(worker.jobs) for worker in self._roster.workers.values())
 
     def add(self, capture_id: str) -> None:
         """Queue a frame that was just kept."""
@@ -67,9 +68,9 @@ class Jobs:
         self._queue = deque(one for one in self._queue if one not in capture_ids)
         for capture_id in capture_ids:
             self._reasons.pop(capture_id, None)
+            self._faces.drop(capture_id)
         for worker in self._roster.workers.values():
-            if worker.job in capture_ids:
-                worker.job = None
+            worker.jobs = [one for one in worker.jobs if one not in capture_ids]
 
     def remake(self, capture_id: str, reason: str, *, attempts_left: bool = True) -> None:
         """Take up a capture again whose face turned out to be damaged."""
@@ -81,77 +82,63 @@ class Jobs:
     def dispatch(self, now: float) -> Iterator[Output]:
         """Give frames to free workers, oldest first; give up what has no attempt left.
 
-        While the disk refuses what is to be kept, nothing new is begun.
+        While the disk refuses what is to be kept, or many faces wait for it, nothing new is begun.
         """
-        if now < self._paused_until:
+        if now < self._paused_until or not self._faces.caught_up():
             return
         try:
-            yield from self._keep_refused()
             yield from self._dispatch(now)
         except StoreError as error:
             self._pause(now, str(error))
 
-    def _keep_refused(self) -> Iterator[Output]:
-        while self._unkept:
-            message, packet = self._unkept[0]
-            useful = self._of_use(message, CaptureEvent.RESULT)
-            if useful:
-                self._store.finish(packet)
-            self._unkept.popleft()
-            if useful:
-                self._log.info("done", capture_id=message.capture_id)
-                yield from self._concluded(message.capture_id)
-
     def _pause(self, now: float, reason: str) -> None:
         self._paused_until = now + _PAUSE_S
-        self._log.error("the disk refuses, work waits", reason=reason, unkept=len(self._unkept))
+        self._log.error("the disk refuses, work waits", reason=reason, unkept=len(self._faces))
 
     def _dispatch(self, now: float) -> Iterator[Output]:
         while self._queue:
             capture_id = self._queue[0]
             stored = self._store.find(capture_id)
-            if stored is None or stored.state is not CaptureState.ACCEPTED:
+            if (stored is None or stored.state is not CaptureState.ACCEPTED
+                    or capture_id in self._faces):
                 self._queue.popleft()
             elif stored.attempts >= self._attempts:
                 yield from self._give_up(capture_id, *self._reasons.get(capture_id, _LOST))
-            elif worker := self._roster.free_worker():
+            # What may have ended a worker is tried alone: no other frame is lost or blamed with it.
+            elif worker := self._roster.free_worker(alone=stored.attempts > 0):
                 yield from self._give(now, capture_id, stored, worker)
             else:
                 return
 
-    def next_job(self, now: float, peer: bytes, answer: messages.Result) -> Iterator[Output]:
-        """Give a worker its next frame before its answer is kept: it need not wait for the disk.
-
-        Its answer counts as its next `WorkerReady`, which then asks for nothing new.
-        """
-        worker = self._roster.workers.get(peer)
-        if (worker and worker.job == answer.capture_id
-                and self._of_use(answer, CaptureEvent.RESULT)):
-            self._roster.answered(worker)
-            yield from self.dispatch(now)
-
-    def result(
-        self, now: float, peer: bytes, message: messages.Result, packet: Packet
-    ) -> Iterator[Output]:
-        """Keep and announce a face, unless this capture has its outcome."""
+    def result(self, peer: bytes, message: messages.Result, packet: Packet) -> None:
+        """Begin to keep a face, unless this capture has one; `written` says what comes of it."""
         failpoint("hub.result.received")
-        capture_id = message.capture_id
-        if not self._expected(peer, message, CaptureEvent.RESULT):
-            return
-        try:
-            message.face.join(packet.arrays)
-            self._store.finish(packet)
-        except ProtocolError as error:
-            self._retry(capture_id, type(error).__name__, str(error))
-        except StoreError as error:
-            self._pause(now, str(error))
-            if len(self._unkept) < _MOST_UNKEPT:
-                self._unkept.append((message, packet))
-            else:
+        if self._expected(peer, message, CaptureEvent.RESULT):
+            try:
+                message.face.join(packet.arrays)
+                self._faces.keep(packet)
+            except (ProtocolError, StoreError) as error:
+                self._retry(message.capture_id, type(error).__name__, str(error))
+
+    def written(self, now: float, faces: Sequence[Written]) -> Iterator[Output]:
+        """Announce faces that are safe, in order; those that the disk refused wait."""
+        for capture_id, error in self._faces.written(faces):
+            if error is None:
+                self._log.info("done", capture_id=capture_id)
+                yield from self._announce(capture_id)
+                continue
+            if isinstance(error, StoreError):
+                self._pause(now, str(error))
+            if capture_id not in self._faces:
                 self._retry(capture_id, type(error).__name__, str(error))
-        else:
-            self._log.info("done", capture_id=capture_id)
+            if not isinstance(error, ServiceError):
+                raise error
+
+    def _announce(self, capture_id: str) -> Iterator[Output]:
+        try:
             yield from self._concluded(capture_id)
+        except StoreError as error:  # subscribers will see the gap and ask for it
+            self._log.error("not announced", capture_id=capture_id, reason=str(error))
 
     def failed(self, peer: bytes, message: messages.JobFailed) -> Iterator[Output]:
         """Announce "no face", or try again."""
@@ -171,15 +158,22 @@ class Jobs:
             yield from self._concluded(capture_id)
 
     def lost(self, worker: Worker) -> None:
-        """Take back what a worker held that went away or came back without an answer."""
-        capture_id, worker.job = worker.job, None
-        if capture_id and self._state(capture_id) is CaptureState.ACCEPTED:
-            self._retry(capture_id, *_LOST)
+        """Take back what a worker held that went away.
+
+        It was working on the first: the others were not begun.
+        """
+        self._hand_back(worker, worker.jobs[1:])
+        while worker.jobs:
+            self._retry(worker.jobs.pop(), *_LOST)
 
     def handed_back(self, worker: Worker) -> None:
-        """Take back what a worker held that was told to stop; as an attempt it does not count."""
-        capture_id, worker.job = worker.job, None
-        if capture_id and self._state(capture_id) is CaptureState.ACCEPTED:
+        """Take back what a worker held that was told to stop."""
+        self._hand_back(worker, list(worker.jobs))
+
+    def _hand_back(self, worker: Worker, capture_ids: Sequence[str]) -> None:
+        """Put jobs back in the queue; as an attempt it does not count."""
+        for capture_id in reversed(capture_ids):
+            worker.jobs.remove(capture_id)
             try:
                 self._store.take_back_attempt(capture_id)
             except StoreError as error:
@@ -197,7 +191,10 @@ class Jobs:
             return
         attempt = self._store.start_attempt(capture_id)
         self._queue.popleft()
-        worker.free, worker.job, worker.seen = False, capture_id, now
+        if not worker.jobs:
+            worker.seen = now
+        worker.free, worker.alone = False, attempt > 1
+        worker.jobs.append(capture_id)
         self._log.info("dispatched", capture_id=capture_id, worker=worker.name, attempt=attempt)
         yield send(worker.peer, messages.Job(
             capture_id=capture_id, attempt=attempt, settings=settings,
@@ -212,7 +209,14 @@ class Jobs:
         yield from self._concluded(capture_id)
 
     def _retry(self, capture_id: str, error: str, reason: str) -> None:
-        if capture_id not in self._queue and self._holder(capture_id) is None:
+        """Put a capture back in the queue that waits for a face.
+
+        Where the store cannot be read it is put back, and `dispatch` looks again.
+        """
+        with suppress(StoreError):
+            if self._state(capture_id) is not CaptureState.ACCEPTED:
+                return
+        if capture_id not in self._queue:
             self._log.warning(
                 "to be tried again", capture_id=capture_id, error=error, reason=reason)
             self._reasons[capture_id] = error, reason
@@ -225,10 +229,14 @@ class Jobs:
         capture_id = answer.capture_id
         useful = self._of_use(answer, event)
         worker = self._roster.workers.get(peer)
-        if worker and worker.job == capture_id:
-            worker.job = None
-            if not useful and self._state(capture_id) is CaptureState.ACCEPTED:
-                self._retry(capture_id, "RemoteProtocolError", "the answer was to another job")
+        if worker and capture_id in worker.jobs:
+            at = worker.jobs.index(capture_id)
+            # Jobs are answered in order: the answers to those before it were lost.
+            before, worker.jobs = worker.jobs[:at], worker.jobs[at + 1:]
+            for one in before if useful else [*before, capture_id]:
+                reason = ("the answer was to another job" if one == capture_id
+                          else "its answer was lost")
+                self._retry(one, "RemoteProtocolError", reason)
         if not useful:
             self._refusals.note("replayed", capture_id=capture_id, detail=f"{event}, not asked for")
         return useful
@@ -245,9 +253,13 @@ class Jobs:
         stored = self._store.find(capture_id)
         if stored is None:
             return None
-        held = stored.state is CaptureState.ACCEPTED and self._holder(capture_id)
-        return CaptureState.WORKING if held else stored.state
+        if stored.state is CaptureState.ACCEPTED:
+            if capture_id in self._faces:
+                return CaptureState.CONCLUDING
+            if self._holder(capture_id):
+                return CaptureState.WORKING
+        return stored.state
 
     def _holder(self, capture_id: str) -> Worker | None:
         return next((worker for worker in self._roster.workers.values()
-                     if worker.job == capture_id), None)
+                     if capture_id in worker.jobs), None)

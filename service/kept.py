@@ -4,6 +4,7 @@ The first part says when and with which settings; then comes the message as it a
 database can be made again from the files alone.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, TypeVar
@@ -16,8 +17,8 @@ from service.payload import Arrays
 from service.spool import read_parts, write_parts
 from service.wire import Packet, decode_kept, encode
 
-__all__ = ["FaceAbout", "FrameAbout", "KeptFace", "KeptFrame", "read_face", "read_frame",
-           "write_kept"]
+__all__ = ["Draft", "FaceAbout", "FrameAbout", "KeptFace", "KeptFrame", "read_face",
+           "read_frame"]
 
 _Time = Annotated[str, Field(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}\+00:00$")]
 
@@ -66,10 +67,33 @@ class KeptFace:
     checksum: str
 
 
-def write_kept(path: Path, about: FrameAbout | FaceAbout, packet: Packet) -> str:
-    """Write a file durably and give its checksum; errors as `write_parts`."""
-    steps = "hub.frame" if isinstance(about, FrameAbout) else "hub.face"
-    return write_parts(path, [about.model_dump_json().encode(), *encode(packet)], steps=steps)
+@dataclass(frozen=True)
+class Draft:
+    """A frame or a face before it is on the disk: its file comes first, then its row."""
+
+    capture_id: str
+    path: Path
+    about: FrameAbout | FaceAbout
+    packet: Packet
+
+    @property
+    def steps(self) -> str:
+        """How the names of its failpoints begin."""
+        return "hub.frame" if isinstance(self.about, FrameAbout) else "hub.face"
+
+    def write(self) -> str:
+        """Write the file, whose name is not yet durable, and give its checksum.
+
+        Raises as `write_parts`.
+        """
+        return write_parts(
+            self.path, [self.about.model_dump_json().encode(), *encode(self.packet)],
+            named=False, steps=self.steps)
+
+    def discard(self) -> None:
+        """Remove the file; where it resists, it is taken in at the next start."""
+        with suppress(OSError):
+            self.path.unlink(missing_ok=True)
 
 
 def read_frame(path: Path, checksum: str | None = None) -> KeptFrame:

@@ -26,14 +26,15 @@ class Worker:
     peer: bytes
     name: str
     seen: float
-    """When it was last known to be alive and, where it has a job, to hold it; seconds."""
+    """When it was last known to be alive and, where it has jobs, to hold one; seconds."""
     credit: int = -1
-    """The last `WorkerReady.credit` heard, or foreseen."""
-    foreseen: int | None = None
-    """The credit that an answer implied; to hear it once is no replay."""
+    """The last `WorkerReady.credit` heard."""
     free: bool = False
-    job: str | None = None
-    """The capture that it was given."""
+    """It has room for one more job."""
+    jobs: list[str] = field(default_factory=list)
+    """The captures that it was given and has not answered, in order: it works on the first."""
+    alone: bool = False
+    """The job that it was given last shall have none beside it."""
 
 
 @dataclass
@@ -61,12 +62,6 @@ class Roster:
             worker.credit, worker.free, worker.seen = credit, True, now
         return worker
 
-    def answered(self, worker: Worker) -> None:
-        """Note that a worker is free by its answer, before it says so."""
-        worker.job, worker.free = None, True
-        worker.credit += 1
-        worker.foreseen = worker.credit
-
     def heartbeat(self, peer: bytes, holding: str | None, now: float) -> bool:
         """Note a sign of life; False where the hub cannot do with it what it might.
 
@@ -77,9 +72,9 @@ class Roster:
             sensor.seen = now
         elif worker := self.workers.get(peer):
             # A worker that lives without the job it was given never got it: let it go silent.
-            if worker.job is None or worker.job == holding:
+            if not worker.jobs or holding is not None:
                 worker.seen = now
-            return worker.free or worker.job is not None or holding is not None
+            return worker.free or bool(worker.jobs) or holding is not None
         else:
             return False
         return True
@@ -89,9 +84,11 @@ class Roster:
         for one in self._everyone():
             one.seen += seconds
 
-    def free_worker(self) -> Worker | None:
-        """Give the free worker that has been known longest."""
-        return next((worker for worker in self.workers.values() if worker.free), None)
+    def free_worker(self, *, alone: bool) -> Worker | None:
+        """Give the free worker with the fewest jobs, none where it is to be `alone` with one."""
+        free = [worker for worker in self.workers.values() if worker.free and (
+            not worker.jobs or not (alone or worker.alone))]
+        return min(free, key=lambda worker: len(worker.jobs), default=None)
 
     def sensor(self) -> Sensor | None:
         """Give the sensor that has been known longest."""

@@ -24,13 +24,14 @@ _MOST_BYTES = 128 * 2**20
 
 
 def write_atomically(
-    path: Path, chunks: Sequence[bytes], *, durable: bool = True, mode: int = 0o666,
-    steps: str = "",
+    path: Path, chunks: Sequence[bytes], *, durable: bool = True, named: bool = True,
+    mode: int = 0o666, steps: str = "",
 ) -> None:
     """Write a file so that `path` is ever either the old contents or all of the new.
 
-    With `durable`, it is on the disk, and so is its name, when this returns. `mode`, less the
-    umask, is that of the file. `steps` begins the names of this write's failpoints.
+    With `durable`, it is on the disk, and with `named` so is its name, when this returns; without,
+    that is left to `sync_folder`. `mode`, less the umask, is that of the file. `steps` begins the
+    names of this write's failpoints.
 
     Raises
     ------
@@ -54,12 +55,14 @@ def write_atomically(
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise
-    if durable:
+    if durable and named:
         sync_folder(path.parent)
 
 
-def write_parts(path: Path, parts: Sequence[bytes], *, steps: str = "") -> str:
-    """Write parts durably and give their checksum, hexadecimal; `steps` as `write_atomically`.
+def write_parts(
+    path: Path, parts: Sequence[bytes], *, named: bool = True, steps: str = ""
+) -> str:
+    """Write parts durably and give their checksum, hexadecimal; the rest as `write_atomically`.
 
     Raises
     ------
@@ -74,7 +77,8 @@ def write_parts(path: Path, parts: Sequence[bytes], *, steps: str = "") -> str:
         digest.update(part)
     try:
         write_atomically(
-            path, [_MAGIC, digest.digest(), index, *parts], mode=0o600, steps=steps)
+            path, [_MAGIC, digest.digest(), index, *parts], named=named, mode=0o600,
+            steps=steps)
     except OSError as error:
         raise store_error(path, error) from error
     return digest.hexdigest()

@@ -10,12 +10,16 @@ class CaptureState(StrEnum):
 
     PRESSED = "pressed"
     """The sensor was asked for a frame."""
+    KEEPING = "keeping"
+    """The frame came and is being written."""
     REFUSED = "refused"
     """No frame came or it could not be kept: forgotten, the id may be pressed again."""
     ACCEPTED = "accepted"
     """Safe on disk, waits for a worker."""
     WORKING = "working"
     """A worker holds it."""
+    CONCLUDING = "concluding"
+    """The face came and is being written."""
     DONE = "done"
     """A face was published."""
     FAILED = "failed"
@@ -30,8 +34,10 @@ class CaptureState(StrEnum):
 class CaptureEvent(StrEnum):
     """What may happen to a capture."""
 
+    RECEIVED = "received"
+    """The frame came."""
     STORED = "stored"
-    """The frame came and is safe."""
+    """The frame is safe."""
     NOT_TAKEN = "not taken"
     """The sensor failed, went away or took too long, or the disk is full."""
     DISPATCHED = "dispatched"
@@ -42,6 +48,11 @@ class CaptureEvent(StrEnum):
     HANDED_BACK = "handed back"
     """The worker was told to stop before it was through; counts for no attempt."""
     RESULT = "result"
+    """A face came."""
+    CONCLUDED = "concluded"
+    """The face is safe."""
+    NOT_KEPT = "not kept"
+    """The face is none, or so many wait for a disk that refuses them that this one is let go."""
     REJECTED = "rejected"
     """A worker says that no attempt would find a face."""
     DAMAGED = "damaged"
@@ -57,18 +68,23 @@ class CaptureEvent(StrEnum):
 _S, _E = CaptureState, CaptureEvent
 
 TRANSITIONS: dict[tuple[CaptureState, CaptureEvent], CaptureState] = {
-    (_S.PRESSED, _E.STORED): _S.ACCEPTED,
+    # What is being written cannot be stopped: a purge waits for it, a time-out does not count.
+    (_S.PRESSED, _E.RECEIVED): _S.KEEPING,
     (_S.PRESSED, _E.NOT_TAKEN): _S.REFUSED,
+    (_S.KEEPING, _E.STORED): _S.ACCEPTED,
+    (_S.KEEPING, _E.NOT_TAKEN): _S.REFUSED,
     (_S.ACCEPTED, _E.DISPATCHED): _S.WORKING,
     (_S.ACCEPTED, _E.EXHAUSTED): _S.DEAD,
     # From a worker that was thought lost.
-    (_S.ACCEPTED, _E.RESULT): _S.DONE,
+    (_S.ACCEPTED, _E.RESULT): _S.CONCLUDING,
     (_S.ACCEPTED, _E.REJECTED): _S.FAILED,
-    (_S.WORKING, _E.RESULT): _S.DONE,
+    (_S.WORKING, _E.RESULT): _S.CONCLUDING,
     (_S.WORKING, _E.REJECTED): _S.FAILED,
     (_S.WORKING, _E.LOST): _S.ACCEPTED,
     (_S.WORKING, _E.EXHAUSTED): _S.DEAD,
     (_S.WORKING, _E.HANDED_BACK): _S.ACCEPTED,
+    (_S.CONCLUDING, _E.CONCLUDED): _S.DONE,
+    (_S.CONCLUDING, _E.NOT_KEPT): _S.ACCEPTED,
     # The outcome is withdrawn, its sequence number used up; the next one gets a new number. So
     # exactly one outcome stands for an id, the one with the highest number seen.
     (_S.DONE, _E.DAMAGED): _S.ACCEPTED,

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
+from sqlite3 import Connection
 from typing import Self
 
 from recon.settings import Settings
@@ -25,13 +26,13 @@ from service.errors import (
 )
 from service.failpoints import failpoint
 from service.kept import (
+    Draft,
     FaceAbout,
     FrameAbout,
     KeptFace,
     KeptFrame,
     read_face,
     read_frame,
-    write_kept,
 )
 from service.layout import Layout
 from service.messages import CaptureFailed, DeadLetter, FaceDone, Frame, Result
@@ -41,6 +42,7 @@ from service.spool import store_error, sync_folder
 from service.states import CaptureState
 from service.stored import Stored
 from service.wire import Packet
+from service.writing import Written
 
 __all__ = ["FolderStore", "check_folder"]
 
@@ -69,8 +71,9 @@ class FolderStore:
     def __init__(self, folder: Path, clock: Clock | None = None) -> None:
         with _naming(folder):
             self._layout = Layout(private_folder(folder))
-        self._fresh: KeptFrame | None = None
-        self._fresh_face: KeptFace | None = None
+        self._fresh: dict[str, KeptFrame] = {}
+        self._fresh_faces: dict[str, KeptFace] = {}
+        """What was kept last, by capture: it is asked for at once."""
         self._unread: set[str] = set()
         """Captures whose face was published from memory and never read from its file."""
         self._lock = _lock(self._layout.lock)
@@ -109,10 +112,10 @@ class FolderStore:
         except OSError as error:
             raise store_error(self._layout.frames, error) from error
 
-    def accept(
+    def frame_draft(
         self, frame: Packet, settings: Settings, settings_hash: str, pressed_by: str = ""
-    ) -> None:
-        """Keep a `Frame`."""
+    ) -> Draft:
+        """Give what is to be written of a `Frame`."""
         message = frame.message
         if not isinstance(message, Frame):
             raise TypeError(f"a Frame is accepted, found {message.kind}")
@@ -123,19 +126,19 @@ class FolderStore:
             accepted_at=stamp(self._account.wall()), clock=clock,
             settings=settings.model_dump_json(), settings_hash=settings_hash,
             pressed_by=pressed_by)
-        path = self._layout.frame(capture_id)
-        try:
-            checksum = write_kept(path, about, frame)
-            self._database.all(
+        return Draft(capture_id, self._layout.frame(capture_id), about, frame)
+
+    def accept(self, frames: Sequence[Written]) -> None:
+        """Keep frames that were written, all or none."""
+        fresh = {one.draft.capture_id: _kept_frame(one) for one in frames}
+        with self._database.transaction() as database:
+            database.executemany(
                 "INSERT INTO captures (capture_id, state, settings_hash, frame_sha256,"
                 " accepted_at, pressed_by) VALUES (?, ?, ?, ?, ?, ?)",
-                capture_id, CaptureState.ACCEPTED, settings_hash, checksum, about.accepted_at,
-                pressed_by)
-        except StoreError:
-            with suppress(OSError):  # at worst it is taken in at the next start
-                path.unlink(missing_ok=True)
-            raise
-        self._fresh = KeptFrame(message, frame.arrays, about, checksum)
+                [(capture_id, CaptureState.ACCEPTED, kept.about.settings_hash, kept.checksum,
+                  kept.about.accepted_at, kept.about.pressed_by)
+                 for capture_id, kept in fresh.items()])
+        self._fresh = fresh
         failpoint("hub.frame.stored")
 
     def find(self, capture_id: str) -> Stored | None:
@@ -175,7 +178,7 @@ class FolderStore:
         path = self._layout.frame(capture_id)
         try:
             # Most go to a worker in the moment they are safe; whoever reads later reads the file.
-            fresh, self._fresh = self._fresh, None
+            fresh = self._fresh.pop(capture_id, None)
             if fresh and fresh.checksum == stored.frame_sha256:
                 return fresh
             return read_frame(path, stored.frame_sha256)
@@ -183,8 +186,8 @@ class FolderStore:
             self._quarantine.take(path, str(error), capture_id)
             raise
 
-    def finish(self, result: Packet) -> None:
-        """Keep a `Result` as the capture's outcome; a second one changes nothing."""
+    def face_draft(self, result: Packet) -> Draft:
+        """Give what is to be written of a `Result`; StoreError where it is of no use."""
         message = result.message
         if not isinstance(message, Result):
             raise TypeError(f"a Result finishes a capture, found {message.kind}")
@@ -192,20 +195,34 @@ class FolderStore:
             "SELECT accepted_at FROM captures WHERE capture_id = ? AND state = ?",
             message.capture_id, CaptureState.ACCEPTED)
         if row is None:
-            return
-        now = stamp(self._account.wall())
+            raise StoreError(f"capture {message.capture_id} waits for no face")
         about = FaceAbout(
-            accepted_at=row["accepted_at"], finished_at=now, clock=self._account.save())
-        checksum = write_kept(
-            self._layout.face(message.capture_id, message.settings_hash), about, result)
-        self._fresh_face = KeptFace(message, result.arrays, about, checksum)
-        self._unread.add(message.capture_id)
-        self._conclude(message.capture_id, CaptureState.DONE, now, face_sha256=checksum)
+            accepted_at=row["accepted_at"], finished_at=stamp(self._account.wall()),
+            clock=self._account.save())
+        return Draft(message.capture_id,
+                     self._layout.face(message.capture_id, message.settings_hash), about, result)
+
+    def finish(self, faces: Sequence[Written]) -> None:
+        """Keep faces that were written as outcomes, in order, all or none.
+
+        A second outcome of a capture changes nothing.
+        """
+        fresh = {one.draft.capture_id: _kept_face(one) for one in faces}
+        with self._database.transaction() as database:
+            for capture_id, kept in fresh.items():
+                self._conclude(database, capture_id, CaptureState.DONE, kept.about.finished_at,
+                               face_sha256=kept.checksum)
+        self._fresh_faces = fresh
+        self._unread.update(fresh)
+        failpoint("hub.outcome.stored")
 
     def fail(self, capture_id: str, error: str, message: str, *, dead: bool) -> None:
         """Keep a failure as the capture's outcome."""
-        self._conclude(capture_id, CaptureState.DEAD if dead else CaptureState.FAILED,
-                       stamp(self._account.wall()), error=error, message=message)
+        with self._database.transaction() as database:
+            self._conclude(
+                database, capture_id, CaptureState.DEAD if dead else CaptureState.FAILED,
+                stamp(self._account.wall()), error=error, message=message)
+        failpoint("hub.outcome.stored")
 
     def reopen(self, capture_id: str, *, attempts_left: bool) -> None:
         """Withdraw an outcome: the capture is accepted again, its number is used up."""
@@ -321,7 +338,7 @@ class FolderStore:
         """Remove the files, then the rows: a row of a file that is gone says so in its state."""
         if not capture_ids:
             return
-        self._fresh = self._fresh_face = None
+        self._fresh, self._fresh_faces = {}, {}
         self._unread.difference_update(capture_ids)
         for capture_id in capture_ids:
             row = self._database.one(
@@ -344,20 +361,18 @@ class FolderStore:
         self._database.truncate_log()
 
     def _conclude(
-        self, capture_id: str, state: CaptureState, now: str, *, face_sha256: str | None = None,
-        error: str | None = None, message: str | None = None,
+        self, database: Connection, capture_id: str, state: CaptureState, now: str, *,
+        face_sha256: str | None = None, error: str | None = None, message: str | None = None,
     ) -> None:
-        with self._database.transaction() as database:
-            changed = database.execute(
-                "UPDATE captures SET state = ? WHERE capture_id = ? AND state = ?",
-                (state, capture_id, CaptureState.ACCEPTED))
-            if changed.rowcount:
-                database.execute(
-                    "INSERT INTO outcomes (capture_id, face_sha256, error, message, dead,"
-                    " finished_at, finished_age_s) VALUES (?, ?, ?, ?, ?, ?, ?)",
-                    (capture_id, face_sha256, error, message, state is CaptureState.DEAD, now,
-                     self._account.now()))
-        failpoint("hub.outcome.stored")
+        changed = database.execute(
+            "UPDATE captures SET state = ? WHERE capture_id = ? AND state = ?",
+            (state, capture_id, CaptureState.ACCEPTED))
+        if changed.rowcount:
+            database.execute(
+                "INSERT INTO outcomes (capture_id, face_sha256, error, message, dead,"
+                " finished_at, finished_age_s) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                (capture_id, face_sha256, error, message, state is CaptureState.DEAD, now,
+                 self._account.now()))
 
     def _outcome(self, which: str, *values: str | int) -> Packet | None:
         row = self._database.one(
@@ -372,7 +387,7 @@ class FolderStore:
                 **common, error=row["error"], message=row["message"], dead=bool(row["dead"])))
         path = self._layout.face(capture_id, row["settings_hash"])
         try:
-            fresh, self._fresh_face = self._fresh_face, None
+            fresh = self._fresh_faces.pop(capture_id, None)
             if fresh is None or fresh.checksum != row["face_sha256"]:
                 fresh = read_face(path, row["face_sha256"])
                 self._unread.discard(capture_id)
@@ -384,6 +399,20 @@ class FolderStore:
     def _ids(self, which: str, *values: str | int) -> list[str]:
         return [row["capture_id"] for row in self._database.all(
             f"SELECT capture_id FROM captures WHERE {which}", *values)]  # noqa: S608
+
+
+def _kept_frame(written: Written) -> KeptFrame:
+    draft = written.draft
+    if not isinstance(draft.packet.message, Frame) or not isinstance(draft.about, FrameAbout):
+        raise TypeError(f"a frame is accepted, found {draft.packet.message.kind}")
+    return KeptFrame(draft.packet.message, draft.packet.arrays, draft.about, written.checksum)
+
+
+def _kept_face(written: Written) -> KeptFace:
+    draft = written.draft
+    if not isinstance(draft.packet.message, Result) or not isinstance(draft.about, FaceAbout):
+        raise TypeError(f"a face finishes a capture, found {draft.packet.message.kind}")
+    return KeptFace(draft.packet.message, draft.packet.arrays, draft.about, written.checksum)
 
 
 @contextmanager

@@ -6,10 +6,11 @@ from datetime import datetime
 from typing import Protocol
 
 from recon.settings import Settings
-from service.kept import KeptFrame
+from service.kept import Draft, KeptFrame
 from service.messages import DeadLetter
 from service.states import CaptureState
 from service.wire import Packet
+from service.writing import Written
 
 __all__ = ["Store", "Stored"]
 
@@ -30,7 +31,8 @@ class Stored:
 class Store(Protocol):
     """Captures and their outcomes.
 
-    Each call is durable when it returns, or raises StoreError; where the database itself is
+    A file is written between its draft and its row, by a `service.writing.Writer`. Each other
+    call is durable when it returns, or raises StoreError; where the database itself is
     malformed, DamagedDatabaseError.
     """
 
@@ -41,10 +43,13 @@ class Store(Protocol):
     def free_bytes(self) -> int:
         """Give the room that is left on the disk."""
 
-    def accept(
+    def frame_draft(
         self, frame: Packet, settings: Settings, settings_hash: str, pressed_by: str = ""
-    ) -> None:
-        """Keep a `Frame`; where that fails, nothing of it stays."""
+    ) -> Draft:
+        """Give what is to be written of a `Frame`."""
+
+    def accept(self, frames: Sequence[Written]) -> None:
+        """Keep frames that were written, all or none."""
 
     def find(self, capture_id: str) -> Stored | None:
         """Give a capture's row."""
@@ -61,8 +66,14 @@ class Store(Protocol):
     def frame(self, capture_id: str) -> KeptFrame:
         """Give the frame back; CorruptFileError where it is damaged, which quarantines it."""
 
-    def finish(self, result: Packet) -> None:
-        """Keep a `Result` as the capture's outcome; a second one changes nothing."""
+    def face_draft(self, result: Packet) -> Draft:
+        """Give what is to be written of a `Result`; StoreError where it is of no use."""
+
+    def finish(self, faces: Sequence[Written]) -> None:
+        """Keep faces that were written as outcomes, in order, all or none.
+
+        A second outcome of a capture changes nothing.
+        """
 
     def fail(self, capture_id: str, error: str, message: str, *, dead: bool) -> None:
         """Keep a failure as the capture's outcome."""

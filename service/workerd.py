@@ -1,4 +1,4 @@
-"""A worker's process: one job at a time, from frame to face."""
+"""A worker's process: one job at a time, from frame to face, and the next one at hand."""
 
 import os
 import socket
@@ -55,6 +55,8 @@ class _Worker:
         self._compute = compute
         self._log = structlog.get_logger("worker")
         self._job: Job | None = None
+        self._next: Packet | None = None
+        """The job that follows."""
         self._answer: Callable[[], bool] | None = None
         self._credit = 0
 
@@ -62,20 +64,24 @@ class _Worker:
         for packet in self._link.packets(stop, self._compute, self._holding):
             if packet is not None:
                 self._receive(packet)
+            self._deliver()
             if self._compute.ended():
-                self._answer = self._computed()
+                if self._answer is None:
+                    self._answer = self._computed()
+                    self._deliver()
             elif self._compute.elapsed_s > self._settings.job_timeout_s:
                 self._log.error("job takes too long", capture_id=self._holding(),
                                 seconds=self._compute.elapsed_s)
                 os._exit(1)
-            if self._answer and self._answer():  # kept until the hub is there to take it
-                failpoint("worker.result.sent")
-                self._answer = self._job = None
-                self._credit += 1
-                self._ready()
+
+    def _deliver(self) -> None:
+        if self._answer and self._answer():  # kept until the hub is there to take it
+            failpoint("worker.result.sent")
+            self._answer = None
 
     def finish(self) -> None:
         """End the job under way and deliver it; where that takes too long, leave it."""
+        self._next = None
         deadline = time.monotonic() + _FINISH_S
         while not self._compute.ends_within(min(self._settings.heartbeat_s, _FINISH_S)):
             if time.monotonic() >= deadline:
@@ -83,10 +89,10 @@ class _Worker:
                                   seconds=round(self._compute.elapsed_s, 1))
                 return
             self._link.send(Heartbeat(holding=self._holding()))
+        self._deliver()
         if self._compute:
             self._answer = self._computed()
-        if self._answer:
-            self._answer()
+            self._deliver()
 
     def _holding(self) -> str | None:
         return self._job.capture_id if self._job else None
@@ -98,24 +104,34 @@ class _Worker:
     def _receive(self, packet: Packet) -> None:
         match packet.message:
             case Announce():
-                if self._job is None:
+                if self._next is None:
                     self._ready()
             case Job() as job:
-                if self._job is not None:  # the hub redelivers what this worker does not hold
+                if self._next is not None:  # the hub redelivers what this worker does not hold
                     self._log.warning("job dropped, busy", capture_id=job.capture_id)
                     return
-                self._job = job
-                self._log.info("job", capture_id=job.capture_id, attempt=job.attempt)
                 failpoint("worker.job.received")
-                self._compute.start(lambda: _face_of(job, packet.arrays))
+                self._next = packet
+                if self._job is None:
+                    self._begin()
+
+    def _begin(self) -> None:
+        """Work on the next job, if there is one, and ask for the one after it."""
+        packet, self._next, self._job = self._next, None, None
+        if packet and isinstance(packet.message, Job):
+            self._job = job = packet.message
+            self._log.info("job", capture_id=job.capture_id, attempt=job.attempt)
+            self._compute.start(lambda: _face_of(job, packet.arrays))
+            self._credit += 1
+            self._ready()
 
     def _computed(self) -> Callable[[], bool]:
-        """Give what sends the answer to the present job."""
+        """Begin the next job and give what sends the answer to the one before."""
         job = self._job
         if job is None:
             raise RuntimeError("a computation without a job ended")
         try:
-            face = self._compute.take()
+            face = self._taken()
             failpoint("worker.job.computed")
             report = face.report.model_copy(update={"capture_id": job.capture_id})
             header, arrays = FaceHeader.of(Face(face.initial, face.dense, report))
@@ -135,6 +151,13 @@ class _Worker:
         self._log.info("face", capture_id=job.capture_id, points=report.dense_points,
                        total_ms=round(report.timings_ms.get("total", 0.0)))
         return lambda: self._link.send(result, arrays)
+
+
+    def _taken(self) -> Face:
+        try:
+            return self._compute.take()
+        finally:
+            self._begin()
 
 
 def _face_of(job: Job, arrays: Arrays) -> Face:

@@ -23,6 +23,7 @@ from service.store import FolderStore
 from service.wire import Packet, decode_from_hub, encode
 from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, service, until
 from tests.unit.service.faces import small_face, small_frame
+from tests.unit.service.keep import accept, finish
 
 FRAME, FRAME_ARRAYS = FrameHeader.of(small_frame())
 FACE, FACE_ARRAYS = FaceHeader.of(small_face())
@@ -41,9 +42,9 @@ def fill(data, *done):
     """Keep captures as a hub does that was stopped."""
     with FolderStore(data) as store:
         for name in done:
-            store.accept(
-                Packet(Frame(capture_id=name, frame=FRAME), FRAME_ARRAYS), Settings(), HASH)
-            store.finish(Packet(Result(
+            accept(store, Packet(Frame(capture_id=name, frame=FRAME), FRAME_ARRAYS), Settings(),
+                   HASH)
+            finish(store, Packet(Result(
                 capture_id=name, settings_hash=HASH, face=FACE,
                 frame_sha256=store.find(name).frame_sha256), FACE_ARRAYS))
 

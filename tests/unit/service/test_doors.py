@@ -96,7 +96,7 @@ def test_who_was_refused_comes_in_once_allowed(context, wakes, tmp_path, monkeyp
     address, refusals = _address(), Refusals(Counters())
     settings = ServiceSettings(address=address, key=secret, hub_key=hub_key)
     doors = ServiceSettings(address=_address(), listen=(address,), keys=tmp_path)
-    entrance = Entrance(context, doors, refusals, wakes)
+    entrance = Entrance(context, doors, refusals, [wakes])
     dealer, knock = connect(context, zmq.DEALER, address, Credentials.of(settings))
     try:
         _until(entrance, lambda _: knock.read() or knock.refused)
@@ -135,7 +135,7 @@ def test_keys_are_for_other_machines(tmp_path):
 def test_only_a_port_can_be_guarded(context, wakes, address):
     with pytest.raises(AddressError, match=address):
         Entrance(context, ServiceSettings(address=_address(), listen=(address,)),
-                 Refusals(Counters()), wakes)
+                 Refusals(Counters()), [wakes])
 
 
 def test_several_addresses_come_with_commas():

@@ -98,5 +98,5 @@ def test_every_failpoint_is_somewhere_and_none_else():
                          and one.value.startswith(("hub.", "worker.", "capture."))
                          and one.value.count(".") == 2)
     spool = {f"{steps}.{step}" for steps in ("hub.frame", "hub.face")
-             for step in ("written", "synced", "renamed")}
+             for step in ("written", "synced", "renamed", "named")}
     assert found | spool == set(NAMES)

@@ -418,10 +418,13 @@ def test_the_table_leads_from_every_state_on_disk_to_an_end():
     reached = {CaptureState.ACCEPTED}
     for _ in CaptureState:
         reached |= {after for (before, _), after in TRANSITIONS.items() if before in reached}
-    assert reached == set(CaptureState) - {CaptureState.PRESSED, CaptureState.REFUSED}
+    assert reached == set(CaptureState) - {
+        CaptureState.PRESSED, CaptureState.KEEPING, CaptureState.REFUSED}
     for outcome in (CaptureState.DONE, CaptureState.FAILED, CaptureState.DEAD):
         assert advance(outcome, CaptureEvent.EXPIRED) is CaptureState.REMOVED
         for event in (CaptureEvent.RESULT, CaptureEvent.REJECTED, CaptureEvent.DISPATCHED):
             assert advance(outcome, event) is None
     assert advance(CaptureState.ACCEPTED, CaptureEvent.EXPIRED) is None
+    for writing in (CaptureState.KEEPING, CaptureState.CONCLUDING):
+        assert advance(writing, CaptureEvent.PURGED) is None  # the hub waits for the disk first
     assert advance(None, CaptureEvent.STORED) is None

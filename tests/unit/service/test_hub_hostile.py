@@ -27,6 +27,7 @@ from service.wire import Packet, decode_from_hub, decode_to_hub, encode
 from tests.fuzzing.corpus import Parts, encoded, kinds
 from tests.fuzzing.mutate import mutate
 from tests.unit.service.test_hub import FACE, FACE_ARRAYS, FRAME, FRAME_ARRAYS
+from tests.unit.service.unkind import StepWriter
 
 SETTINGS = ServiceSettings(address="ipc:///unused", attempts=2, queue=6, reserve_mib=0)
 _MEMORY = Path("/dev/shm")  # noqa: S108
@@ -57,7 +58,11 @@ class Hostile:
     taken: int = 0
 
     def __post_init__(self) -> None:
-        self.hub = Hub(self.store, SETTINGS, Settings())
+        self.start()
+
+    def start(self) -> None:
+        self.writer = StepWriter(lambda: None, lambda _: None)
+        self.hub = Hub(self.store, SETTINGS, Settings(), writer=self.writer)
 
     def give(self, outputs: list[Output]) -> None:
         for output in outputs:
@@ -77,7 +82,6 @@ class Hostile:
             return
         self.taken += 1
         self.heard = [*self.heard[-50:], parts]
-        self.give(self.hub.next_job(self.now, peer, packet))
         self.give(self.hub.receive(self.now, peer, packet))
         kept = {one for one in self.accepted if self.store.find(one)}
         if type(packet.message) in OPERATOR:
@@ -87,6 +91,10 @@ class Hostile:
     def step(self) -> None:
         peer = self.rng.choice(PEERS)
         match self.rng.randrange(10):
+            case 0 if self.rng.random() < 0.5:
+                self.writer.at_once = not self.writer.at_once
+                self.writer.step(self.rng.randrange(4))
+                self.give(self.hub.written(self.now))
             case 0:
                 self.now += self.rng.choice((0.1, 1.0, 4.0, 11.0))
                 self.give(self.hub.tick(self.now))
@@ -142,7 +150,9 @@ class Hostile:
 
     def conclude(self) -> set[str]:
         """Let an honest worker finish what is left; give the ids that have an outcome."""
-        self.hub, self.jobs = Hub(self.store, SETTINGS, Settings()), []
+        self.give(self.hub.written(self.now, all_of_it=True))
+        self.start()
+        self.jobs = []
         for credit in range(20):
             self.say(b"honest", encode(Packet(messages.WorkerReady(name="w", credit=credit))))
             for job in self.jobs:

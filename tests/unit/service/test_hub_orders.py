@@ -1,7 +1,7 @@
 """Any order of events: what was accepted ends once, nothing appears that was not pressed.
 
 An operator who purges, retries and drops, the retention, damaged files and a damaged database, a
-full disk and a hub that is killed between two steps are among the events.
+full disk, a slow one and a hub that is killed between two steps are among the events.
 """
 
 import shutil
@@ -13,17 +13,20 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
+import service.kept
 import service.store
+import service.writing
 from recon.settings import Settings
 from service import messages
 from service.hub import Hub, settings_hash
+from service.kept import FrameAbout
 from service.outputs import Publish, Topic
 from service.settings import ServiceSettings
 from service.states import CaptureState
 from service.wire import Packet
 from tests.unit.service.clocks import FakeClock
 from tests.unit.service.test_hub import FACE, FACE_ARRAYS, FRAME, FRAME_ARRAYS
-from tests.unit.service.unkind import KilledError, UnkindStore
+from tests.unit.service.unkind import KilledError, StepWriter, UnkindStore
 
 HASH = settings_hash(Settings())
 SETTINGS = ServiceSettings(
@@ -42,8 +45,9 @@ class AnyOrder(RuleBasedStateMachine):
         self.dies_after: str | None = None
         self.killed = False
         self.patches = [
-            patch(f"service.store.{name}", self.last_step(name, getattr(service.store, name)))
-            for name in ("write_kept", "sync_folder")]
+            patch(f"{module.__name__}.{name}", self.last_step(name, getattr(module, name)))
+            for module, name in ((service.kept, "write_parts"), (service.writing, "sync_folder"),
+                                 (service.store, "sync_folder"))]
         for one in self.patches:
             one.start()
         self.folder = Path(tempfile.mkdtemp(dir=_MEMORY if _MEMORY.is_dir() else None))
@@ -64,6 +68,8 @@ class AnyOrder(RuleBasedStateMachine):
         try:
             self.dies_after = None
             self.store.full = False
+            self.writer.at_once = True
+            self.the_disk_goes_on(9)
             self.jobs.clear()  # those workers died; two good ones finish
             self.work()
             self.read_all()  # finds what is damaged
@@ -132,24 +138,53 @@ class AnyOrder(RuleBasedStateMachine):
         return FACE.model_copy(update={"report": report})
 
     def last_step(self, name, step):
-        def done(*arguments):
-            result = step(*arguments)
+        def done(*arguments, **more):
+            result = step(*arguments, **more)
             if self.dies_after == name:
                 raise KilledError
             return result
         return done
 
     def say(self, peer, message, arrays=None):
-        packet = Packet(message, arrays or {})
         try:
-            self.give(self.hub.next_job(self.now, peer, packet))
-            self.give(self.hub.receive(self.now, peer, packet))
+            self.give(self.hub.receive(self.now, peer, Packet(message, arrays or {})))
         except KilledError:
             self.kill()
 
+    def writes(self, draft):
+        if isinstance(draft.about, FrameAbout):
+            self.shown[draft.capture_id] = draft.packet.message.frame.calibration_origin
+
     @rule()
     def restart(self):
-        self.hub = Hub(self.store, SETTINGS, Settings())
+        """As a hub does that is told to stop, and another."""
+        if hasattr(self, "writer"):
+            try:
+                self.give(self.hub.written(self.now, all_of_it=True))
+            except KilledError:
+                self.kill()
+                return
+        self.start_hub()
+
+    def start_hub(self):
+        at_once = self.writer.at_once if hasattr(self, "writer") else True
+        self.writer = StepWriter(self.store.room, self.writes)
+        self.writer.at_once = at_once
+        self.hub = Hub(self.store, SETTINGS, Settings(), writer=self.writer)
+
+    @rule(at_once=st.booleans())
+    def the_disk_becomes(self, at_once):
+        """Slow, or as quick as in other tests."""
+        self.writer.at_once = at_once
+
+    @rule(count=st.integers(1, 3))
+    def the_disk_goes_on(self, count):
+        """Files are safe, and the hub hears of it."""
+        try:
+            self.writer.step(count)
+            self.give(self.hub.written(self.now))
+        except KilledError:
+            self.kill()
 
     @rule(seconds=st.sampled_from([0.1, 1.0, 4.0, 11.0]))
     def pass_time(self, seconds):
@@ -178,10 +213,7 @@ class AnyOrder(RuleBasedStateMachine):
         if capture_id in self.taken:
             self.frames += 1
             frame = FRAME.model_copy(update={"calibration_origin": f"frame {self.frames}"})
-            before = self.rows()
             self.say(b"s", messages.Frame(capture_id=capture_id, frame=frame), FRAME_ARRAYS)
-            if capture_id in self.rows() - before:
-                self.shown[capture_id] = frame.calibration_origin
 
     @rule(capture_id=ids, worker=workers)
     def all_goes_well_until_the_job(self, capture_id, worker):
@@ -234,6 +266,15 @@ class AnyOrder(RuleBasedStateMachine):
         self.press(capture_id)
         self.frame(capture_id)
         self.result(worker)
+
+    @rule(capture_id=ids, worker=workers, another=workers)
+    def two_faces_come_before_the_first_is_safe(self, capture_id, worker, another):
+        self.all_goes_well_until_the_job(capture_id, worker)
+        self.writer.at_once = False
+        copies = [job for job in self.jobs.get(worker, []) if job.capture_id == capture_id]
+        self.jobs.setdefault(another, []).extend(copies)
+        self.result(worker)
+        self.result(another)
 
     @rule(worker=workers)
     def job_never_arrives(self, worker):
@@ -327,7 +368,7 @@ class AnyOrder(RuleBasedStateMachine):
     def disk(self, full):
         self.store.full = full
 
-    @rule(step=st.sampled_from(["write_kept", "sync_folder", None]))
+    @rule(step=st.sampled_from(["write_parts", "sync_folder", None]))
     def will_die(self, step):
         self.dies_after = step
 
@@ -337,12 +378,13 @@ class AnyOrder(RuleBasedStateMachine):
         self.killed = True
         self.store.__exit__()
         self.store = UnkindStore(self.folder / "data", self.clock)
-        self.restart()
+        self.start_hub()
         # What was safe and not yet acknowledged may be there.
         self.accepted |= self.rows() & self.taken
 
     @rule(damage=st.sampled_from(["gone", "empty", "cut", "garbage"]))
     def damage_the_database(self, damage):
+        self.restart()
         self.store.__exit__()
         path = self.folder / "data" / "captures.sqlite3"
         content = path.read_bytes()
@@ -358,7 +400,7 @@ class AnyOrder(RuleBasedStateMachine):
         known = {path.name.partition(".")[0] for folder in ("frames", "faces")
                  for path in (self.folder / "data" / folder).iterdir()}
         self.store = UnkindStore(self.folder / "data", self.clock)
-        self.restart()
+        self.start_hub()
         self.published.clear()  # another epoch
         self.accepted &= known  # a dead letter whose frame is gone is known to the rows alone
         self.ids_are_known()

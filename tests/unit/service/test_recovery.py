@@ -12,6 +12,7 @@ from service.errors import DamagedDatabaseError, DamagedFaceError, DiskFullError
 from service.states import CaptureState
 from service.store import FolderStore
 from tests.unit.service.clocks import FakeClock
+from tests.unit.service.keep import accept, finish
 from tests.unit.service.test_store import frame, result
 
 DAY = 86400.0
@@ -22,8 +23,8 @@ def data(tmp_path):
     """A folder with a face, a failure, a dead letter and a frame that waits."""
     with FolderStore(tmp_path / "data", FakeClock()) as store:
         for name in ("done", "failed", "dead", "waits"):
-            store.accept(frame(name), Settings(), "0f")
-        store.finish(result("done", store))
+            accept(store, frame(name), Settings(), "0f")
+        finish(store, result("done", store))
         store.fail("failed", "NoFaceError", "no face", dead=False)
         store.fail("dead", "WorkerLost", "gone", dead=True)
     return tmp_path / "data"
@@ -102,8 +103,8 @@ def test_a_log_with_a_flipped_bit_loses_nothing_that_was_accepted(data, tmp_path
     with FolderStore(data, FakeClock()) as store:
         last = store.last_sequence()
         for name in ("x", "y"):
-            store.accept(frame(name), Settings(), "0f")
-        store.finish(result("x", store))
+            accept(store, frame(name), Settings(), "0f")
+        finish(store, result("x", store))
         shutil.copytree(data, killed)
     log = killed / "captures.sqlite3-wal"
     size = log.stat().st_size
@@ -116,7 +117,7 @@ def test_a_log_with_a_flipped_bit_loses_nothing_that_was_accepted(data, tmp_path
             assert store.find("x").state is CaptureState.DONE
             assert store.find("y").state is CaptureState.ACCEPTED
             assert store.outcome("x").message.sequence > last
-            store.finish(result("y", store))
+            finish(store, result("y", store))
             assert store.outcome("y").message.sequence > last + 1
         shutil.rmtree(again)
 
@@ -137,7 +138,7 @@ def test_a_frame_without_a_row_is_taken_in(data):
     _forget(data, "waits")
     with FolderStore(data, FakeClock()) as store:
         assert states(store)["waits"] is CaptureState.ACCEPTED
-        store.finish(result("waits", store))
+        finish(store, result("waits", store))
 
 
 def test_a_face_without_a_row_is_taken_in(data):
@@ -232,7 +233,7 @@ def test_a_removal_that_was_cut_short_is_finished(data, monkeypatch):
     with FolderStore(data, FakeClock()) as store:
         assert store.find("done") is None
         assert store.counts() == {CaptureState.FAILED: 1, CaptureState.DEAD: 1}
-        store.accept(frame("done"), Settings(), "0f")
+        accept(store, frame("done"), Settings(), "0f")
         assert store.find("done").state is CaptureState.ACCEPTED
         store.sweep(None)
         assert store.find("done").state is CaptureState.ACCEPTED
@@ -268,11 +269,11 @@ def test_a_frame_that_cannot_be_kept_leaves_nothing(
             case "folder":
                 monkeypatch.setattr("service.spool.os.fsync", second_fails)
         with pytest.raises(kind, match=message):
-            store.accept(frame("new"), Settings(), "0f")
+            accept(store, frame("new"), Settings(), "0f")
         monkeypatch.undo()
         assert sorted((data / "frames").iterdir()) == before
         assert store.find("new") is None
-        store.accept(frame("new"), Settings(), "0f")
+        accept(store, frame("new"), Settings(), "0f")
 
 
 def test_a_full_database_leaves_no_frame(data):
@@ -281,7 +282,7 @@ def test_a_full_database_leaves_no_frame(data):
         store._database.one(f"PRAGMA max_page_count = {pages}")
         for number in range(200):
             try:
-                store.accept(frame(f"x{number}"), Settings(), "0f")
+                accept(store, frame(f"x{number}"), Settings(), "0f")
             except DiskFullError as error:
                 assert "no room on the disk" in str(error)  # noqa: PT017
                 break

@@ -15,7 +15,9 @@ from service.spool import read_parts, write_parts
 from service.states import CaptureState
 from service.store import FolderStore
 from service.wire import Packet
+from service.writing import write
 from tests.unit.service.faces import small_face, small_frame
+from tests.unit.service.keep import accept, finish
 
 
 @pytest.fixture
@@ -39,8 +41,8 @@ def result(capture_id: str, store: FolderStore) -> Packet:
 def test_an_accepted_frame_survives_closing(tmp_path):
     settings = Settings.of("faithful", ratio=7)
     with FolderStore(tmp_path / "data") as store:
-        store.accept(frame("a"), settings, "0f")
-        store.accept(frame("b"), settings, "0f")
+        accept(store, frame("a"), settings, "0f")
+        accept(store, frame("b"), settings, "0f")
         epoch = store.epoch
     with FolderStore(tmp_path / "data") as store:
         assert store.epoch == epoch
@@ -58,7 +60,7 @@ def test_an_accepted_frame_survives_closing(tmp_path):
 
 def test_a_row_comes_after_its_file_is_safe(store, monkeypatch):
     steps = []
-    sync, rename, insert = os.fsync, Path.replace, store._database.all
+    sync, rename, transaction = os.fsync, Path.replace, store._database.transaction
 
     def synced(descriptor):
         steps.append("folder" if stat.S_ISDIR(os.fstat(descriptor).st_mode) else "file")
@@ -68,15 +70,15 @@ def test_a_row_comes_after_its_file_is_safe(store, monkeypatch):
         steps.append(target.name)
         return rename(path, target)
 
-    def inserted(statement, *values):
-        if statement.startswith("INSERT"):
-            steps.append("row")
-        return insert(statement, *values)
+    def begun():
+        steps.append("row")
+        return transaction()
 
     monkeypatch.setattr("service.spool.os.fsync", synced)
     monkeypatch.setattr(Path, "replace", renamed)
-    monkeypatch.setattr(store._database, "all", inserted)
-    store.accept(frame("a"), Settings(), "0f")
+    draft = store.frame_draft(frame("a"), Settings(), "0f")
+    monkeypatch.setattr(store._database, "transaction", begun)
+    store.accept(write([draft]))
     assert steps == ["file", "a.frame", "folder", "row"]
     assert store._database.one("PRAGMA synchronous")[0] == 2
     assert store._database.one("PRAGMA journal_mode")[0] == "wal"
@@ -84,8 +86,8 @@ def test_a_row_comes_after_its_file_is_safe(store, monkeypatch):
 
 def test_outcomes_are_numbered_in_order(store):
     for name in "abc":
-        store.accept(frame(name), Settings(), "0f")
-    store.finish(result("b", store))
+        accept(store, frame(name), Settings(), "0f")
+    finish(store, result("b", store))
     store.fail("a", "NoFaceError", "no face", dead=False)
     store.fail("c", "WorkerLost", "gone", dead=True)
     assert store.unfinished() == []
@@ -102,15 +104,15 @@ def test_outcomes_are_numbered_in_order(store):
 
 
 def test_a_second_outcome_changes_nothing(store):
-    store.accept(frame("a"), Settings(), "0f")
-    store.finish(result("a", store))
+    accept(store, frame("a"), Settings(), "0f")
+    finish(store, result("a", store))
     store.fail("a", "WorkerLost", "late", dead=True)
     assert store.last_sequence() == 1
     assert store.find("a").state is CaptureState.DONE
 
 
 def test_a_damaged_frame_is_named(store, tmp_path):
-    store.accept(frame("a"), Settings(), "0f")
+    accept(store, frame("a"), Settings(), "0f")
     path = tmp_path / "data" / "frames" / "a.frame"
     data = bytearray(path.read_bytes())
     data[-1] ^= 1

@@ -1,7 +1,14 @@
-"""A store to which things happen."""
+"""A store and a writer to which things happen."""
+
+from collections import deque
+from collections.abc import Callable
 
 from service.errors import DiskFullError
+from service.kept import Draft
 from service.store import FolderStore
+from service.writing import Written, write
+
+__all__ = ["KilledError", "StepWriter", "UnkindStore"]
 
 
 class KilledError(BaseException):
@@ -13,22 +20,63 @@ class UnkindStore(FolderStore):
 
     full = False
 
-    def _room(self):
+    def room(self):
         if self.full:
             raise DiskFullError("no room on the disk")
 
-    def accept(self, *arguments):
-        self._room()
-        super().accept(*arguments)
+    def accept(self, frames):
+        self.room()
+        super().accept(frames)
 
     def start_attempt(self, capture_id):
-        self._room()
+        self.room()
         return super().start_attempt(capture_id)
 
-    def finish(self, result):
-        self._room()
-        super().finish(result)
+    def finish(self, faces):
+        self.room()
+        super().finish(faces)
 
     def fail(self, *arguments, **more):
-        self._room()
+        self.room()
         super().fail(*arguments, **more)
+
+
+class StepWriter:
+    """Writes when it is told to, some files at a time; with `at_once`, as soon as it can.
+
+    Parameters
+    ----------
+    room : raises DiskFullError where there is none
+    writes : is told of each draft that is going to be a file
+    """
+
+    def __init__(self, room: Callable[[], None], writes: Callable[[Draft], None]) -> None:
+        self.at_once = True
+        self.waiting: deque[Draft] = deque()
+        self._room = room
+        self._writes = writes
+        self._done: list[Written] = []
+
+    def start(self, draft: Draft) -> None:
+        self.waiting.append(draft)
+        if self.at_once:
+            self.settle()
+
+    def step(self, count: int) -> None:
+        """Write so many that wait, as one batch."""
+        batch = [self.waiting.popleft() for _ in range(min(count, len(self.waiting)))]
+        try:
+            self._room()
+        except DiskFullError as error:
+            self._done += [Written(draft, error=error) for draft in batch]
+            return
+        for draft in batch:  # before: the hub may be killed when one is written
+            self._writes(draft)
+        self._done += write(batch)
+
+    def take(self) -> list[Written]:
+        done, self._done = self._done, []
+        return done
+
+    def settle(self) -> None:
+        self.step(len(self.waiting))
