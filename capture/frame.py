@@ -145,13 +145,18 @@ class CameraModel(_Model):
     @model_validator(mode="after")
     def _invertible(self) -> Self:
         """Refuse a distortion that folds the image over itself: its pixels have no one ray."""
-        u, v = np.meshgrid(np.linspace(0, self.width - 1, 9), np.linspace(0, self.height - 1, 9))
-        pixels = np.stack([u, v], axis=-1)
-        with np.errstate(all="ignore"):
-            off = np.abs(self.project(self.back_project(pixels, 1.0)) - pixels)
-        if not (off < _INVERTIBLE_PX).all():
+        if _folds(self):
             raise ValueError("distortion cannot be inverted over the whole image")
         return self
+
+
+@lru_cache(maxsize=32)  # each frame says anew of which cameras it is
+def _folds(camera: CameraModel) -> bool:
+    u, v = np.meshgrid(np.linspace(0, camera.width - 1, 9), np.linspace(0, camera.height - 1, 9))
+    pixels = np.stack([u, v], axis=-1)
+    with np.errstate(all="ignore"):
+        off = np.abs(camera.project(camera.back_project(pixels, 1.0)) - pixels)
+    return not (off < _INVERTIBLE_PX).all()
 
 
 @lru_cache(maxsize=8)

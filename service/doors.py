@@ -5,7 +5,7 @@ authenticator without which nobody comes in, and an allow-list that is asked aga
 a key that is revoked is cut off at once.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -27,7 +27,7 @@ from service.sockets import (
     receive_parts,
     send_parts,
 )
-from service.wire import MAX_HEADER_BYTES, MAX_PARTS
+from service.wire import MAX_HEADER_BYTES, MAX_PARTS, Buffer
 from service.zap import DOMAIN, TOPICS_DOMAIN
 
 __all__ = ["Door", "Guard", "Incoming"]
@@ -58,7 +58,8 @@ class Incoming:
 
     peer: bytes
     """Names the sender's key with its roles, and its connection."""
-    parts: list[bytes]
+    parts: list[memoryview]
+    """In libzmq's own memory, not to be written to."""
     sender: Allowed
     key: str
     """Fingerprint of the sender's key; empty where it needed none."""
@@ -142,7 +143,8 @@ class Door:
                 continue
             if user := self._known(first):
                 token, key = (user.token, user.fingerprint) if self._guard else (_LOCAL, "")
-                yield Incoming(token + first.bytes, parts, user, key, _address(first))
+                yield Incoming(token + first.bytes, [part.buffer for part in parts], user, key,
+                               _address(first))
 
     def listen(self) -> None:
         """Take note of who subscribes, of who leaves and of who was not let in."""
@@ -159,7 +161,7 @@ class Door:
                 continue
             self._subscription(first)
 
-    def send(self, peer: bytes, parts: list[bytes]) -> bool:
+    def send(self, peer: bytes, parts: Sequence[Buffer]) -> bool:
         """Send to a peer; False where it cannot be reached, or its key was revoked."""
         if not self.knows(peer):
             return False
@@ -170,7 +172,7 @@ class Door:
                 raise
             return False
 
-    def publish(self, topic: Topic, parts: list[bytes]) -> bool:
+    def publish(self, topic: Topic, parts: Sequence[Buffer]) -> bool:
         """Send to all who subscribed to a topic; False where one at least could not take it."""
         return publish_parts(self._publisher, [topic.encode(), *parts])
 

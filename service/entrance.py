@@ -17,6 +17,7 @@ from service.memory import MemoryWatch
 from service.outputs import Topic
 from service.refusals import Refusals
 from service.settings import ServiceSettings
+from service.wire import Buffer
 from service.zap import TOPICS_DOMAIN, Authenticator
 
 __all__ = ["Entrance", "guard", "guarded_addresses"]
@@ -126,11 +127,11 @@ class Entrance:
             if any(one in ready for one in others):
                 door.listen()
 
-    def send(self, peer: bytes, parts: list[bytes]) -> bool:
+    def send(self, peer: bytes, parts: Sequence[Buffer]) -> bool:
         """Send to a peer; False where it cannot be reached, or its key was revoked."""
         return self._doors[peer[0]].send(peer[1:], parts)
 
-    def publish(self, topic: Topic, parts: list[bytes]) -> bool:
+    def publish(self, topic: Topic, parts: Sequence[Buffer]) -> bool:
         """Send to all who subscribed to a topic; False where one at least could not take it."""
         taken = [door.publish(topic, parts) for door in self._doors]
         return all(taken)

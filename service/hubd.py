@@ -3,6 +3,7 @@
 import math
 import os
 import time
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 
 import structlog
@@ -24,7 +25,7 @@ from service.settings import ServiceSettings
 from service.stopping import StopSignal
 from service.store import FolderStore
 from service.viewfinder import PERIOD_S
-from service.wire import Packet, decode_to_hub, encode
+from service.wire import Buffer, Packet, decode_to_hub, encode
 from service.writing import Threads
 
 __all__ = ["run"]
@@ -149,7 +150,7 @@ class _Loop:
             elif step := _SENT.get(output.packet.message.kind):
                 failpoint(step)
 
-    def _publish(self, topic: Topic, parts: list[bytes]) -> None:
+    def _publish(self, topic: Topic, parts: Sequence[Buffer]) -> None:
         if topic is Topic.FACES:
             failpoint("hub.outcome.publishing")
         if not self._entrance.publish(topic, parts):

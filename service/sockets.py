@@ -1,9 +1,12 @@
 """ZeroMQ sockets with every limit set."""
 
+from collections.abc import Sequence
+
 import zmq
 
 from service.errors import RemoteProtocolError
 from service.payload import MAX_ARRAY_BYTES
+from service.wire import Buffer
 
 __all__ = ["TooLongError", "open_socket", "publish_parts", "receive_parts", "send_parts"]
 
@@ -44,7 +47,7 @@ def open_socket(
     return socket
 
 
-def send_parts(socket: "zmq.Socket[bytes]", parts: list[bytes]) -> bool:
+def send_parts(socket: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bool:
     """Send without waiting; False where nobody can take it now."""
     try:
         socket.send_multipart(parts, flags=zmq.DONTWAIT)
@@ -53,7 +56,7 @@ def send_parts(socket: "zmq.Socket[bytes]", parts: list[bytes]) -> bool:
     return True
 
 
-def publish_parts(publisher: "zmq.Socket[bytes]", parts: list[bytes]) -> bool:
+def publish_parts(publisher: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bool:
     """Send to all subscribers of an XPUB; False where the queue of one at least was found full.
 
     It went to the others all the same. While a queue stays full libzmq passes over it unseen, so
@@ -76,7 +79,7 @@ def publish_parts(publisher: "zmq.Socket[bytes]", parts: list[bytes]) -> bool:
 
 def receive_parts(
     socket: "zmq.Socket[bytes]", most: int, most_bytes: int
-) -> tuple[zmq.Frame, list[bytes]]:
+) -> tuple[zmq.Frame, list[zmq.Frame]]:
     """Receive without waiting: the first part with its properties, and those that follow it.
 
     A message is taken part by part and kept only as far as it may go.
@@ -89,14 +92,14 @@ def receive_parts(
         Where more than `most` parts or `most_bytes` bytes follow the first.
     """
     first = frame = socket.recv(zmq.DONTWAIT, copy=False, track=False)
-    parts: list[bytes] = []
+    parts: list[zmq.Frame] = []
     count = size = 0
     while frame.more:
         frame = socket.recv(zmq.DONTWAIT, copy=False, track=False)
         count += 1
         size += len(frame)
         if count <= most and size <= most_bytes:
-            parts.append(frame.bytes)
+            parts.append(frame)
     if count > most or size > most_bytes:
         raise TooLongError(
             f"{count} parts with {size} bytes, at most {most} with {most_bytes} allowed", first)

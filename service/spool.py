@@ -24,7 +24,7 @@ _MOST_BYTES = 128 * 2**20
 
 
 def write_atomically(
-    path: Path, chunks: Sequence[bytes], *, durable: bool = True, named: bool = True,
+    path: Path, chunks: Sequence[bytes | memoryview], *, durable: bool = True, named: bool = True,
     mode: int = 0o666, steps: str = "",
 ) -> None:
     """Write a file so that `path` is ever either the old contents or all of the new.
@@ -60,7 +60,7 @@ def write_atomically(
 
 
 def write_parts(
-    path: Path, parts: Sequence[bytes], *, named: bool = True, steps: str = ""
+    path: Path, parts: Sequence[bytes | memoryview], *, named: bool = True, steps: str = ""
 ) -> str:
     """Write parts durably and give their checksum, hexadecimal; the rest as `write_atomically`.
 

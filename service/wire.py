@@ -1,28 +1,32 @@
 """How a message is written on the wire.
 
-A message is a list of byte strings: a JSON header (one of `service.messages`), then the raw arrays
-that the header describes. `encode` and `decode_*` are pure functions; `docs/wire.md` says the same
+A message is a list of buffers: a JSON header (one of `service.messages`), then the raw arrays that
+the header describes. `encode` and `decode_*` are pure functions; `docs/wire.md` says the same
 in prose.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError
 
 from service.errors import LocalProtocolError, RemoteProtocolError
 from service.messages import FromHub, Message, ToHub
 from service.payload import Arrays
 
-__all__ = ["MAX_HEADER_BYTES", "MAX_HEADER_BYTES_TO_HUB", "MAX_PARTS", "Packet", "decode_from_hub",
-           "decode_kept", "decode_to_hub", "encode"]
+__all__ = ["MAX_HEADER_BYTES", "MAX_HEADER_BYTES_TO_HUB", "MAX_PARTS", "Buffer", "Packet",
+           "decode_from_hub", "decode_kept", "decode_to_hub", "encode"]
 
 MAX_HEADER_BYTES = 256 * 1024
 MAX_HEADER_BYTES_TO_HUB = 64 * 1024
 """A quarter: what the hub takes it must be able to write, and `1e15` is written with 18 bytes."""
 MAX_PARTS = 1 + 16
+
+Buffer = bytes | memoryview
+"""One part of a message."""
 
 _TO_HUB: TypeAdapter[ToHub] = TypeAdapter(Annotated[ToHub, Field(discriminator="kind")])
 _FROM_HUB: TypeAdapter[FromHub] = TypeAdapter(Annotated[FromHub, Field(discriminator="kind")])
@@ -36,8 +40,8 @@ class Packet:
     arrays: Arrays = field(default_factory=dict)
 
 
-def encode(packet: Packet) -> list[bytes]:
-    """Write a message.
+def encode(packet: Packet) -> list[Buffer]:
+    """Write a message: bytes for the header, views of the arrays' memory behind it.
 
     Raises
     ------
@@ -60,11 +64,14 @@ def encode(packet: Packet) -> list[bytes]:
             raise LocalProtocolError(
                 f"{message.kind}: {info.name} is {array.dtype} {list(array.shape)}, "
                 f"the header says {info.dtype} {list(info.shape)}")
-    return [header, *(arrays[info.name].astype(info.dtype, copy=False).tobytes()
-                      for info in infos)]
+    return [header, *(_raw(arrays[info.name].astype(info.dtype, copy=False)) for info in infos)]
 
 
-def decode_to_hub(parts: Sequence[bytes]) -> Packet:
+def _raw(array: NDArray[Any]) -> memoryview:
+    return np.ascontiguousarray(array).reshape(-1).view(np.uint8).data
+
+
+def decode_to_hub(parts: Sequence[Buffer]) -> Packet:
     """Read a message that the hub may receive.
 
     Parameters
@@ -79,18 +86,18 @@ def decode_to_hub(parts: Sequence[bytes]) -> Packet:
     return _decode(parts, _TO_HUB, MAX_HEADER_BYTES_TO_HUB)
 
 
-def decode_kept(parts: Sequence[bytes]) -> Packet:
+def decode_kept(parts: Sequence[Buffer]) -> Packet:
     """Read again what `encode` wrote of a message that the hub received; as `decode_to_hub`."""
     return _decode(parts, _TO_HUB, MAX_HEADER_BYTES)
 
 
-def decode_from_hub(parts: Sequence[bytes]) -> Packet:
+def decode_from_hub(parts: Sequence[Buffer]) -> Packet:
     """Read a message that only the hub may send; otherwise as `decode_to_hub`."""
     return _decode(parts, _FROM_HUB, MAX_HEADER_BYTES)
 
 
 def _decode(
-    parts: Sequence[bytes], adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub], most: int
+    parts: Sequence[Buffer], adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub], most: int
 ) -> Packet:
     if not 1 <= len(parts) <= MAX_PARTS:
         raise RemoteProtocolError(f"message has {len(parts)} parts, 1 to {MAX_PARTS} expected",
@@ -99,7 +106,7 @@ def _decode(
     if len(header) > most:
         raise RemoteProtocolError(
             f"header has {len(header)} bytes, at most {most} allowed", "oversized")
-    message = _header(header, adapter)
+    message = _header(bytes(header), adapter)
     infos = message.payload.arrays if message.payload else ()
     if len(buffers) != len(infos):
         raise RemoteProtocolError(
@@ -110,7 +117,7 @@ def _decode(
                 f"{message.kind}: {info.name} has {len(buffer)} bytes, {info.nbytes} announced",
                 "truncated")
     return Packet(message, {
-        info.name: np.frombuffer(buffer, info.dtype).reshape(info.shape)
+        info.name: np.frombuffer(memoryview(buffer).toreadonly(), info.dtype).reshape(info.shape)
         for info, buffer in zip(infos, buffers, strict=True)})
 
 

@@ -74,7 +74,7 @@ def _example(about: dict[str, Any], definitions: dict[str, Any]) -> Any:
 
 def encoded() -> list[Parts]:
     """Give `packets` as they travel."""
-    return [encode(packet) for packet in packets()]
+    return [[bytes(part) for part in encode(packet)] for packet in packets()]
 
 
 def pack(parts: Sequence[bytes]) -> bytes:

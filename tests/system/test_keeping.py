@@ -174,7 +174,7 @@ def test_a_full_disk_refuses_presses_and_no_more(tmp_path, address):
             assert client.purge(capture_id="before") == 1
             (seen / "other").unlink()
             client.press("after")
-            assert accepted == ["before", "after"]
+            until(lambda: accepted == ["before", "after"])
     finally:
         hub.terminate()
         assert hub.wait(10) == 0

@@ -103,7 +103,7 @@ class Hostile:
             case 2 | 3 if self.heard:
                 self.say(peer, self.rng.choice(self.heard))
             case 4 | 5:
-                self.say(peer, mutate(self.rng, self.likely(), CORPUS))
+                self.say(peer, mutate(self.rng, [bytes(one) for one in self.likely()], CORPUS))
             case 6:
                 self.all_is_well_until_the_job(self.rng.choice(IDS))
             case _:
