@@ -107,8 +107,11 @@ class Database:
         self._connection.close()
 
     @contextmanager
-    def transaction(self) -> Iterator[sqlite3.Connection]:
+    def transaction(self, *, synced: bool = True) -> Iterator[sqlite3.Connection]:
         """All that is done within is durable at the end, or none of it.
+
+        Without `synced` it outlives this process at once and a power cut from the next
+        transaction on.
 
         Raises
         ------
@@ -119,7 +122,7 @@ class Database:
         StoreError
             Where it fails otherwise.
         """
-        with self._named():
+        with self._named(), self._synchronous(synced=synced):
             self._connection.execute("BEGIN IMMEDIATE")
             try:
                 yield self._connection
@@ -130,9 +133,22 @@ class Database:
                         self._connection.execute("ROLLBACK")
                 raise
 
-    def all(self, statement: str, *values: str | float | None) -> list[sqlite3.Row]:
+    @contextmanager
+    def _synchronous(self, *, synced: bool) -> Iterator[None]:
+        if synced:  # as it was opened
+            yield
+            return
+        self._connection.execute("PRAGMA synchronous=NORMAL")
+        try:
+            yield
+        finally:
+            self._connection.execute("PRAGMA synchronous=FULL")
+
+    def all(
+        self, statement: str, *values: str | float | None, synced: bool = True
+    ) -> list[sqlite3.Row]:
         """Run one statement, durably where it changes something, and give its rows."""
-        with self.transaction() as connection:
+        with self.transaction(synced=synced) as connection:
             return connection.execute(statement, values).fetchall()
 
     def one(self, statement: str, *values: str | float | None) -> sqlite3.Row | None:

@@ -157,9 +157,10 @@ class FolderStore:
 
     def start_attempt(self, capture_id: str) -> int:
         """Count an attempt before it is made and give its number, from 1."""
+        # Not synced: a power cut may cost this count, and the frame is tried once more.
         rows = self._database.all(
             "UPDATE captures SET attempts = attempts + 1 WHERE capture_id = ? RETURNING attempts",
-            capture_id)
+            capture_id, synced=False)
         if not rows:
             raise StoreError(f"capture {capture_id} is not in the store")
         failpoint("hub.attempt.counted")

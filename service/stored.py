@@ -58,7 +58,10 @@ class Store(Protocol):
         """Give the ids of what was accepted and has no outcome, oldest first."""
 
     def start_attempt(self, capture_id: str) -> int:
-        """Count an attempt before it is made and give its number, from 1."""
+        """Count an attempt before it is made and give its number, from 1.
+
+        A power cut alone may undo it, until the next call that is durable.
+        """
 
     def take_back_attempt(self, capture_id: str) -> None:
         """Count an attempt no more that was not made to its end."""
