@@ -6,7 +6,6 @@ import structlog
 
 from service.errors import StoreError
 from service.kept import Draft
-from service.messages import Result
 from service.stored import Store
 from service.wire import Packet
 from service.writing import Writer, Written
@@ -35,16 +34,22 @@ class Faces:
 
     def keep(self, result: Packet) -> None:
         """Begin to write a face; StoreError where it is of no use."""
-        if isinstance(result.message, Result):
-            draft = self._unkept[result.message.capture_id] = self._store.face_draft(result)
-            self._writer.start(draft)
+        draft = self._store.face_draft(result)
+        self._unkept[draft.capture_id] = draft
+        self._writer.start(draft)
 
     def caught_up(self) -> bool:
-        """Begin anew to write what the disk refused; True where there is room for more faces."""
+        """Begin anew to write what the disk refused; True where there is room for more faces.
+
+        Raises
+        ------
+        StoreError
+            Where the store cannot be read.
+        """
         for capture_id, again in self._refused.items():
             if not again:
+                self.keep(self._unkept[capture_id].packet)  # its retention begins now
                 self._refused[capture_id] = True
-                self._writer.start(self._unkept[capture_id])
         return not self._refused and len(self._unkept) < _MOST_UNKEPT
 
     def written(self, faces: Sequence[Written]) -> list[tuple[str, Exception | None]]:

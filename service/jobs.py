@@ -84,10 +84,11 @@ class Jobs:
 
         While the disk refuses what is to be kept, or many faces wait for it, nothing new is begun.
         """
-        if now < self._paused_until or not self._faces.caught_up():
+        if now < self._paused_until:
             return
         try:
-            yield from self._dispatch(now)
+            if self._faces.caught_up():
+                yield from self._dispatch(now)
         except StoreError as error:
             self._pause(now, str(error))
 

@@ -294,6 +294,7 @@ class AnyOrder(RuleBasedStateMachine):
 
     @rule()
     def the_retention_passes(self):
+        self.the_disk_goes_on(9)  # no disk takes an hour
         for _ in range(2):  # once more, for what was set back
             self.clock.pass_time(3700.0)
             self.now += 3700.0
