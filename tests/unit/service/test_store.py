@@ -1,7 +1,9 @@
 """The data folder."""
 
+import hashlib
 import os
 import stat
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -151,6 +153,34 @@ def test_parts_come_back_as_they_were(tmp_path):
     assert read_parts(tmp_path / "x", checksum) == read_parts(tmp_path / "x") == (parts, checksum)
     with pytest.raises(CorruptFileError):
         read_parts(tmp_path / "x", "0" * 64)
+
+
+def test_parts_of_the_format_before_are_read(tmp_path):
+    body = struct.pack("<I2Q", 2, 1, 3) + b"a" + b"bcd"
+    digest = hashlib.sha256(body)
+    (tmp_path / "x").write_bytes(b"denseface spool 2\n" + digest.digest() + body)
+    assert read_parts(tmp_path / "x", digest.hexdigest()) == ([b"a", b"bcd"], digest.hexdigest())
+    (tmp_path / "x").write_bytes(b"denseface spool 2\n" + digest.digest() + body[:-1] + b"x")
+    with pytest.raises(CorruptFileError, match="contents"):
+        read_parts(tmp_path / "x")
+
+
+def test_no_flipped_bit_and_no_swap_of_parts_goes_unseen(tmp_path):
+    path = tmp_path / "x"
+    checksum = write_parts(path, [b"header", b"", bytes(range(64)), bytes(reversed(range(64)))])
+    content = path.read_bytes()
+    for position in range(len(content)):
+        for bit in range(8):
+            spoiled = bytearray(content)
+            spoiled[position] ^= 1 << bit
+            path.write_bytes(spoiled)
+            with pytest.raises(CorruptFileError):
+                read_parts(path, checksum)
+    for spoiled in (content[:-128] + content[-64:] + content[-128:-64], content[:-1],
+                    content + b"\0"):
+        path.write_bytes(spoiled)
+        with pytest.raises(CorruptFileError):
+            read_parts(path)
 
 
 def test_a_full_disk_leaves_nothing_half_written(tmp_path, monkeypatch):
