@@ -134,5 +134,7 @@ def _check(name: str, array: NDArray[Any], dtype: type[np.generic], shape: tuple
     if array.dtype.kind == "f":
         flat = array.ravel()
         # A finite sum of squares has finite parts, and takes half the time to tell.
-        if not (np.isfinite(flat @ flat) or np.isfinite(flat).all()):
+        with np.errstate(over="ignore", invalid="ignore"):
+            squares = flat @ flat
+        if not (np.isfinite(squares) or np.isfinite(flat).all()):
             raise ValueError(f"{name} must be finite")

@@ -35,6 +35,10 @@ def test_a_bad_cloud_is_refused(change, message):
         cloud(**change)
 
 
+def test_what_is_huge_is_finite_still():
+    assert cloud(points=np.full((5, 3), 3e38, np.float32)).points.max() == np.float32(3e38)
+
+
 @pytest.mark.parametrize(("change", "message"), [
     ({"normals": np.zeros((2, 3), np.float32)}, "normals must be float32"),
     ({"sigma": np.ones(2, np.float32)}, "sigma must be float32"),
