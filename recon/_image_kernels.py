@@ -92,7 +92,7 @@ def collect(
     points, normals = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
     rgb, cells = np.empty((n, 3), np.uint8), np.empty((n, 2), np.int32)
     error = np.empty(n, np.float32)
-    x = xs.astype(np.float32)
+    x, known = xs.astype(np.float32), colors.astype(np.float32)
     color_left, color_part = _steps(every, 3, columns)
     sigma_left, sigma_part = _steps(each, 1, columns)
     color_above, color_below = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
@@ -104,10 +104,8 @@ def collect(
         if row % every == 0:
             color_above, color_below = color_below, color_above
             if row == 0:
-                _along(colors[0].ravel().astype(np.float32), color_left, color_part, 3,
-                       color_above)
-            _along(colors[above + 1].ravel().astype(np.float32), color_left, color_part, 3,
-                   color_below)
+                _along(known[0].ravel(), color_left, color_part, 3, color_above)
+            _along(known[above + 1].ravel(), color_left, color_part, 3, color_below)
         if row % each == 0:
             sigma_above, sigma_below = sigma_below, sigma_above
             if row == 0:
@@ -126,6 +124,7 @@ def collect(
             between[j] = np.uint8(np.int32(
                 upper[j] + down * (lower[j] - upper[j]) + np.float32(0.5)))
         down = np.float32(row % each) / np.float32(each)
+        y = np.float32(ys[row])
         # Slices, since an index that might be negative keeps a loop from being vectorised.
         while first < end:
             stop = first
@@ -135,11 +134,11 @@ def collect(
             flat = points[i:i + count].ravel()
             across, z = x[first:stop], heights[row, first:stop]
             for j in range(count):
-                flat[3 * j], flat[3 * j + 1], flat[3 * j + 2] = across[j], ys[row], z[j]
+                flat[3 * j], flat[3 * j + 1], flat[3 * j + 2] = across[j], y, z[j]
             flat = normals[i:i + count].ravel()
             dx, dy = slopes_x[row, first:stop], slopes_y[row, first:stop]
             for j in range(count):
-                lengths[j] = 1 / np.sqrt(dx[j] * dx[j] + dy[j] * dy[j] + np.float32(1))
+                lengths[j] = np.float32(1) / np.sqrt(dx[j] * dx[j] + dy[j] * dy[j] + np.float32(1))
             for j in range(count):
                 flat[3 * j], flat[3 * j + 1] = dx[j] * lengths[j], dy[j] * lengths[j]
                 flat[3 * j + 2] = -lengths[j]

@@ -48,7 +48,7 @@ def split_depths(z: NDArray[np.floating]) -> list[Cluster]:
     for power in range(3):
         np.cumsum(weighted, out=sums[power, 1:])
         weighted *= depth
-    places = np.unique(np.linspace(0, len(counts), _PLACES).astype(np.int64))
+    places = np.arange(_PLACES) * len(counts) // (_PLACES - 1)
     cuts = _refined(*_best_cuts(sums, places), sums)
     clusters = []
     for first, end in zip((0, *cuts), (*cuts, len(counts)), strict=True):
@@ -56,8 +56,8 @@ def split_depths(z: NDArray[np.floating]) -> list[Cluster]:
         if up_to > before:
             most = [before + share * (up_to - before) for share in _MOST]
             # The bins with the first, the last, and the readings at those shares.
-            at = np.searchsorted(sums[0][1:], [before + 0.5, up_to - 0.5, *most])
-            clusters.append(Cluster(*(start + int(value) for value in at)))
+            at = start + np.searchsorted(sums[0][1:], [before + 0.5, up_to - 0.5, *most])
+            clusters.append(Cluster(*at.tolist()))
     return clusters
 
 

@@ -139,3 +139,15 @@ def test_points_in_a_hole_are_coloured_by_what_is_seen_there():
     # What the camera does not see there is filled from the border.
     assert (dense.colors[inside & ~right] == 128).all()
     assert (dense.colors[far < spacing] == 128).all()
+
+
+@pytest.mark.parametrize("ratio", [1, 10, 40])
+def test_colours_stand_where_their_seeds_are(ratio):
+    """However coarse the colours' own grid: a ramp of colours keeps its place."""
+    points = raised(disc_seeds(1.3, 40), plane)
+    ramp = np.rint(128 + 2.5 * points[:, :2]).astype(np.uint8)
+    dense = dense_of(points, ratio, colors=np.column_stack([ramp, ramp[:, 0]]))
+    inner = np.hypot(*dense.points[:, :2].T) < 36
+    off = dense.colors[inner, :2] - (128 + 2.5 * dense.points[inner, :2])
+    assert np.abs(off.mean(axis=0)).max() < 0.3
+    assert np.abs(off).max() < 4
