@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["add_between", "collect", "farther"]
+__all__ = ["add_between", "collect", "unset"]
 
 
 @compiled
@@ -160,14 +160,12 @@ def collect(
 
 
 @compiled
-def farther(
-    away: NDArray[np.float32], cells: NDArray[np.int32], limit: float
-) -> NDArray[np.int64]:
-    """Give the indices of the cells where an image of every second point is above a limit."""
+def unset(image: NDArray[np.uint8], cells: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Give the indices of the cells where an image of every second point is zero."""
     out = np.empty(len(cells), np.int64)
-    count, most = 0, np.float32(limit)
+    count = 0
     for i in range(len(cells)):
-        if away[np.uint32(cells[i, 0]) >> 1, np.uint32(cells[i, 1]) >> 1] > most:
-            out[count] = i
+        out[count] = i
+        if image[np.uint32(cells[i, 0]) >> 1, np.uint32(cells[i, 1]) >> 1] == 0:
             count += 1
     return out[:count].copy()

@@ -10,11 +10,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._image_kernels import collect, farther
+from recon._image_kernels import collect, unset
 from recon._scatter_kernels import BILINEAR_VARIANCE, mark
 from recon.colors import average_neighbors
 from recon.detail import DetailedSurface
 from recon.face import DenseCloud
+from recon.masks import disc
 from recon.rbf import Surface
 from recon.segment import Seeds
 from recon.support import support_on_grid
@@ -102,8 +103,8 @@ def _far_from_seeds(
     rows, columns = (side // 2 + 1 for side in shape)
     seeded = mark(seeds.points, (origin[0] + step / 2, origin[1] + step / 2), 2 * step, rows,
                   columns)
-    away = cv2.distanceTransform(1 - seeded, cv2.DIST_L2, cv2.DIST_MASK_3)
-    return farther(np.asarray(away, np.float32), cells, radius / (2 * step))
+    near = cv2.dilate(seeded, disc(radius / (2 * step)))
+    return unset(np.asarray(near, np.uint8), cells)
 
 
 def _colors(
@@ -111,7 +112,7 @@ def _colors(
     wanted: NDArray[np.bool_],
 ) -> NDArray[np.uint8]:
     """The seeds' mean colour on a grid of its own, (rows, columns, 3)."""
-    places = ((seeds.points[:, 1::-1] - origin[::-1]) / step).astype(np.float32)
+    places = (seeds.points[:, 1::-1] - np.array(origin[::-1], np.float32)) * np.float32(1 / step)
     # Sharing a colour among four pixels, and reading between four, blurs by as much.
     radius = np.sqrt(max((_COLOR_RADIUS * spacing / step) ** 2 - 2 * BILINEAR_VARIANCE,
                          _LEAST_RADIUS**2))

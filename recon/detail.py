@@ -77,7 +77,6 @@ class DetailedSurface:
 
         As `Surface.sampled`: (k,), (m,) mm -> (m, k) each.
         """
-        # The broad fit has no slopes that the detail's grid could not tell.
         heights = self.base.heights(xs, ys)
         found = heights, np.zeros_like(heights), np.zeros_like(heights)
         rows, columns = self._places(ys, 1), self._places(xs, 0)
@@ -108,7 +107,7 @@ def add_detail(
     columns, rows = (((points[:, axis] - low) / step).astype(np.float32)
                      for axis, low in ((0, xs[0]), (1, ys[0])))
     grid = _Seeded(columns, rows, support.shape)
-    heights, *slopes = base.sampled(xs, ys)
+    heights = base.heights(xs, ys)
     rest = points[:, 2] - grid.at_seeds(heights)
     usual = np.float32(_FINENESS**-2)
     weight = grid.spread(None, radius / step)
@@ -119,9 +118,9 @@ def add_detail(
                       None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
     detail += missing * (wide[:detail.shape[0], :detail.shape[1]] - detail)
     detail *= _gain(detail, support, step)
-    for slope, right in zip(slopes, (1, 0), strict=True):
-        slope += cv2.Sobel(detail, cv2.CV_32F, right, 1 - right, ksize=1, scale=0.5 / step,
-                           borderType=cv2.BORDER_REPLICATE)
+    heights += detail
+    slopes = [cv2.Sobel(heights, cv2.CV_32F, right, 1 - right, ksize=1, scale=0.5 / step,
+                        borderType=cv2.BORDER_REPLICATE) for right in (1, 0)]
     return DetailedSurface(
         base, np.stack([detail, *slopes]).astype(np.float32, copy=False),
         (float(xs[0]), float(ys[0])), step, noise=float((rest - grid.at_seeds(detail)).std()),
