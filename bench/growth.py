@@ -1,15 +1,15 @@
 """Time against the number of seeds: the same head before sensors of other resolutions."""
 
 import statistics
-import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from bench.cases import Case, with_preset
 from bench.dense_solve import dense_heights
+from bench.own import after_segmentation, milliseconds
 from bench.pcl_peer import Pcl
 from bench.peer_methods import griddata_points, inpaint_points, poisson_points, rbf_points
-from bench.peers import ours_ms
 from recon import Preset, reconstruct
 from tests.simulator import KINECT_DEFAULT, KinectModel, Person, Scene, simulate
 
@@ -32,16 +32,17 @@ _FRAME = "ours, whole frame"
 def growth(pcl: Pcl | None, pictures: Path | None) -> None:
     """Print the table, and draw it where asked."""
     times: dict[str, list[tuple[int, float]]] = {}
+    settings = with_preset(Preset.BEST)
     for scale in _SCALES:
         case = _case(scale)
+        rest = after_segmentation(case, settings)
         ours: list[float] = []
         frame: list[float] = []
         others = _others(case, pcl)
         taken: dict[str, list[float]] = {name: [] for name in others}
         for _ in range(_RUNS):
-            timings = reconstruct(case.frame, with_preset(Preset.BEST)).report.timings_ms
-            ours.append(ours_ms(timings))
-            frame.append(timings["total"])
+            ours.append(milliseconds(rest))
+            frame.append(milliseconds(partial(reconstruct, case.frame, settings)))
             for name, call in others.items():
                 if not taken[name] or max(taken[name]) < _SLOW_MS:
                     taken[name].append(call(case))
@@ -84,12 +85,7 @@ def _others(case: Case, pcl: Pcl | None) -> dict[str, Callable[[Case], float]]:
 
 
 def _timed(function: Callable[[Case], object]) -> Callable[[Case], float]:
-    def timed(case: Case) -> float:
-        start = time.perf_counter()
-        function(case)
-        return (time.perf_counter() - start) * 1e3
-
-    return timed
+    return lambda case: milliseconds(lambda: function(case))
 
 
 def _print(times: dict[str, list[tuple[int, float]]]) -> None:

@@ -20,7 +20,7 @@ from bench.peer_methods import griddata_points, inpaint_points, poisson_points, 
 from bench.tally import HEADINGS, Tally
 from recon import Preset, reconstruct
 
-__all__ = ["ours_ms"]
+__all__: list[str] = []
 
 Result = tuple[NDArray[np.float64], float]
 """Points, (m, 3) mm, one for each query, and the milliseconds that they took."""
@@ -42,7 +42,7 @@ class _Method:
     variants: dict[str, Callable[[Case], Result]]
 
 
-def ours_ms(timings: dict[str, float]) -> float:
+def _ours_ms(timings: dict[str, float]) -> float:
     """Sum what follows segmentation: spacing, fit, evaluation, normals, colours."""
     return sum(ms for name, ms in timings.items() if name not in _BEFORE_FIT)
 
@@ -58,7 +58,7 @@ def _ours(preset: Preset, case: Case) -> Result:
     if len(face.dense) != len(case.queries):
         raise RuntimeError(f"preset {preset.value}: {len(face.dense)} places, "
                            f"expected the {len(case.queries)} of `best`")
-    return face.dense.points.astype(np.float64), ours_ms(face.report.timings_ms)
+    return face.dense.points.astype(np.float64), _ours_ms(face.report.timings_ms)
 
 
 def _methods(pcl: Pcl | None, *, more: bool) -> Iterator[_Method]:

@@ -3,7 +3,6 @@
 import argparse
 import statistics
 import sys
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -19,10 +18,11 @@ from bench.flags import add_flags, check_flags, open_pcl
 from bench.growth import growth
 from bench.machine import describe
 from bench.memory import extra_memory, resident_mb
+from bench.own import after_segmentation, milliseconds, surface_of
 from bench.pcl_peer import Pcl
 from bench.peer_methods import inpaint_points, rbf_points
-from bench.peers import ours_ms
 from recon import Preset, Settings, reconstruct, warm
+from recon.face import Face
 from recon.rbf import MIN_SEEDS, fit_surface
 
 __all__: list[str] = []
@@ -30,17 +30,10 @@ __all__: list[str] = []
 _OF = "frontal_700/0"
 # About 100,000 points, the goal's number.
 _GOAL_OF = "dark_skin/0"
-_R0_FACTOR, _SMOOTHING = 6.0, 3.0
 _SIGMA_PX = 2.0
 _PCL_RADIUS_MM = 10.0
 _SLOW_RUNS = 3
 _FAST_RUNS = 15
-
-
-def _milliseconds(call: Callable[[], object]) -> float:
-    start = time.perf_counter()
-    call()
-    return (time.perf_counter() - start) * 1e3
 
 
 def _frame_times(case: Case, runs: int) -> None:
@@ -49,25 +42,29 @@ def _frame_times(case: Case, runs: int) -> None:
     folder = Path(cv2.__file__).parent / "data"
     cascade = cv2.CascadeClassifier(str(folder / "haarcascade_frontalface_default.xml"))
     laps: dict[str, list[float]] = {}
+    faces: list[Face] = []
+    whole: list[float] = []
     haar: list[float] = []
     for _ in range(5):
         reconstruct(case.frame)
     settled = resident_mb()
     for _ in range(runs):
-        for name, ms in reconstruct(case.frame).report.timings_ms.items():
+        whole.append(milliseconds(lambda: faces.append(reconstruct(case.frame))))
+        for name, ms in faces.pop().report.timings_ms.items():
             laps.setdefault(name, []).append(ms)
-        haar.append(_milliseconds(lambda: cascade.detectMultiScale(gray)))
+        haar.append(milliseconds(lambda: cascade.detectMultiScale(gray)))
     print(f"\nWhole frame ({case.name}, preset `best`, {len(case.seeds):,} seeds, "
           f"{len(case.queries):,} coloured points with normals), {runs} runs by turns with "
           "OpenCV's default Haar pass on the same image:\n")
     print("| stage | median, ms | p99, ms |\n| --- | --- | --- |")
     for name, taken in laps.items():
         print(f"| {name} | {statistics.median(taken):.1f} | {np.percentile(taken, 99):.1f} |")
-    print(f"| OpenCV `detectMultiScale`, defaults, {gray.shape[1]}x{gray.shape[0]} "
+    print(f"| OpenCV `detectMultiScale`, defaults, {gray.shape[1]}x{gray.shape[0]}, the same "
           f"| {statistics.median(haar):.1f} | {np.percentile(haar, 99):.1f} |")
-    total = statistics.median(laps["total"])
+    total = statistics.median(whole)
+    print(f"| the whole frame, processor's time | {total:.1f} | {np.percentile(whole, 99):.1f} |")
     print(f"\nRatio of the medians, frame to Haar: {total / statistics.median(haar):.2f} "
-          f"(goal 0.20); p99 to median: {np.percentile(laps['total'], 99) / total:.1f} "
+          f"(goal 0.20); p99 to median: {np.percentile(whole, 99) / total:.1f} "
           f"(goal 1.5).")
     held = resident_mb()
     extra = extra_memory(lambda: reconstruct(case.frame))
@@ -85,20 +82,23 @@ def _grid(case: Case) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def _fit_times(case: Case, pcl: Pcl | None) -> None:
     """One fit and its evaluation, and the whole of ours, against others, by turns."""
     xs, ys = _grid(case)
-    seeds, r0 = case.seeds, _R0_FACTOR * case.spacing
+    seeds, spacing = case.seeds, case.spacing
     calls: dict[str, Callable[[], float]] = {
-        "ours: one fit (R0 = 6h, lambda = 3) and evaluation": lambda: _milliseconds(
-            lambda: fit_surface(seeds, r0, _SMOOTHING).on_grid(xs, ys)),
-        **{f"ours, `{preset.value}`, all after segmentation: spacing, fit, normals, colours":
-           partial(_all_of_ours, case, with_preset(preset))
-           for preset in (Preset.FAITHFUL, Preset.BEST)},
-        "OpenCV inpaint + Gaussian + bicubic": lambda: _milliseconds(
+        **{f"ours, `{preset.value}`: its fit {_of_fit(preset)} and evaluation": partial(
+            milliseconds, partial(_fitted, seeds, spacing, preset, xs, ys))
+           for preset in (Preset.BEST, Preset.FAITHFUL)},
+        "ours, `best`: fit, detail, evaluation with slopes": lambda: milliseconds(
+            lambda: surface_of(seeds.astype(np.float32), spacing, Settings()).sampled(xs, ys)),
+        **{f"ours, `{preset.value}`, all after segmentation: spacing, fit, normals, colours, sigma":
+           partial(milliseconds, after_segmentation(case, with_preset(preset)))
+           for preset in (Preset.BEST, Preset.FAITHFUL)},
+        "OpenCV inpaint + Gaussian + bicubic": lambda: milliseconds(
             lambda: inpaint_points(case, _SIGMA_PX)),
     }
     if pcl is not None:
         calls[f"PCL MovingLeastSquares, radius {_PCL_RADIUS_MM:g} mm"] = lambda: pcl.run(
             seeds, case.spacing, _PCL_RADIUS_MM)[1]
-    slow = {"scipy RBFInterpolator, 50 neighbours": lambda: _milliseconds(
+    slow = {"scipy RBFInterpolator, 50 neighbours": lambda: milliseconds(
         lambda: rbf_points(case, 50))}
     taken: dict[str, list[float]] = {name: [] for name in (calls | slow)}
     for run in range(_FAST_RUNS):
@@ -110,21 +110,33 @@ def _fit_times(case: Case, pcl: Pcl | None) -> None:
     print(f"\nFit and evaluation ({case.name}, {len(seeds):,} seeds, {len(case.queries):,} "
           f"points), medians of {_FAST_RUNS} runs by turns ({_SLOW_RUNS} of scipy):\n")
     medians = {name: statistics.median(ms) for name, ms in taken.items()}
-    fit, best = (medians[name] for name in list(medians)[:3:2])
-    print("| | ms | over one fit of ours | over all of `best` |\n| --- | --- | --- | --- |")
+    # Fit, and fit with detail, of `best`; all of it.
+    own = [list(medians.values())[at] for at in (0, 2, 3)]
+    print("| | ms | over the fit of `best` | over its fit and detail | over all of it |\n"
+          "| --- | --- | --- | --- | --- |")
     for name, ms in medians.items():
-        print(f"| {name} | {ms:,.1f} | {ms / fit:,.1f} | {ms / best:,.1f} |")
+        print(f"| {name} | {ms:,.1f} | " + " | ".join(f"{ms / one:,.2f}" for one in own) + " |")
 
 
-def _all_of_ours(case: Case, settings: Settings) -> float:
-    return ours_ms(reconstruct(case.frame, settings).report.timings_ms)
+def _of_fit(preset: Preset) -> str:
+    known = Settings.of(preset)
+    return f"(R0 = {known.r0_factor:g}h, lambda = {known.smoothing:g})"
 
 
-def _against_dense(case: Case, count: int) -> None:
+def _fitted(
+    seeds: NDArray[np.float64], spacing: float, preset: Preset, xs: NDArray[np.float64],
+    ys: NDArray[np.float64],
+) -> NDArray[np.float32]:
+    known = Settings.of(preset)
+    return fit_surface(seeds, known.r0_factor * spacing, known.smoothing).heights(xs, ys)
+
+
+def _against_dense(case: Case, count: int, preset: Preset) -> None:
     """The same system with one unknown for each seed, for so many seeds as it can bear."""
+    known = Settings.of(preset)
     away = np.linalg.norm(case.seeds[:, :2] - np.median(case.seeds[:, :2], axis=0), axis=1)
     chosen = np.argsort(away)[:count]
-    seeds, r0 = case.seeds[chosen], _R0_FACTOR * case.spacing
+    seeds, r0 = case.seeds[chosen], known.r0_factor * case.spacing
     low, high = seeds[:, :2].min(axis=0), seeds[:, :2].max(axis=0)
     side = int(np.sqrt(10 * len(seeds)))
     xs, ys = np.linspace(low[0], high[0], side), np.linspace(low[1], high[1], side)
@@ -134,19 +146,19 @@ def _against_dense(case: Case, count: int) -> None:
     results: dict[str, Any] = {}
 
     def fast() -> None:
-        results["fast"] = fit_surface(seeds, r0, _SMOOTHING).on_grid(xs, ys).ravel()
+        results["fast"] = fit_surface(seeds, r0, known.smoothing).on_grid(xs, ys).ravel()
 
     def dense() -> None:
-        results["dense"] = dense_heights(seeds, queries, r0, _SMOOTHING)
+        results["dense"] = dense_heights(seeds, queries, r0, known.smoothing)
 
     fast()
     times: list[tuple[float, float]] = []
     for _ in range(_SLOW_RUNS):
-        slow = _milliseconds(dense)
-        times.append((statistics.median(_milliseconds(fast) for _ in range(5)), slow))
+        slow = milliseconds(dense)
+        times.append((statistics.median(milliseconds(fast) for _ in range(5)), slow))
     ours, dense_ms = (statistics.median(column) for column in zip(*times, strict=True))
     off = np.abs(results["fast"] - results["dense"])[inside]
-    print(f"\nThe same system (R0 = 6h, lambda = 3, quadratic polynomial) for the middle "
+    print(f"\nThe system of `{preset.value}` {_of_fit(preset)} for the middle "
           f"{len(seeds):,} seeds, {len(queries):,} points: dense solve {dense_ms:,.0f} ms, ours "
           f"{ours:.1f} ms, {dense_ms / ours:,.0f} times faster (goal 1000, for all seeds); largest "
           f"deviation {off.max():.4f} mm (goal 0.01).")
@@ -175,7 +187,8 @@ def main() -> int:
         _frame_times(cases[name], args.runs)
     case = cases[_OF]
     _fit_times(case, pcl)
-    _against_dense(case, args.dense_seeds)
+    for preset in (Preset.BEST, Preset.FAITHFUL):
+        _against_dense(case, args.dense_seeds, preset)
     growth(pcl, args.pictures)
     return 0
 
