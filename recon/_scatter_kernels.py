@@ -5,10 +5,21 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["BILINEAR_VARIANCE", "mark", "read_between", "share_out"]
+__all__ = ["BILINEAR_VARIANCE", "bounds", "mark", "read_between", "share_out"]
 
 BILINEAR_VARIANCE = 1 / 6
 """What bilinear weights blur by on average, squared pixels."""
+
+
+@compiled
+def bounds(points: NDArray[np.float32]) -> tuple[float, float, float, float]:
+    """Give the least and the largest x, the least and the largest y of (n, 3) points, n >= 1."""
+    left = right = points[0, 0]
+    top = bottom = points[0, 1]
+    for i in range(len(points)):
+        left, right = min(left, points[i, 0]), max(right, points[i, 0])
+        top, bottom = min(top, points[i, 1]), max(bottom, points[i, 1])
+    return left, right, top, bottom
 
 
 @compiled

@@ -1,16 +1,14 @@
 """Colours as the mean of their neighbours: near ones where there are any, else farther ones."""
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from recon._color_kernels import average, planes, scatter
+from recon.masks import gaussian
 
 __all__ = ["average_missing", "average_neighbors"]
 
 _LEAST_WEIGHT = 0.05
-# The blur's, in units of its radius.
-_REACH = 4
 
 
 def average_neighbors(
@@ -43,7 +41,7 @@ def average_neighbors(
         raise ValueError("colors must not be empty")
     sums = scatter(colors, np.ascontiguousarray(places, np.float32), *wanted.shape)
     image = np.zeros((*wanted.shape, 3), np.uint8)
-    average(sums, wanted, _taps(radius), _LEAST_WEIGHT / spacing**2, image)
+    average(sums, wanted, gaussian(radius), _LEAST_WEIGHT / spacing**2, image)
     return image
 
 
@@ -57,9 +55,4 @@ def average_missing(
     image : (rows, columns, 3) uint8, RGB; changed where `missing`
     known, missing : (rows, columns) bool; at least one is known
     """
-    average(planes(image, known), missing, _taps(1.0), _LEAST_WEIGHT, image)
-
-
-def _taps(radius: float) -> NDArray[np.float32]:
-    size = 2 * round(_REACH * radius) + 1
-    return np.asarray(cv2.getGaussianKernel(size, radius, cv2.CV_32F), np.float32).ravel()
+    average(planes(image, known), missing, gaussian(1.0), _LEAST_WEIGHT, image)

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._scatter_kernels import mark
+from recon._scatter_kernels import bounds, mark
 from recon.masks import disc, fill_holes
 
 __all__ = ["support_on_grid"]
@@ -40,8 +40,9 @@ def support_on_grid(
     support : (rows, columns) bool
     """
     reach = (_CLOSING + _EVEN) * spacing
-    x, y = points[:, 0], points[:, 1]
-    xs, ys = _axis(x, reach, step), _axis(y, reach, step)
+    left, right, top, bottom = bounds(points)
+    xs, ys = (_axis(low - reach, high + reach, step)
+              for low, high in ((left, right), (top, bottom)))
     seeded = mark(points, (xs[0], ys[0]), step, len(ys), len(xs))
     closed = fill_holes(
         np.asarray(cv2.dilate(seeded, disc(_CLOSING * spacing / step)), np.uint8))
@@ -64,7 +65,6 @@ def _blurred(image: NDArray[np.uint8], sigma: float) -> NDArray[np.float32]:
         cv2.resize(half, None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR), np.float32)
 
 
-def _axis(values: NDArray[np.float32], reach: float, step: float) -> NDArray[np.float64]:
-    """Points from before the least value to behind the largest, an even number."""
-    low, high = float(values.min()) - reach, float(values.max()) + reach
+def _axis(low: float, high: float, step: float) -> NDArray[np.float64]:
+    """Points from the least value to behind the largest, an even number."""
     return low + step * np.arange(2 * (int((high - low) / step) // 2 + 1), dtype=np.float64)

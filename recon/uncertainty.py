@@ -23,7 +23,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from recon._color_kernels import blur
 from recon._uncertainty_kernels import coarsen, interpolate
+from recon.masks import gaussian
 from recon.settings import Settings
 
 __all__ = ["Sources", "average_cutoff", "cutoff", "noise_share", "sources_of_error",
@@ -114,8 +116,7 @@ def sources_of_error(
     planes = coarsen(points, support, heights, *slopes, origin, step, every)
     far = cv2.distanceTransform((planes[..., 2] == 0).astype(np.uint8), cv2.DIST_L2, 5)
     seeds, squares = planes[..., 2].sum(dtype=np.float64), planes[..., 3].sum(dtype=np.float64)
-    covered, slope, count, square = cv2.split(
-        cv2.GaussianBlur(planes, (0, 0), _WINDOW / node, borderType=cv2.BORDER_CONSTANT))
+    covered, slope, count, square = cv2.split(blur(planes, gaussian(_WINDOW / node)))
     prior = np.float32(_PRIOR * node**2)
     noise = (square + prior * np.float32(squares / max(seeds, 1.0))) / (count + prior)
     hole = noise * np.maximum(np.float32(node) * far - 1, np.float32(0))

@@ -2,7 +2,14 @@
 
 import numpy as np
 
-from recon._scatter_kernels import mark, read_between, share_out
+from recon._scatter_kernels import bounds, mark, read_between, share_out
+
+
+def test_bounds_are_the_least_and_the_largest():
+    points = np.random.default_rng(4).normal(size=(50, 3)).astype(np.float32)
+    least, most = points.min(axis=0), points.max(axis=0)
+    assert bounds(points) == (least[0], most[0], least[1], most[1])
+    assert bounds(points[:1]) == (*points[0, [0, 0]], *points[0, [1, 1]])
 
 
 def test_the_pixel_nearest_to_a_point_is_marked():
