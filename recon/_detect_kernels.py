@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["bulge_terms", "depths_in_box", "fill_layers"]
+__all__ = ["depths_in_box", "fill_layers", "nearest_in_cells"]
 
 
 @compiled
@@ -34,6 +34,21 @@ def fill_layers(
 
 
 @compiled
+def nearest_in_cells(
+    pixels: NDArray[np.float32], color_depth: NDArray[np.float32], visible: NDArray[np.bool_],
+    cell: float, nearest: NDArray[np.float32],
+) -> None:
+    """Lower each of the (rows, columns) cells to the nearest depth in it, mm."""
+    rows, columns = nearest.shape
+    for i in range(visible.shape[0]):
+        for j in range(visible.shape[1]):
+            if visible[i, j]:
+                row = min(int((pixels[i, j, 1] + 0.5) / cell), rows - 1)
+                column = min(int((pixels[i, j, 0] + 0.5) / cell), columns - 1)
+                nearest[row, column] = min(nearest[row, column], color_depth[i, j])
+
+
+@compiled
 def depths_in_box(
     pixels: NDArray[np.float32], color_depth: NDArray[np.float32], visible: NDArray[np.bool_],
     left: float, top: float, width: float, height: float,
@@ -54,31 +69,3 @@ def depths_in_box(
                 found[count, 0], found[count, 1], found[count, 2] = u, v, color_depth[i, j]
                 count += 1
     return found[:count]
-
-
-@compiled
-def bulge_terms(
-    depths: NDArray[np.float64], around_mm: float, reach_mm: float, fitted: NDArray[np.float64],
-    before_mm: float, kept: NDArray[np.bool_],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
-    """Give the normal equations of z - around = a + b u + c v + d (u^2 + v^2), and their number.
-
-    kept : (n,), which depths are fitted; lowered here to those in the unit circle, less than
-        `reach_mm` from `around_mm`, and not more than `before_mm` before what was `fitted` last
-    """
-    matrix, right = np.zeros((4, 4)), np.zeros(4)
-    term = np.ones(4)
-    count = 0
-    for i in range(len(depths)):
-        u, v, z = depths[i, 0], depths[i, 1], depths[i, 2] - around_mm
-        squared = u * u + v * v
-        term[1], term[2], term[3] = u, v, squared
-        behind = z - (fitted[0] + fitted[1] * u + fitted[2] * v + fitted[3] * squared)
-        kept[i] &= squared < 1 and abs(z) < reach_mm and behind > -before_mm
-        if kept[i]:
-            count += 1
-            for row in range(4):
-                right[row] += term[row] * z
-                for column in range(4):
-                    matrix[row, column] += term[row] * term[column]
-    return matrix, right, count

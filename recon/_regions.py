@@ -6,12 +6,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._detect_kernels import fill_layers
+from recon._detect_kernels import fill_layers, nearest_in_cells
+from recon._relief_kernels import curved_cells
 from recon.errors import NoDepthError
 from recon.face import Box
 from recon.registration import Registration
 
-__all__ = ["CELLS", "Region", "regions_by_depth"]
+__all__ = ["CELLS", "Region", "regions_by_depth", "without_flat"]
 
 # A face farther away has under 2,000 depth pixels and noise of over 5 mm: no face worth having.
 _NEAREST_MM, _FARTHEST_MM = 300.0, 2000.0
@@ -26,6 +27,12 @@ _HALF_FACE_MM = 90.0
 # Of a square about its middle, so wide, at least such a share holds depth of the layer.
 _MIDDLE_MM = 80.0
 _LEAST_SHARE = 0.2
+# What bulges less than this about a middle, within half a face's width, is no face: the least that
+# a face's own box must bulge, less what a cell aside makes of it.
+_LEAST_BULGE_MM = 4.0
+_HALF_BOX_MM = 80.0
+_HALF_NARROWEST_MM, _HALF_WIDEST_MM = 55.0, 105.0
+_NOTHING = np.float32(1e30)
 
 
 class Region(NamedTuple):
@@ -79,6 +86,36 @@ def regions_by_depth(
                 part = _widened((x, y, w, h), around, cell, shape)
                 regions.append(Region(part, near, far, middles))
     return regions
+
+
+def without_flat(
+    regions: list[Region], registered: Registration, shape: tuple[int, int], focal_px: float
+) -> list[Region]:
+    """Give the regions without the middles about which no depth bulges, as small as is left.
+
+    Parameters are those of `regions_by_depth`.
+    """
+    if not regions:
+        return []
+    cell = shape[1] / CELLS
+    nearest = np.full(regions[0].middles.shape, _NOTHING)
+    nearest_in_cells(registered.pixels, registered.color_depth, registered.visible, cell, nearest)
+    remaining = []
+    for region in regions:
+        x, y, w, h = (round(side / cell) for side in region.part)
+        # Nearer to the image's border, the narrowest face is not whole.
+        off = int(_HALF_NARROWEST_MM * focal_px / region.far_mm / cell)
+        there = np.s_[max(y, off):min(y + h, len(nearest) - off),
+                      max(x, off):min(x + w, CELLS - off)]
+        wanted = np.zeros_like(region.middles)
+        wanted[there] = region.middles[there]
+        curved = curved_cells(nearest, wanted, _HALF_BOX_MM * focal_px / cell, _LEAST_BULGE_MM)
+        if curved.any():
+            around = round(_HALF_WIDEST_MM * focal_px / region.near_mm / cell)
+            left, top, width, height = cv2.boundingRect(curved.view(np.uint8))
+            part = _widened((left, top, width, height), around, cell, shape)
+            remaining.append(region._replace(part=part, middles=curved))
+    return remaining
 
 
 def _widened(cells: Box, around: int, cell: float, shape: tuple[int, int]) -> Box:

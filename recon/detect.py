@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from recon._cascades import Look, Middles, look_for_faces
 from recon._detect_kernels import depths_in_box
-from recon._regions import CELLS, Region, regions_by_depth
+from recon._regions import CELLS, Region, regions_by_depth, without_flat
 from recon._relief import bulge_mm
 from recon.errors import FaceWithoutDepthError, NoFaceError
 from recon.face import Box, FaceCandidate
@@ -27,28 +27,29 @@ _LEAST_BULGE_MM = 7.5
 
 # Viola and Jones, 2001, doi:10.1109/CVPR.2001.990517.
 _ALT2 = "haarcascade_frontalface_alt2"
-_DEFAULT = "haarcascade_frontalface_default"
 _PROFILE = "haarcascade_profileface"
 # The profile cascade's box is so much wider than the frontal ones' around the same head.
 _PROFILE_WIDER = 1.09
 
-# A third of the resolution for a face at 0.8 m, half of it, then whatever there is.
-_THIRD, _HALF, _FULL = 28.0, 42.0, 96.0
-_ROLLED_PX = 32.0
+# A third of the resolution for a face at 0.8 m, half of it, two thirds.
+_THIRD, _HALF, _FINE = 28.0, 42.0, 60.0
+_ROLLED_PX, _PROFILE_PX = 36.0, 34.0
 _FIRST = Look(_ALT2, _THIRD, 1.18, 3)
 _ANYWHERE = Look(_ALT2, _THIRD, 1.2, 3)
 _SECOND = Look(_ALT2, _HALF)
-_ROLLED = tuple(Look(_ALT2, _ROLLED_PX, 1.2, 3, roll=degrees) for degrees in (-30, 30, -15, 15))
-_PROFILES = tuple(Look(_PROFILE, _HALF, mirrored=mirrored) for mirrored in (False, True))
+_ROLLED = tuple(Look(_ALT2, _ROLLED_PX, 1.15, 3, roll=degrees) for degrees in (-30, 30, -15, 15))
+_PROFILES = tuple(Look(_PROFILE, _PROFILE_PX, 1.05, 6, mirrored=way) for way in (False, True))
 # The first look by which depth confirms a face ends the search: most faces are found by the first,
 # the others see those that it misses (turned, tipped, lit from the side).
-_LADDER = (_FIRST, _SECOND, *_ROLLED, *_PROFILES, Look(_DEFAULT, _HALF, 1.1, 4), Look(_ALT2, _FULL))
+_LADDER = (_FIRST, _SECOND, *_ROLLED, *_PROFILES, Look(_ALT2, _FINE, 1.07))
 # With the contrast evened out, for faces in the dark or lit aslant. The profile cascade takes the
 # back of an ear for a face there.
 _EVENED_LADDER = (_FIRST, _SECOND)
 # What stands this much nearer than the face found is searched once more, by so many looks.
-_NEARER_MM = 40.0
-_NEARER_LOOKS = (_SECOND, *_ROLLED[:2])
+_NEARER_MM = 20.0
+# What is below a face and not so much nearer is its own body.
+_BODY_MM = 100.0
+_NEARER_LOOKS = (_SECOND, *_ROLLED[:2], *_PROFILES)
 # The box found small is sought again at full size, about its own middle, as wide as a face is at
 # its depth: its own width is that of a few coarse steps.
 _REFINED_STEP, _REFINED_NEIGHBORS = 1.08, 2
@@ -109,6 +110,8 @@ def detect_face(
             if found:
                 nearer = search.nearer_than(found)
                 return search.detection(*(nearer or (searched, look, found)))
+            if look is _FIRST and gray is not None:
+                search.leave_out_flat()
     search.anywhere()
     raise search.failure()
 
@@ -130,6 +133,10 @@ class _Search:
         self.to_color = color.shape[1] / gray.shape[1]
         self.shape = color.shape[:2]
         self.regions = regions_by_depth(registered, self.shape, focal_px)
+
+    def leave_out_flat(self) -> None:
+        """From now on look only where depth bulges."""
+        self.regions = without_flat(self.regions, self.registered, self.shape, self.focal_px)
 
     def evened(self) -> NDArray[np.uint8]:
         """Give the image with its contrast evened out."""
@@ -159,9 +166,13 @@ class _Search:
         nearer = regions_by_depth(self.registered, self.shape, self.focal_px,
                                   _depth(found) - _NEARER_MM)
         x, y, w, h = (side * CELLS / self.shape[1] for side in found.box)
+        left, top, right, bottom = (max(round(side), 0) for side in (x, y, x + w, y + h))
         for region in nearer:
-            region.middles[max(round(y), 0):round(y + h), max(round(x), 0):round(x + w)] = False
-        nearer = [region for region in nearer if region.middles.any()]
+            region.middles[top:bottom, left:right] = False
+            if region.far_mm > _depth(found) - _BODY_MM:
+                region.middles[bottom:, max(round(x - w / 2), 0):round(x + 1.5 * w)] = False
+        if nearer:
+            nearer = without_flat(nearer, self.registered, self.shape, self.focal_px)
         for look in _NEARER_LOOKS if nearer else ():
             missed = self.nearest(self.gray, look, nearer)
             if missed:

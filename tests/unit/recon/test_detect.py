@@ -137,14 +137,29 @@ def test_the_middle_stays_when_the_images_are_turned(shot):
     assert wide == pytest.approx(w, rel=0.15)
 
 
-def test_a_nearer_face_wins_though_the_first_look_sees_only_the_farther():
-    shot, = simulate(Scene((Person(distance_mm=1150, offset_mm=(230, -30)),
-                            Person(distance_mm=700, offset_mm=(-110, 10), roll=33))), seed=1)
-    alone, = simulate(Scene((Person(distance_mm=700, offset_mm=(-110, 10), roll=33),)), seed=1)
+@pytest.mark.parametrize(("nearer", "farther"), [
+    ({"distance_mm": 700, "roll": 33}, {"distance_mm": 1150, "offset_mm": (230, -30)}),
+    ({"distance_mm": 750, "yaw": -60}, {"distance_mm": 1150, "offset_mm": (230, -30)}),
+    ({"distance_mm": 820, "roll": -33}, {"distance_mm": 860, "offset_mm": (110, -10)})])
+def test_a_nearer_face_wins_though_the_first_look_sees_only_the_farther(nearer, farther):
+    one = Person(offset_mm=(-110, 10), **nearer)
+    shot, = simulate(Scene((Person(**farther), one)), seed=1)
+    alone, = simulate(Scene((one,)), seed=1)
     found = detected(shot.frame)
-    assert found.depth_mm < 800
+    assert found.depth_mm < one.distance_mm + 20
     assert [c.verdict for c in found.candidates] == ["chosen", "farther"]
     assert [c.verdict for c in detected(alone.frame).candidates] == ["chosen"]
+
+
+@pytest.mark.parametrize("distance_mm", [600, 1000])
+def test_the_box_is_as_wide_as_a_face_whatever_the_first_look_gave(distance_mm):
+    widths = []
+    for step in range(3):
+        shot, = simulate(Scene((Person(distance_mm=distance_mm + 35 * step),)), seed=step)
+        widths.append(detected(shot.frame).candidates[0].width_mm)
+    assert max(widths) < 1.12 * min(widths)
+    assert min(widths) > 145
+    assert max(widths) < 190
 
 
 @pytest.mark.parametrize("nobody", [

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from recon._regions import CELLS, regions_by_depth
+from recon._regions import CELLS, regions_by_depth, without_flat
 from recon.registration import register
 from tests.unit.frames import calibration, camera, frame
 
@@ -11,12 +11,29 @@ SIZE = 480, 640
 FOCAL_PX = 520.0
 
 
-def regions(depth, every=1, **limit):
+def registration(depth, every=1):
     one = camera(640, 480, FOCAL_PX)
     shown = frame(depth.astype(np.uint16), np.zeros((*SIZE, 3), np.uint8),
                   calibration(depth=one, color=one), registered=True)
     part = slice(None, None, every)
-    return regions_by_depth(register(shown, 0.0, part, part), SIZE, FOCAL_PX, **limit)
+    return register(shown, 0.0, part, part)
+
+
+def regions(depth, every=1, **limit):
+    return regions_by_depth(registration(depth, every), SIZE, FOCAL_PX, **limit)
+
+
+def curved(depth, every=4):
+    one = registration(depth, every)
+    return without_flat(regions_by_depth(one, SIZE, FOCAL_PX), one, SIZE, FOCAL_PX)
+
+
+def with_ball(depth, column, row, distance, radius_mm=80):
+    """A ball before what is there."""
+    v, u = np.mgrid[:480, :640]
+    away = np.hypot(u - column, v - row) * distance / FOCAL_PX
+    inside = away < radius_mm
+    depth[inside] = distance + radius_mm - np.sqrt(radius_mm**2 - away[inside] ** 2)
 
 
 @pytest.fixture
@@ -95,3 +112,32 @@ def test_what_is_farther_than_asked_is_left_out(two):
     assert [r.far_mm for r in regions(two, nearer_than_mm=1310)] == [near.far_mm, 1310]
     assert regions(two, nearer_than_mm=690) == []
     assert regions(two, nearer_than_mm=100) == []
+
+
+@pytest.mark.parametrize("every", [1, 4])
+@pytest.mark.parametrize("slant", [0.0, 0.6])
+def test_a_wall_is_left_out_and_a_ball_before_it_is_not(every, slant):
+    depth = 1100 + slant * (np.arange(640) - 320) + np.zeros(SIZE)
+    assert curved(depth, every) == []
+    with_ball(depth, 200, 240, 700)
+    region, = (r for r in curved(depth, every) if r.near_mm <= 700 < r.far_mm)
+    side = 640 / CELLS
+    assert region.middles[round(240 / side), round(200 / side)]
+    # Whole boxes, of the widest face, fit about all that is left.
+    rows, columns = np.nonzero(region.middles)
+    half = 105 * FOCAL_PX / region.near_mm
+    assert covers(region, (columns.min() + 0.5) * side - half, (rows.min() + 0.5) * side - half,
+                  (columns.max() + 0.5) * side + half, (rows.max() + 0.5) * side + half)
+
+
+def test_a_ball_where_little_is_measured_is_not_left_out():
+    """Too few depths do not tell."""
+    depth = np.zeros(SIZE)
+    with_ball(depth, 320, 240, 1500)
+    depth[:, np.arange(640) % 32 > 1] = 0
+    everything = regions(depth, 1)
+    assert len(curved(depth, 1)) == len(everything)
+
+
+def test_nothing_is_left_of_nothing():
+    assert without_flat([], registration(np.full(SIZE, 900.0)), SIZE, FOCAL_PX) == []
