@@ -117,6 +117,6 @@ def curved_cells(
                         depths[count, 1] = down * step / half
                         depths[count, 2] = nearest[row, column]
                         count += 1
-            bulge, known = fitted_bulge(depths[:count], nearest[i, j])
+            bulge, known = fitted_bulge(depths[:count], float(nearest[i, j]))
             curved[i, j] = bulge >= least_mm or not known
     return curved

@@ -99,7 +99,7 @@ class Report(_Model):
     """x, y, width, height; pixels of the colour image."""
     # Of a face from elsewhere: one complaint is enough, each costs a thousand bytes.
     candidates: Annotated[tuple[FaceCandidate, ...], FailFast()]
-    """Every box the detector gave, the chosen one first."""
+    """Every box the detector weighed, the chosen one first. Nobody farther is looked for."""
     initial_points: int
     dense_points: int
     mean_spacing_mm: float

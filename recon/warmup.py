@@ -6,6 +6,8 @@ from functools import cache, partial
 import numpy as np
 
 from capture.frame import Calibration, CameraModel, RgbdFrame
+from recon._detect_kernels import depths_in_box
+from recon._relief import bulge_mm
 from recon.densify import densify
 from recon.detail import add_detail
 from recon.detect import detect_face
@@ -22,6 +24,7 @@ __all__ = ["warm"]
 _WIDTH, _HEIGHT = 160, 120
 _FOCAL_PX = 150.0
 _BOX = (58, 38, 44, 44)
+_NEAREST_MM = 700.0
 
 
 @cache
@@ -36,6 +39,9 @@ def warm() -> None:
     registered = register(frame)
     with suppress(NoFaceError):  # not even OpenCV sees one
         detect_face(frame.color, registered, _FOCAL_PX)
+    left, top, width, height = map(float, _BOX)
+    bulge_mm(depths_in_box(registered.pixels, registered.color_depth, registered.visible,
+                           left, top, width, height), _NEAREST_MM)
     seeds = segment_face(registered, _BOX, _FOCAL_PX)
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     fit = fit_surface(seeds.points, settings.r0_factor * spacing, settings.smoothing)
@@ -48,6 +54,6 @@ def _ball() -> RgbdFrame:
                          cx=(_WIDTH - 1) / 2, cy=(_HEIGHT - 1) / 2)
     v, u = np.mgrid[:_HEIGHT, :_WIDTH]
     lower = ((u - camera.cx) ** 2 + (v - camera.cy) ** 2) / 20
-    depth = np.where(lower < 60, 700 + lower, 1500).astype(np.uint16)
+    depth = np.where(lower < 60, _NEAREST_MM + lower, 1500).astype(np.uint16)
     return RgbdFrame(depth, np.full((_HEIGHT, _WIDTH, 3), 128, np.uint8), 0, 0,
                      Calibration(depth=camera, color=camera), registered=True)
