@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import os
 import statistics
 import sys
 import tempfile
@@ -15,7 +16,7 @@ import structlog
 
 from bench.accuracy import RECORDINGS
 from bench.machine import describe
-from bench.service_processes import Bare, Running, running
+from bench.service_processes import Bare, Running, kind_of, running
 from bench.service_steps import Laps, one_capture_each
 from capture import open_source
 from recon import warm
@@ -70,6 +71,26 @@ def _print_throughput(rates: dict[str, list[float]], rounds: int, count: int) ->
               f"({100 * min(ratios):.0f} to {100 * max(ratios):.0f}; goal 90) |")
 
 
+def _processor_s(side: Bare | Running) -> dict[str, float]:
+    return {"bare": side.processor_s()} if isinstance(side, Bare) else side.processor_s()
+
+
+def _print_processor_time(used: dict[int, dict[str, float]], captures: int) -> None:
+    """Where all cores are busy no pipeline is faster than its processor time."""
+    cores = len(os.sched_getaffinity(0))
+    names = ("bare", "worker", "hub", "capture", "client")
+    print(f"\nProcessor time for one capture, ms, of the same rounds; the client is this program, "
+          f"and no share is above what {cores} cores could give if all of it were spread evenly:\n")
+    print(f"| workers | {' | '.join(names[1:])} | all | bare function | share at most |\n"
+          f"|{' --- |' * (len(names) + 3)}")
+    for workers, one in used.items():
+        ms = {name: one[name] / captures * 1e3 for name in names}
+        total = sum(ms.values()) - ms["bare"]
+        most = min(1.0, cores / workers * ms["bare"] / total)
+        print(f"| {workers} | {' | '.join(f'{ms[name]:.1f}' for name in names[1:])} "
+              f"| {total:.1f} | {ms['bare']:.1f} | {100 * most:.0f} % |")
+
+
 def _latency(service: Running, presses: int) -> tuple[list[float], list[float]]:
     """Milliseconds from each press to its acknowledgement, and to the face at a subscriber."""
     accepted, published = [], []
@@ -88,8 +109,8 @@ def _idle(service: Running, seconds: float) -> list[tuple[str, float, float]]:
     family = service.family()
     before = [sum(one.cpu_times()[:2]) for one in family]
     time.sleep(seconds)
-    return [(one.cmdline()[4] if "-P" in one.cmdline() else "up",
-             100 * (sum(one.cpu_times()[:2]) - was) / seconds, one.memory_full_info().uss / _MB)
+    return [(kind_of(one), 100 * (sum(one.cpu_times()[:2]) - was) / seconds,
+             one.memory_full_info().uss / _MB)
             for one, was in zip(family, before, strict=True)]
 
 
@@ -98,7 +119,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="script/bench service", description=__doc__)
     parser.add_argument("--source", type=Path, default=RECORDINGS / "frontal_700.oni",
                         help="recording that is served (frontal_700)")
-    parser.add_argument("--captures", type=int, default=30, help="of one round (30)")
+    # So many that filling and draining the pipeline is no part of the result.
+    parser.add_argument("--captures", type=int, default=100, help="of one round (100)")
     parser.add_argument("--rounds", type=int, default=5, help="of throughput (5)")
     parser.add_argument("--presses", type=int, default=200, help="for the latency (200)")
     parser.add_argument("--idle", type=float, default=20.0, help="seconds (20)")
@@ -110,11 +132,13 @@ def main() -> int:
     print(describe("script/bench service " + " ".join(sys.argv[1:])), flush=True)
     warm()
     rates: dict[str, list[float]] = {}
+    used: dict[int, dict[str, float]] = {}
     accepted: list[float] = []
     published: list[float] = []
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="df-")))
-        _print_overhead(_overhead(args.source, folder, args.captures), args.source, args.captures)
+        runs = min(args.captures, 30)
+        _print_overhead(_overhead(args.source, folder, runs), args.source, runs)
         services = {count: stack.enter_context(running(args.source, count)) for count in (1, 2)}
         bare = {count: Bare(args.source, count) for count in (1, 2)}
         for each in bare.values():
@@ -124,13 +148,18 @@ def main() -> int:
         for turn in range(args.rounds):
             for name, sides in (("bare", bare), ("service", services)):
                 for count, side in sides.items():
+                    before = _processor_s(side)
                     rates.setdefault(f"{name}, {count}", []).append(
                         args.captures / side.throughput(args.captures))
+                    for process, seconds in _processor_s(side).items():
+                        total = used.setdefault(count, {})
+                        total[process] = total.get(process, 0.0) + seconds - before[process]
             some = args.presses * (turn + 1) // args.rounds - args.presses * turn // args.rounds
             for into, found in zip((accepted, published), _latency(services[1], some),
                                    strict=True):
                 into += found
         _print_throughput(rates, args.rounds, args.captures)
+        _print_processor_time(used, args.rounds * args.captures)
         print(f"\nFrom a press, {args.presses} of them between those rounds, 1 worker:\n")
         print("| until | p50, ms | p99, ms |\n| --- | --- | --- |")
         for what, taken in (("it is accepted", accepted),

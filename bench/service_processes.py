@@ -19,7 +19,7 @@ from service.client import Client
 from service.outputs import Topic
 from service.sockets import open_socket
 
-__all__ = ["Bare", "Running", "running"]
+__all__ = ["Bare", "Running", "kind_of", "running"]
 
 _START_S = 60.0
 _CAPTURE_S = 60.0
@@ -39,6 +39,14 @@ class Running:
         """Give the supervisor and its processes, in the order of the process table."""
         up = psutil.Process(self.process.pid)
         return [up, *up.children()]
+
+    def processor_s(self) -> dict[str, float]:
+        """Give the processor time so far of each kind of process, and of this one, the client."""
+        used = {"client": sum(psutil.Process().cpu_times()[:2])}
+        for one in self.family():
+            name = kind_of(one)
+            used[name] = used.get(name, 0.0) + sum(one.cpu_times()[:2])
+        return used
 
     def throughput(self, count: int) -> float:
         """Press so often, one press after the other; seconds from the first to the last face."""
@@ -64,6 +72,12 @@ class Running:
             took = time.perf_counter() - start
             socket.close()
         return took
+
+
+def kind_of(process: psutil.Process) -> str:
+    """Give the name in the process table of one of the service's processes."""
+    command = process.cmdline()
+    return command[4] if "-P" in command else "up"
 
 
 @contextmanager
@@ -106,6 +120,10 @@ class Bare:
             for _ in range(count)]
         for process in self._processes:
             _line(process.stdout)  # warm
+
+    def processor_s(self) -> float:
+        """Give the processor time so far of all."""
+        return sum(sum(psutil.Process(one.pid).cpu_times()[:2]) for one in self._processes)
 
     def throughput(self, count: int) -> float:
         """Reconstruct so many frames in all; seconds until the last process is through."""
