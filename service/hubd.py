@@ -19,7 +19,7 @@ from service.errors import LocalProtocolError, RemoteProtocolError
 from service.failpoints import failpoint
 from service.hub import Hub
 from service.observer import Observer
-from service.outputs import Output, Publish, Topic, send
+from service.outputs import Output, Publish, Topic, send, steps
 from service.refusals import Refusals
 from service.settings import ServiceSettings
 from service.stopping import StopSignal
@@ -136,7 +136,12 @@ class _Loop:
             time.monotonic(), incoming.peer, packet, incoming.key), packet)
 
     def _give_out(self, outputs: list[Output], caused_by: Packet | None = None) -> None:
-        self._observer.saw(time.monotonic(), caused_by, outputs)
+        for step in steps(outputs):
+            self._observer.saw(time.monotonic(), caused_by, step)
+            self._send(step)
+            caused_by = None
+
+    def _send(self, outputs: Sequence[Output]) -> None:
         for output in outputs:
             try:
                 parts = encode(output.packet)
@@ -147,8 +152,8 @@ class _Loop:
                 self._publish(output.topic, parts)
             elif not self._entrance.send(output.peer, parts):
                 self._give_out(self._hub.unreachable(output.peer))
-            elif step := _SENT.get(output.packet.message.kind):
-                failpoint(step)
+            elif name := _SENT.get(output.packet.message.kind):
+                failpoint(name)
 
     def _publish(self, topic: Topic, parts: Sequence[Buffer]) -> None:
         if topic is Topic.FACES:

@@ -1,13 +1,14 @@
 """What the hub gives out: messages to peers and to subscribers."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from service.messages import FromHub
+from service.messages import FromHub, Job
 from service.payload import Arrays
 from service.wire import Packet
 
-__all__ = ["Output", "Publish", "Send", "Topic", "send"]
+__all__ = ["Output", "Publish", "Send", "Topic", "send", "steps"]
 
 
 class Topic(StrEnum):
@@ -38,6 +39,19 @@ class Publish:
 
 
 Output = Send | Publish
+
+
+def steps(outputs: Sequence[Output]) -> Iterator[Sequence[Output]]:
+    """Split what is to be given out before each job.
+
+    Whoever waits for what comes before does not wait for the job, which has a time of its own.
+    """
+    begin = 0
+    for at, output in enumerate(outputs):
+        if at > begin and isinstance(output.packet.message, Job):
+            yield outputs[begin:at]
+            begin = at
+    yield outputs[begin:]
 
 
 def send(peer: bytes, message: FromHub, arrays: Arrays | None = None) -> Send:

@@ -6,6 +6,7 @@ from recon.settings import Settings
 from service import messages
 from service.figures import Figures
 from service.hub import Hub
+from service.outputs import send, steps
 from service.store import FolderStore
 from service.watch import Watch
 from service.wire import Packet
@@ -35,7 +36,10 @@ class WatchedBench(Bench):
         packet = Packet(message, arrays or {})
         outputs = self.hub.receive(self.now, peer, packet)
         self.now += 0.5
-        self.watch.saw(self.now, packet, outputs)
+        for step in steps(outputs):
+            self.watch.saw(self.now, packet, step)
+            self.now += 0.25
+        self.now -= 0.25
         return self._sent(outputs)
 
     def wait(self, seconds):
@@ -71,8 +75,20 @@ def test_a_capture_is_counted_once_with_the_time_of_every_stage(bench):
     assert times.pop("recon_total") == (1, pytest.approx(
         small_face().report.timings_ms["total"] / 1000))
     assert times == {
-        "press_to_accepted": (1, 0.5), "accepted_to_dispatched": (1, 0.0),
-        "dispatched_to_result": (1, 1.5), "press_to_published": (1, 2.0)}
+        "press_to_accepted": (1, 0.5), "accepted_to_dispatched": (1, 0.25),
+        "dispatched_to_result": (1, 1.5), "press_to_published": (1, 2.25)}
+
+
+def test_what_is_said_before_a_job_has_its_own_time(bench):
+    bench.accepted("a", "b")
+    outputs = [send(SENSOR, messages.FrameAccepted(capture_id="a"))]
+    for credit, capture_id in enumerate("ab"):
+        outputs += bench.hub.receive(bench.now, WORKER, Packet(
+            messages.WorkerReady(name="w", credit=credit)))
+        outputs.append(send(CLIENT, messages.PressAccepted(request=1, capture_id=capture_id)))
+    assert [[one.packet.message.kind for one in step] for step in steps(outputs)] == [
+        ["frame_accepted"], ["job", "press_accepted"], ["job", "press_accepted"]]
+    assert [list(step) for step in steps([])] == [[]]
 
 
 def test_a_job_that_is_given_out_again_and_then_given_up(bench):
