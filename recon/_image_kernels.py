@@ -161,11 +161,11 @@ def collect(
 
 @compiled
 def unset(image: NDArray[np.uint8], cells: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Give the indices of the cells where an image of every second point is zero."""
+    """Give the indices of the cells where an image is zero."""
     out = np.empty(len(cells), np.int64)
     count = 0
     for i in range(len(cells)):
         out[count] = i
-        if image[np.uint32(cells[i, 0]) >> 1, np.uint32(cells[i, 1]) >> 1] == 0:
+        if image[np.uint32(cells[i, 0]), np.uint32(cells[i, 1])] == 0:
             count += 1
     return out[:count].copy()

@@ -35,6 +35,10 @@ _LEAST_RADIUS = 0.4
 _COARSE = 0.5
 # Farther than this from every seed, over (X, Y), a point is in a hole.
 _HOLE = 1.5
+# Steeper than this, and farther than that from every seed, the fit bridges a step: no sensor reads
+# what it sees at so grazing an angle.
+_STEEP = 4.0
+_UNREAD = 0.7
 
 
 def densify(
@@ -64,6 +68,10 @@ def densify(
     origin = float(xs[0]), float(ys[0])
 
     heights, slopes_x, slopes_y = surface.sampled(xs, ys)
+    steep = slopes_x * slopes_x + slopes_y * slopes_y >= np.float32(_STEEP**2)
+    if steep.any():
+        near = _near_seeds(seeds, origin, step, support.shape, _UNREAD * spacing)
+        support &= ~steep | near.view(np.bool_)
     sources = sources_of_error(
         seeds.points, support, heights, (slopes_x, slopes_y), origin, step, spacing)
     sigma = np.asarray(cv2.copyMakeBorder(
@@ -74,7 +82,7 @@ def densify(
     points, normals, colors, sigma, cells = collect(
         support, xs, ys, heights, slopes_x, slopes_y, colors, every, sigma, sources.every)
     if look_up is not None:
-        hole = _far_from_seeds(seeds, origin, step, cells, support.shape, _HOLE * spacing)
+        hole = unset(_near_seeds(seeds, origin, step, support.shape, _HOLE * spacing), cells)
         if len(hole):
             own, seen = look_up(points[hole])
             colors[hole[seen]] = own[seen]
@@ -95,16 +103,12 @@ def _supported_area(points: NDArray[np.float32], spacing: float) -> float:
     return float(np.count_nonzero(support) * step**2)
 
 
-def _far_from_seeds(
-    seeds: Seeds, origin: tuple[float, float], step: float, cells: NDArray[np.int32],
-    shape: tuple[int, int], radius: float,
-) -> NDArray[np.int64]:
-    """Which cells, by their indices, have no seed within a radius, mm, to a grid point."""
-    rows, columns = (side // 2 + 1 for side in shape)
-    seeded = mark(seeds.points, (origin[0] + step / 2, origin[1] + step / 2), 2 * step, rows,
-                  columns)
-    near = cv2.dilate(seeded, disc(radius / (2 * step)))
-    return unset(np.asarray(near, np.uint8), cells)
+def _near_seeds(
+    seeds: Seeds, origin: tuple[float, float], step: float, shape: tuple[int, ...], radius: float
+) -> NDArray[np.uint8]:
+    """Which grid points have a seed within a radius, mm, to half a step; 0 or 1."""
+    seeded = mark(seeds.points, origin, step, shape[0], shape[1])
+    return np.asarray(cv2.dilate(seeded, disc(radius / step)), np.uint8)
 
 
 def _colors(

@@ -17,6 +17,7 @@ from recon._image_kernels import add_between
 from recon._percentile import percentile
 from recon._scatter_kernels import BILINEAR_VARIANCE, read_between, share_out
 from recon.rbf import Surface
+from recon.rim import BROADER, Rim, broad_average, halved
 from recon.support import support_on_grid
 
 __all__ = ["DetailedSurface", "add_detail"]
@@ -24,7 +25,7 @@ __all__ = ["DetailedSurface", "add_detail"]
 Image = NDArray[np.float32]
 
 # Points of the detail's grid for each spacing.
-_FINENESS = 1.5
+_FINENESS = 1.75
 # Below this share of the usual weight lies a hole, or the rim.
 _FULL = 0.4
 # There a wider average is taken, and again of what it leaves: like a fit, that carries the slope
@@ -114,15 +115,20 @@ def add_detail(
     detail = grid.spread(rest, radius / step) / (weight + usual * np.float32(_FADING))
     missing = 1 - np.minimum(weight / (usual * np.float32(_FULL)), 1)
     missing *= missing * (3 - 2 * missing)
-    wide = cv2.resize(_extended(grid.halved(), rest, _WIDER * radius / (2 * step), 4 * usual),
-                      None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
-    detail += missing * (wide[:detail.shape[0], :detail.shape[1]] - detail)
+    half = grid.halved()
+    wide = _extended(half, rest, _WIDER * radius / (2 * step), 4 * usual)
+    detail += missing * (_doubled(wide, detail) - detail)
+    rim = Rim.of(support, step / spacing)
+    # So broad an average needs no more than every fourth point.
+    cells = half.halved()
+    broad = broad_average(cells.sums(None), cells.sums(rest), BROADER * radius / (4 * step),
+                          16 * float(usual), rim, 2)
+    detail += _doubled(rim.nearness, detail) * (_doubled(broad, detail) - detail)
     detail *= _gain(detail, support, step)
+    detail += _doubled(rim.frayed_depth(_slopes(halved(heights), 2 * step), spacing), detail)
     heights += detail
-    slopes = [cv2.Sobel(heights, cv2.CV_32F, right, 1 - right, ksize=1, scale=0.5 / step,
-                        borderType=cv2.BORDER_REPLICATE) for right in (1, 0)]
     return DetailedSurface(
-        base, np.stack([detail, *slopes]).astype(np.float32, copy=False),
+        base, np.stack([detail, *_slopes(heights, step)]).astype(np.float32, copy=False),
         (float(xs[0]), float(ys[0])), step, noise=float((rest - grid.at_seeds(detail)).std()),
         area=float(np.count_nonzero(support) * step**2))
 
@@ -146,17 +152,35 @@ class _Seeded:
         columns, rows = (half * (one - half) for one in (self.columns, self.rows))
         return _Seeded(columns, rows, ((self.shape[0] + 1) // 2, (self.shape[1] + 1) // 2))
 
-    def spread(self, values: Image | None, sigma: float) -> Image:
-        """Sum the seeds' values, or the seeds, weighted by a Gaussian."""
+    def sums(self, values: Image | None) -> Image:
+        """Sum the seeds' values, or the seeds, each shared among the four pixels around it."""
         sums = np.zeros(self.shape, np.float32)
         given = np.ones_like(self.columns) if values is None else values
         share_out(self.columns, self.rows, given, sums)
+        return sums
+
+    def spread(self, values: Image | None, sigma: float) -> Image:
+        """Sum the seeds' values, or the seeds, weighted by a Gaussian."""
         # Sharing a value among four pixels blurs by as much already.
-        return _blur(sums, math.sqrt(sigma * sigma - BILINEAR_VARIANCE))
+        return _blur(self.sums(values), math.sqrt(sigma * sigma - BILINEAR_VARIANCE))
 
     def at_seeds(self, image: Image) -> Image:
         """Interpolate an image, (n,)."""
         return read_between(image, self.columns, self.rows)
+
+
+def _slopes(heights: Image, step: float) -> tuple[Image, Image]:
+    """Give dz/dx and dz/dy of points at a distance, mm."""
+    across, down = (
+        np.asarray(cv2.Sobel(heights, cv2.CV_32F, right, 1 - right, ksize=1, scale=0.5 / step,
+                             borderType=cv2.BORDER_REPLICATE), np.float32) for right in (1, 0))
+    return across, down
+
+
+def _doubled(image: Image, like: Image) -> Image:
+    """A halved grid's image between its pixels."""
+    finer = cv2.resize(image, None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
+    return np.asarray(finer, np.float32)[:like.shape[0], :like.shape[1]]
 
 
 def _extended(grid: _Seeded, rest: Image, sigma: float, usual: np.float32) -> Image:

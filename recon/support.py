@@ -15,12 +15,14 @@ __all__ = ["support_on_grid"]
 # the rim, counted outward from the outermost seeds.
 _CLOSING = 1.2
 _RIM = 0.2
-_EVEN = 1.0
-_HALF = 0.5
-# A blur by more than the first, pixels, is made at half the size: what going there and back blurs
-# by already, squared pixels, is a quarter and three quarters.
-_WIDE = 2.5
-_HALVING_VARIANCE = 1.0
+# The sensor leaves an edge frayed, over several pixels at once: its outline is evened out by a
+# Gaussian of this radius, where seeds are few by no more than the second: a share of the side of a
+# square as large as they are. It grows into bays by no more than the third.
+_EVEN = 4.0
+_EVEN_PART = 0.1
+_GROWTH = 1.0
+# Pixels for that radius: more change nothing.
+_EVEN_PX = 3
 
 
 def support_on_grid(
@@ -39,30 +41,31 @@ def support_on_grid(
     xs, ys : (columns,), (rows,) float64, mm
     support : (rows, columns) bool
     """
-    reach = (_CLOSING + _EVEN) * spacing
+    reach = (_CLOSING + _GROWTH) * spacing
     left, right, top, bottom = bounds(points)
     xs, ys = (_axis(low - reach, high + reach, step)
               for low, high in ((left, right), (top, bottom)))
     seeded = mark(points, (xs[0], ys[0]), step, len(ys), len(xs))
     closed = fill_holes(
         np.asarray(cv2.dilate(seeded, disc(_CLOSING * spacing / step)), np.uint8))
-    # The sensor leaves an edge frayed: its outline is evened out, neither grown nor shrunk.
-    even = (_blurred(closed, _EVEN * spacing / step) > _HALF).view(np.uint8)
-    support = cv2.erode(even, disc((_CLOSING - _RIM) * spacing / step))
-    return xs, ys, support.view(np.bool_)
+    even = min(_EVEN * spacing / step, _EVEN_PART * math.sqrt(np.count_nonzero(closed)))
+    # Of a Gaussian that far inside a straight edge, so much is inside.
+    inside = 0.5 + 0.5 * math.erf((_CLOSING - _RIM) * spacing / step / (even * math.sqrt(2)))
+    most = cv2.dilate(closed, disc(_GROWTH * spacing / step))
+    return xs, ys, (most > 0) & (_blurred(closed, even) > inside)
 
 
 def _blurred(image: NDArray[np.uint8], sigma: float) -> NDArray[np.float32]:
-    """Blur by a Gaussian; a wide one at half the size, which tells as much."""
-    whole = np.asarray(image, np.float32)
-    if sigma < _WIDE:
-        return np.asarray(cv2.GaussianBlur(
-            whole, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT), np.float32)
-    half = cv2.resize(whole, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
-    half = cv2.GaussianBlur(half, (0, 0), math.sqrt(sigma * sigma - _HALVING_VARIANCE) / 2,
-                            borderType=cv2.BORDER_CONSTANT)
-    return np.asarray(
-        cv2.resize(half, None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR), np.float32)
+    """Blur by a broad Gaussian, on fewer pixels where they are enough."""
+    every = max(1, int(sigma / _EVEN_PX))
+    rows, columns = (-(-side // every) for side in image.shape)
+    whole = cv2.copyMakeBorder(
+        image.astype(np.float32), 0, rows * every - image.shape[0], 0,
+        columns * every - image.shape[1], cv2.BORDER_CONSTANT, value=0)
+    small = cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA)
+    blurred = cv2.GaussianBlur(small, (0, 0), sigma / every, borderType=cv2.BORDER_CONSTANT)
+    return np.asarray(cv2.resize(blurred, whole.shape[::-1], interpolation=cv2.INTER_LINEAR),
+                      np.float32)[:image.shape[0], :image.shape[1]]
 
 
 def _axis(low: float, high: float, step: float) -> NDArray[np.float64]:

@@ -151,3 +151,28 @@ def test_colours_stand_where_their_seeds_are(ratio):
     off = dense.colors[inner, :2] - (128 + 2.5 * dense.points[inner, :2])
     assert np.abs(off.mean(axis=0)).max() < 0.3
     assert np.abs(off).max() < 4
+
+
+def test_a_step_is_not_bridged_where_nothing_was_read():
+    points = disc_seeds(1.0, 30)
+    right = points[:, 0] > 0
+    points[:, 2] = np.where(right, 740, 700)
+    points = points[np.abs(points[:, 0]) > 0.8]
+    dense = densify(seeds(points), fit_surface(points, 4, 0.1), 1.0, 10, 0.5)
+    x, _, z = dense.points.T
+    far, _ = cKDTree(points[:, :2]).query(dense.points[:, :2])
+    normals = dense.normals
+    steep = np.hypot(normals[:, 0], normals[:, 1]) > 4.1 * np.abs(normals[:, 2])
+    assert not (steep & (far > 0.9)).any()
+    # Neither side loses its own.
+    for side, depth in ((x < -2, 700), (x > 2, 740)):
+        assert side.sum() == pytest.approx(10 * (np.abs(points[:, 0]) > 2).sum() / 2, rel=0.1)
+        assert np.abs(z[side] - depth).mean() < 2
+
+
+def test_what_was_read_stays_however_steep():
+    points = disc_seeds(1.0, 30)
+    points[:, 2] = 700 + 8 * points[:, 0]
+    dense = densify(seeds(points), fit_surface(points, 8, 0.1), 1.0, 10, 0.5)
+    read, _ = cKDTree(dense.points[:, :2]).query(points[:, :2])
+    assert np.quantile(read, 0.9) < 0.5

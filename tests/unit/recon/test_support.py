@@ -2,6 +2,7 @@
 
 import cv2
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
@@ -69,6 +70,28 @@ def test_frayed_edges_are_evened_out():
     inside, _ = supported(frayed, 1.0)
     assert to_seed(inside, frayed).max() < 2.2
     assert np.hypot(*inside.T).max() <= 25.4
+
+
+def test_broad_bites_and_spurs_of_an_edge_are_evened_out():
+    """An edge that is frayed over several pixels at once, by two spacings either way."""
+    points = disc_seeds(1.0, 32, jitter=0)
+    far, turn = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
+    frayed = points[far < 28 + 2 * np.sign(np.sin(30 * turn))]
+    inside, outside = supported(frayed, 1.0)
+    assert roundness(frayed) < 1.2
+    assert np.hypot(*inside.T).max() < 29
+    assert np.hypot(*outside.T).min() > 27
+
+
+@pytest.mark.parametrize("sides", [(7, 8), (3, 17), (2, 26)])
+def test_few_seeds_still_have_support(sides):
+    x, y = np.meshgrid(*(np.arange(side, dtype=np.float32) for side in sides))
+    points = np.stack([x, y, 700 + 0 * x], axis=-1).reshape(-1, 3)
+    inside, _ = supported(points, 1.0)
+    assert len(inside) > 0.5 * 10 * len(points)
+    middle = np.array([np.median(x), np.median(y)])
+    assert np.hypot(*(inside - middle).T).min() < 0.3
+    assert to_seed(inside, points).max() < 1.2
 
 
 def test_the_grid_is_regular_and_its_border_empty():
