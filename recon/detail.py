@@ -25,7 +25,7 @@ __all__ = ["DetailedSurface", "add_detail"]
 Image = NDArray[np.float32]
 
 # Points of the detail's grid for each spacing.
-_FINENESS = 1.75
+_FINENESS = 1.7
 # Below this share of the usual weight lies a hole, or the rim.
 _FULL = 0.4
 # There a wider average is taken, and again of what it leaves: like a fit, that carries the slope
