@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from service.direct import write_direct
 from service.errors import CorruptFileError, DiskFullError, StoreError
 from service.failpoints import failpoint
 
@@ -33,13 +34,14 @@ _MOST_BYTES = 128 * 2**20
 
 def write_atomically(
     path: Path, chunks: Sequence[bytes | memoryview], *, durable: bool = True, named: bool = True,
-    mode: int = 0o666, steps: str = "",
+    direct: bool = False, mode: int = 0o666, steps: str = "",
 ) -> None:
     """Write a file so that `path` is ever either the old contents or all of the new.
 
     With `durable`, it is on the disk, and with `named` so is its name, when this returns; without,
-    that is left to `sync_folder`. `mode`, less the umask, is that of the file. `steps` begins the
-    names of this write's failpoints.
+    that is left to `sync_folder`. With `direct` it does not pass through the page cache where that
+    can be had. `mode`, less the umask, is that of the file. `steps` begins the names of this
+    write's failpoints.
 
     Raises
     ------
@@ -50,9 +52,10 @@ def write_atomically(
     try:
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
         with os.fdopen(os.open(temporary, flags, mode), "wb") as file:
-            for chunk in chunks:
-                file.write(chunk)
-            file.flush()
+            if not (direct and write_direct(file.fileno(), chunks)):
+                for chunk in chunks:
+                    file.write(chunk)
+                file.flush()
             failpoint(f"{steps}.written")
             if durable:
                 os.fsync(file.fileno())
@@ -68,7 +71,8 @@ def write_atomically(
 
 
 def write_parts(
-    path: Path, parts: Sequence[bytes | memoryview], *, named: bool = True, steps: str = ""
+    path: Path, parts: Sequence[bytes | memoryview], *, named: bool = True,
+    direct: bool = False, steps: str = "",
 ) -> str:
     """Write parts durably and give their checksum, hexadecimal; the rest as `write_atomically`.
 
@@ -83,7 +87,7 @@ def write_parts(
     digest = _checksum(index, parts)
     try:
         write_atomically(
-            path, [_MAGIC, digest, index, *parts], named=named, mode=0o600,
+            path, [_MAGIC, digest, index, *parts], named=named, direct=direct, mode=0o600,
             steps=steps)
     except OSError as error:
         raise store_error(path, error) from error
