@@ -53,8 +53,8 @@ def _print_overhead(laps: Laps, source: Path, runs: int) -> None:
 
 def _print_throughput(rates: dict[str, list[float]], rounds: int, count: int) -> None:
     print(f"\nThroughput on that frame, {rounds} rounds of {count} captures by turns, medians. A "
-          "round of the service lasts from the first press to the last publication, the next press as soon as "
-          "the last is accepted:\n")
+          "round of the service lasts from the first press to the last publication, the next press "
+          "as soon as the last is accepted:\n")
     print("| | captures / s | of the bare function |\n| --- | --- | --- |")
     for workers in (1, 2):
         name, bare = (f"{what}, {workers}" for what in ("service", "bare"))

@@ -1,7 +1,8 @@
 """Writing past the page cache.
 
-A face goes out from memory and is hardly ever read from its file. To find and fill 1,500 pages of
-cache for it takes the kernel two to eight milliseconds, as much as all else that the hub does.
+Frames and faces go out from memory and are hardly ever read from their files. To find and fill the
+2,000 pages of cache for both takes the kernel two to eight milliseconds, as much as all else that
+the hub does.
 """
 
 import errno

@@ -88,7 +88,7 @@ class Draft:
         """
         return write_parts(
             self.path, [self.about.model_dump_json().encode(), *encode(self.packet)],
-            named=False, direct=isinstance(self.about, FaceAbout), steps=self.steps)
+            named=False, direct=True, steps=self.steps)
 
     def discard(self) -> None:
         """Remove the file; where it resists, it is taken in at the next start."""

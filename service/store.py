@@ -3,7 +3,6 @@
 A file is written and synced before the row that names it, so a row never names what was not there.
 """
 
-import fcntl
 import os
 import shutil
 from collections.abc import Iterator, Sequence
@@ -20,11 +19,10 @@ from service.errors import (
     CorruptFileError,
     DamagedDatabaseError,
     DamagedFaceError,
-    HubRunningError,
-    SettingsError,
     StoreError,
 )
 from service.failpoints import failpoint
+from service.fresh import FreshFrames
 from service.kept import (
     Draft,
     FaceAbout,
@@ -35,6 +33,7 @@ from service.kept import (
     read_frame,
 )
 from service.layout import Layout
+from service.locking import lock
 from service.messages import CaptureFailed, DeadLetter, FaceDone, Frame, Result
 from service.recovery import recover
 from service.settings import private_folder
@@ -44,7 +43,7 @@ from service.stored import Stored
 from service.wire import Packet
 from service.writing import Written
 
-__all__ = ["FolderStore", "check_folder"]
+__all__ = ["FolderStore"]
 
 _SHOWN = 300
 """Characters of an error that a list shows."""
@@ -71,12 +70,12 @@ class FolderStore:
     def __init__(self, folder: Path, clock: Clock | None = None) -> None:
         with _naming(folder):
             self._layout = Layout(private_folder(folder))
-        self._fresh: dict[str, KeptFrame] = {}
+        self._fresh = FreshFrames()
         self._fresh_faces: dict[str, KeptFace] = {}
-        """What was kept last, by capture: it is asked for at once."""
+        """Those that were kept last: they are published at once."""
         self._unread: set[str] = set()
         """Captures whose face was published from memory and never read from its file."""
-        self._lock = _lock(self._layout.lock)
+        self._lock = lock(self._layout.lock)
         try:
             self._database, self._account, self._quarantine = recover(
                 self._layout, clock or SystemClock())
@@ -138,7 +137,7 @@ class FolderStore:
                 [(capture_id, CaptureState.ACCEPTED, kept.about.settings_hash, kept.checksum,
                   kept.about.accepted_at, kept.about.pressed_by)
                  for capture_id, kept in fresh.items()])
-        self._fresh = fresh
+        self._fresh.add(fresh.values())
         failpoint("hub.frame.stored")
 
     def find(self, capture_id: str) -> Stored | None:
@@ -178,8 +177,8 @@ class FolderStore:
             raise StoreError(f"capture {capture_id} is not in the store")
         path = self._layout.frame(capture_id)
         try:
-            # Most go to a worker in the moment they are safe; whoever reads later reads the file.
-            fresh = self._fresh.pop(capture_id, None)
+            # Most go to a worker soon after they are safe; a second time the file is read.
+            fresh = self._fresh.pop(capture_id)
             if fresh and fresh.checksum == stored.frame_sha256:
                 return fresh
             return read_frame(path, stored.frame_sha256)
@@ -339,7 +338,9 @@ class FolderStore:
         """Remove the files, then the rows: a row of a file that is gone says so in its state."""
         if not capture_ids:
             return
-        self._fresh, self._fresh_faces = {}, {}
+        for capture_id in capture_ids:
+            self._fresh.pop(capture_id)
+            self._fresh_faces.pop(capture_id, None)
         self._unread.difference_update(capture_ids)
         for capture_id in capture_ids:
             row = self._database.one(
@@ -422,29 +423,3 @@ def _naming(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise store_error(path, error) from error
-
-
-def check_folder(folder: Path) -> None:
-    """Create a data folder, or check that a hub could have it.
-
-    Raises
-    ------
-    SettingsError
-        Where it cannot be had.
-    HubRunningError
-        Where a hub has it open.
-    """
-    os.close(_lock(private_folder(folder) / "lock"))
-
-
-def _lock(path: Path) -> int:
-    try:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-    except OSError as error:
-        raise SettingsError(f"{path}: {error.strerror or error}") from error
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        os.close(descriptor)
-        raise HubRunningError(f"{path.parent}: another hub has this data folder open") from error
-    return descriptor

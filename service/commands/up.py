@@ -28,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
     from service.addresses import check_bindable, is_local
     from service.entrance import guard
     from service.errors import AddressError
-    from service.store import check_folder
+    from service.locking import check_folder
     from service.supervisor import Supervisor, processes
 
     settings = options.service_settings(args)

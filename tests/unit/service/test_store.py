@@ -12,6 +12,7 @@ import pytest
 from recon.settings import Settings
 from service import messages
 from service.errors import CorruptFileError, HubRunningError, SettingsError, StoreError
+from service.fresh import FreshFrames
 from service.payload import FaceHeader, FrameHeader
 from service.spool import read_parts, write_parts
 from service.states import CaptureState
@@ -191,3 +192,19 @@ def test_a_full_disk_leaves_nothing_half_written(tmp_path, monkeypatch):
     with pytest.raises(StoreError, match="No space left"):
         write_parts(tmp_path / "x", [b"data"])
     assert list(tmp_path.iterdir()) == []
+
+
+def test_frames_are_held_in_memory_as_far_as_there_is_room(store, monkeypatch):
+    size = sum(array.nbytes for array in frame("a").arrays.values())
+    monkeypatch.setattr("service.fresh._BYTES", 2 * size)
+    fresh = FreshFrames()
+    kept = {}
+    for name in "abc":
+        accept(store, frame(name), Settings(), "0f")
+        kept[name] = store.frame(name)
+    fresh.add(kept.values())
+    assert fresh.pop("c") is None
+    assert fresh.pop("a") is kept["a"]
+    assert fresh.pop("a") is None
+    fresh.add([kept["c"]])
+    assert [fresh.pop(name) for name in "bc"] == [kept["b"], kept["c"]]
