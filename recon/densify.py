@@ -116,7 +116,8 @@ def _colors(
     wanted: NDArray[np.bool_],
 ) -> NDArray[np.uint8]:
     """The seeds' mean colour on a grid of its own, (rows, columns, 3)."""
-    places = (seeds.points[:, 1::-1] - np.array(origin[::-1], np.float32)) * np.float32(1 / step)
+    # In double precision: no place may come out before the first.
+    places = ((seeds.points[:, 1::-1] - origin[::-1]) / step).astype(np.float32)
     # Sharing a colour among four pixels, and reading between four, blurs by as much.
     radius = np.sqrt(max((_COLOR_RADIUS * spacing / step) ** 2 - 2 * BILINEAR_VARIANCE,
                          _LEAST_RADIUS**2))

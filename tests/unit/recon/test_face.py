@@ -22,11 +22,18 @@ def test_a_cloud_is_as_long_as_it_has_points():
     assert len(face.dense) == len(face.dense.points) == face.report.dense_points
 
 
+def test_a_finite_cloud_may_be_as_far_away_as_it_likes():
+    assert len(cloud(points=np.full((5, 3), 3e38, np.float32))) == 5
+
+
 @pytest.mark.parametrize(("change", "message"), [
     ({"points": np.zeros((5, 3))}, r"points must be float32 \(5, 3\), found float64"),
     ({"points": np.zeros((5, 2), np.float32)}, r"points must be float32 \(5, 3\), found .*\(5, 2"),
     ({"points": np.full((5, 3), np.nan, np.float32)}, "points must be finite"),
     ({"points": np.full((5, 3), np.inf, np.float32)}, "points must be finite"),
+    # A signalling NaN.
+    ({"points": np.full((5, 3), 0x7FA00000, np.uint32).view(np.float32)}, "points must be finite"),
+    ({"points": np.array([[1e30, -np.inf, 0]] * 5, np.float32)}, "points must be finite"),
     ({"colors": np.zeros((4, 3), np.uint8)}, r"colors must be uint8 \(5, 3\), found .*\(4, 3\)"),
     ({"colors": np.zeros((5, 3), np.int32)}, "colors must be uint8 .* found int32"),
 ])
