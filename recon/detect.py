@@ -84,8 +84,8 @@ def detect_face(
 ) -> Detection:
     """Find the nearest face whose size and shape fit its depth.
 
-    The scene is searched from the nearest layer of depth to the farthest, and no further than to
-    the first face.
+    The scene is searched from the nearest layer of depth to the farthest, at most 2 m, and no
+    further than to the first face.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ class _Search:
     def nearer_than(
         self, found: FaceCandidate
     ) -> tuple[NDArray[np.uint8], Look, FaceCandidate] | None:
-        """Look again, in other ways, at what stands well before a face."""
+        """Look again, in other ways, at what stands before a face and is not its own body."""
         nearer = regions_by_depth(self.registered, self.shape, self.focal_px,
                                   _depth(found) - _NEARER_MM)
         x, y, w, h = (side * CELLS / self.shape[1] for side in found.box)
@@ -175,7 +175,7 @@ class _Search:
             nearer = without_flat(nearer, self.registered, self.shape, self.focal_px)
         for look in _NEARER_LOOKS if nearer else ():
             missed = self.nearest(self.gray, look, nearer)
-            if missed:
+            if missed and _depth(missed) < _depth(found):
                 return self.gray, look, missed
         return None
 
