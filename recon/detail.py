@@ -16,16 +16,19 @@ from numpy.typing import NDArray
 from recon._image_kernels import add_between
 from recon._percentile import percentile
 from recon._scatter_kernels import BILINEAR_VARIANCE, read_between, share_out
+from recon.local_means import enlarged, local_means
+from recon.mirror_plane import find_plane
 from recon.rbf import Surface
 from recon.rim import BROADER, Rim, broad_average, halved
 from recon.support import support_on_grid
+from recon.symmetry import helped_by_mirror
 
 __all__ = ["DetailedSurface", "add_detail"]
 
 Image = NDArray[np.float32]
 
 # Points of the detail's grid for each spacing.
-_FINENESS = 1.7
+_FINENESS = 2
 # Below this share of the usual weight lies a hole, or the rim.
 _FULL = 0.4
 # There a wider average is taken, and again of what it leaves: like a fit, that carries the slope
@@ -35,11 +38,13 @@ _PASSES = 4
 # An average fades where the seeds within reach weigh less than this share of what is usual.
 _FADING = 0.005
 _FADING_WIDE = 0.05
-# Over what radius detail counts as local (standard deviation), and how coarsely that is told.
-_WINDOW_MM = 8.0
-_COARSER = 3
+# Over what radius detail counts as local (standard deviation).
+_WINDOW_MM = 11.0
 # The smoothest part of a face shows what noise alone adds to the detail.
-_NOISE_PERCENTILE = 20
+_NOISE_PERCENTILE = 22
+# What lies within about so many spacings of the rim tells little of the noise, and of the other
+# side.
+_FADING_RIM = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +97,8 @@ class DetailedSurface:
 
 
 def add_detail(
-    base: Surface, points: NDArray[np.float32], spacing: float, radius: float
+    base: Surface, points: NDArray[np.float32], spacing: float, radius: float, *,
+    symmetry: bool = False,
 ) -> DetailedSurface:
     """Add to a broad fit what its seeds show besides.
 
@@ -102,6 +108,7 @@ def add_detail(
     points : (n, 3) float32, mm, depth camera frame
     spacing : mean spacing of the points, mm
     radius : of the average (standard deviation), mm
+    symmetry : let each side of the face be helped by the other's mirror image
     """
     step = spacing / _FINENESS
     xs, ys, support = support_on_grid(points, spacing, step)
@@ -113,7 +120,8 @@ def add_detail(
     usual = np.float32(_FINENESS**-2)
     weight = grid.spread(None, radius / step)
     detail = grid.spread(rest, radius / step) / (weight + usual * np.float32(_FADING))
-    missing = 1 - np.minimum(weight / (usual * np.float32(_FULL)), 1)
+    seeded = np.minimum(weight / (usual * np.float32(_FULL)), 1)
+    missing = 1 - seeded
     missing *= missing * (3 - 2 * missing)
     half = grid.halved()
     wide = _extended(half, rest, _WIDER * radius / (2 * step), 4 * usual)
@@ -124,12 +132,25 @@ def add_detail(
     broad = broad_average(cells.sums(None), cells.sums(rest), BROADER * radius / (4 * step),
                           16 * float(usual), rim, 2)
     detail += _doubled(rim.nearness, detail) * (_doubled(broad, detail) - detail)
-    detail *= _gain(detail, support, step)
+
+    # How much of it is more than noise varies slowly: every second point is enough.
+    some = np.s_[::_FINENESS, ::_FINENESS]
+    shown = support[some].astype(np.float32)
+    field = _field(heights[some], shown, detail[some], seeded[some], spacing)
+    gain, noise = _gain(field[..., 3], field[..., 2], spacing)
+    origin = float(xs[0]), float(ys[0])
+    plane = find_plane(field, origin, spacing) if symmetry else None
+    kept = gain * detail[some]
+    detail *= _between(gain, detail.shape)
+    if plane is not None:
+        detail += _between(helped_by_mirror(field, kept, plane, noise, _WINDOW_MM, origin, spacing),
+                           detail.shape)
+
     detail += _doubled(rim.frayed_depth(_slopes(halved(heights), 2 * step), spacing), detail)
     heights += detail
     return DetailedSurface(
         base, np.stack([detail, *_slopes(heights, step)]).astype(np.float32, copy=False),
-        (float(xs[0]), float(ys[0])), step, noise=float((rest - grid.at_seeds(detail)).std()),
+        origin, step, noise=float((rest - grid.at_seeds(detail)).std()),
         area=float(np.count_nonzero(support) * step**2))
 
 
@@ -194,22 +215,36 @@ def _extended(grid: _Seeded, rest: Image, sigma: float, usual: np.float32) -> Im
     return total
 
 
-def _gain(detail: Image, support: NDArray[np.bool_], step: float) -> Image:
-    """How much of the detail is not noise, 0-1, place by place."""
-    inside = support.astype(np.float32)
-    energy = detail * detail
-    energy *= inside
-    small = (-(-detail.shape[1] // _COARSER), -(-detail.shape[0] // _COARSER))
-    sigma = _WINDOW_MM / (_COARSER * step)
-    local, covered = (
-        _blur(np.asarray(cv2.resize(one, small, interpolation=cv2.INTER_AREA), np.float32), sigma)
-        for one in (energy, inside))
-    local /= np.maximum(covered, np.float32(1e-6))
-    seen = cv2.resize(inside, small, interpolation=cv2.INTER_NEAREST) > 0
-    noise = np.float32(percentile(local[seen], _NOISE_PERCENTILE) if seen.any() else 0)
-    gain = np.clip(1 - noise / np.maximum(local, np.float32(1e-12)), 0, 1)
-    return np.asarray(cv2.resize(gain, detail.shape[::-1], interpolation=cv2.INTER_LINEAR),
-                      np.float32)
+def _field(
+    heights: Image, shown: Image, detail: Image, seeded: Image, step: float
+) -> Image:
+    """What `helped_by_mirror` asks for, (rows, columns, 5)."""
+    across, down = _slopes(heights, step)
+    facing = 1 / np.sqrt(across * across + down * down + 1)
+    inner = np.clip(2 * _blur(shown, _FADING_RIM) - 1, 0, 1) * shown
+    return np.asarray(cv2.merge([heights, facing, inner, detail * facing, seeded]), np.float32)
+
+
+def _gain(detail: Image, inner: Image, step: float) -> tuple[Image, float]:
+    """How much of the detail is not noise, 0-1, place by place, and the variance of noise.
+
+    detail : mm along the normal: along z, noise and detail both grow where a face is steep
+    inner : 0-1, what counts as face
+    """
+    local, = local_means(inner, _WINDOW_MM / (2 * step), detail * detail)
+    local = enlarged(local, detail.shape)
+    seen = local[inner > 0]
+    noise = percentile(seen, _NOISE_PERCENTILE) if seen.size else 0.0
+    gain = 1 - np.float32(noise) / np.maximum(local, np.float32(max(noise, 1e-12)))
+    return np.asarray(gain, np.float32), noise
+
+
+def _between(coarse: Image, shape: tuple[int, ...]) -> Image:
+    """Interpolate an image of every second point."""
+    image = np.zeros(shape, np.float32)
+    rows, columns = ((np.arange(side) / _FINENESS).astype(np.float32) for side in shape)
+    add_between(image, coarse, rows, columns)
+    return image
 
 
 def _blur(image: Image, sigma: float) -> Image:

@@ -113,7 +113,8 @@ def _fit(
     surface = fit_surface(points, settings.r0_factor * spacing, settings.smoothing)
     if settings.detail_factor is None:
         return surface
-    return add_detail(surface, points, spacing, settings.detail_factor * spacing)
+    return add_detail(surface, points, spacing, settings.detail_factor * spacing,
+                      symmetry=settings.symmetry)
 
 
 def _warnings(frame: RgbdFrame, seeds: int) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ _PRESETS: dict[Preset, dict[str, Any]] = {
     Preset.PAPER: {"r0_factor": 6.0, "smoothing": 0.1, "neighbors": Neighbors.RANDOMIZED,
                    "depth_offset_mm": 0.0},
     Preset.FAITHFUL: {"r0_factor": 6.0, "smoothing": 3.0, "neighbors": Neighbors.RANDOMIZED},
-    Preset.BEST: {"r0_factor": 14.0, "smoothing": 20.0, "detail_factor": 1.6,
+    Preset.BEST: {"r0_factor": 14.0, "smoothing": 12.0, "detail_factor": 1.5, "symmetry": True,
                   "neighbors": Neighbors.LATTICE},
 }
 
@@ -52,6 +52,9 @@ class Settings(BaseModel):
     detail_factor: Annotated[float, Field(ge=0.5, le=10)] | None = None
     """Radius of the averages that give back what the fit smooths away, in mean spacings; None:
     the fit alone."""
+    symmetry: bool = False
+    """Let each side of the face be helped by the mirror image of the other; only where detail is
+    added (`detail_factor`)."""
     neighbors: Neighbors = Neighbors.LATTICE
     """How the mean spacing is measured."""
     depth_offset_mm: Annotated[float, Field(ge=-10, le=10)] = 0.5

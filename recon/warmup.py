@@ -45,7 +45,7 @@ def warm() -> None:
     seeds = segment_face(registered, _BOX, _FOCAL_PX)
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     fit = fit_surface(seeds.points, settings.r0_factor * spacing, settings.smoothing)
-    surface = add_detail(fit, seeds.points, spacing, spacing)
+    surface = add_detail(fit, seeds.points, spacing, spacing, symmetry=True)
     densify(seeds, surface, spacing, settings.ratio, 1.0, partial(look_up, frame, registered))
 
 

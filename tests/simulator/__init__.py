@@ -1,6 +1,7 @@
 """A Kinect v1 that is not there: frames of heads whose true shape is known."""
 
 from tests.simulator.accuracy import Accuracy, measure
+from tests.simulator.deformed import Deformed, Patch, patch
 from tests.simulator.heads import Head, head_names, load_head, shared_folder
 from tests.simulator.kinect import KINECT_CALIBRATED, KINECT_DEFAULT, KinectModel
 from tests.simulator.labels import Label
@@ -13,10 +14,12 @@ __all__ = [
     "KINECT_CALIBRATED",
     "KINECT_DEFAULT",
     "Accuracy",
+    "Deformed",
     "Head",
     "KinectModel",
     "Label",
     "Light",
+    "Patch",
     "Person",
     "Scene",
     "Simulated",
@@ -25,6 +28,7 @@ __all__ = [
     "head_names",
     "load_head",
     "measure",
+    "patch",
     "shared_folder",
     "simulate",
 ]

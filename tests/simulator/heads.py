@@ -1,7 +1,7 @@
 """The heads that can be rendered: one made by code alone, and scans where they are at hand."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tests.simulator import procedural
 from tests.simulator.clip import clip_below
+from tests.simulator.deformed import Deformed, displacement
 from tests.simulator.landmarks import SCANS, Landmarks
 from tests.simulator.surface import Surface
 
@@ -48,13 +49,18 @@ def head_names() -> list[str]:
 
 @lru_cache(maxsize=16)
 def load_head(name: str) -> Head:
-    """Load a head by its name.
+    """Load a head by its name, `NAME+KIND` for one of whose sides is deformed (`Deformed`).
 
     Raises
     ------
     ValueError
-        Where no such head is at hand.
+        Where no such head is at hand, or no such deformation is known.
     """
+    name, _, kind = name.partition("+")
+    if kind:
+        head = load_head(name)
+        moved = displacement(Deformed(kind), head.vertices, head.normals, head.landmarks)
+        return replace(head, vertices=head.vertices + moved, name=f"{name}+{kind}")
     if name not in head_names():
         raise ValueError(f"head {name!r} is not at hand, expected one of {head_names()}")
     if name == "procedural":

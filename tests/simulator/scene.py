@@ -2,6 +2,10 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
 __all__ = ["Light", "Person", "Scene"]
 
 
@@ -28,6 +32,19 @@ class Person:
     glasses: bool = False
     hand: bool = False
     """A hand before chin and cheek."""
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """(3, 3), from the head frame to the depth camera's."""
+        # Yaw about y, pitch about x, roll about z, signs as above.
+        turn: NDArray[np.float64] = Rotation.from_euler(
+            "ZYX", [self.roll, -self.yaw, -self.pitch], degrees=True).as_matrix()
+        return turn
+
+    @property
+    def shift(self) -> NDArray[np.float64]:
+        """(3,) mm, the head frame's origin in the depth camera's frame."""
+        return np.array([*self.offset_mm, self.distance_mm])
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from tests.simulator import body, room
 from tests.simulator.caster import Caster
@@ -141,10 +140,7 @@ class World:
     def _add_person(self, person: Person, *, target: bool) -> None:
         head = load_head(person.head)
         marks = head.landmarks
-        # Yaw about y, pitch about x, roll about z, signs as `Person` says.
-        R = Rotation.from_euler("ZYX", [person.roll, -person.yaw, -person.pitch],
-                                degrees=True).as_matrix()
-        t = np.array([*person.offset_mm, person.distance_mm])
+        R, t = person.rotation, person.shift
 
         def add(surface: Surface, rotation: NDArray[np.float64], shift: NDArray[np.float64],
                 label: Label, **more: Any) -> None:

@@ -36,7 +36,8 @@ def dense_of(seeds: Seeds) -> DenseCloud:
     points = seeds.points
     spacing = exact_spacing(np.ascontiguousarray(points[:, :2]))
     fit = fit_surface(points, HOW.r0_factor * spacing, HOW.smoothing)
-    surface = add_detail(fit, points, spacing, HOW.detail_factor * spacing)
+    surface = add_detail(fit, points, spacing, HOW.detail_factor * spacing,
+                         symmetry=HOW.symmetry)
     return densify(seeds, surface, spacing, HOW.ratio, share=0.5)
 
 

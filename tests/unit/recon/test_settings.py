@@ -9,7 +9,8 @@ from recon.settings import Neighbors, Preset, Settings
 def test_best_is_the_default():
     assert Settings() == Settings(preset=Preset.BEST) == Settings.of("best")
     assert Settings().r0_factor == 14
-    assert Settings().detail_factor == 1.6
+    assert Settings().detail_factor == 1.5
+    assert Settings().symmetry
     assert Settings().neighbors is Neighbors.LATTICE
 
 
@@ -20,6 +21,7 @@ def test_the_papers_presets_have_its_r0_and_its_trees(preset):
     assert settings.r0_factor == 6
     assert settings.neighbors is Neighbors.RANDOMIZED
     assert settings.detail_factor is None
+    assert not settings.symmetry
     assert settings.ratio == 10
 
 

@@ -4,7 +4,17 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.simulator import KINECT_DEFAULT, Label, Person, Scene, head_names, load_head, simulate
+from tests.simulator import (
+    KINECT_DEFAULT,
+    Deformed,
+    Label,
+    Person,
+    Scene,
+    head_names,
+    load_head,
+    patch,
+    simulate,
+)
 from tests.simulator.camera_views import color_view
 
 HEADS = pytest.mark.parametrize("name", head_names())
@@ -70,6 +80,25 @@ def test_the_head_frame_has_its_origin_behind_the_middle_of_the_face(name):
     assert marks.bridge[1] == 0
     assert marks.nose_tip[1] < -8
     assert abs(head.vertices[:, 0].mean()) < 5
+
+
+@pytest.mark.parametrize("kind", list(Deformed))
+def test_a_deformation_moves_one_side_by_millimetres(kind):
+    head, plain = load_head(f"procedural+{kind}"), load_head("procedural")
+    moved = np.linalg.norm(head.vertices - plain.vertices, axis=1)
+    assert 1.5 < moved.max() < 6.5
+    x, y, radius = patch(kind, plain.landmarks)
+    near = np.hypot(plain.vertices[:, 0] - x, plain.vertices[:, 1] - y) < 2 * radius
+    assert moved[~near].max() < 0.5
+    assert head.landmarks == plain.landmarks
+    if x:
+        image = np.hypot(plain.vertices[:, 0] + x, plain.vertices[:, 1] - y) < radius / 2
+        assert moved[image].max() < 0.5
+
+
+def test_an_unknown_deformation_is_named():
+    with pytest.raises(ValueError, match="'swirl'"):
+        load_head("procedural+swirl")
 
 
 def test_a_head_that_is_not_there_is_named():

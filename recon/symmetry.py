@@ -1,0 +1,100 @@
+"""A face's two sides show the same shape twice: each is helped by the mirror image of the other.
+
+Noise differs from side to side, and so do faces. How much of a place's detail the sides have in
+common is told by the local moments of the detail d and its mirror image d': with signal variance
+P, covariance C and noise variance v, the linear estimate of least squared error is
+c1 d + c2 d',  c1 = (P (P + v) - C^2) / D,  c2 = C v / D,  D = (P + v)^2 - C^2,
+Lee's gain P / (P + v) where C = 0. The broad fit, which is all signal, moves toward its mirror
+image by v1 / (v1 + v2) of the gap between them, and by less where the gap is larger than noise
+alone makes it. What one side alone has (a swelling, a scar) so stays there, and off the other.
+"""
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from recon._mirror_kernels import mirror_image
+from recon.local_means import enlarged, local_means, shrunk
+from recon.mirror_plane import MirrorPlane
+
+__all__ = ["helped_by_mirror"]
+
+Image = NDArray[np.float32]
+
+# A mirror image farther than this from the face is of something else; one that looks aside by
+# more than the second (cosine) says nothing.
+_FARTHEST_MM = 12.0
+_STEEPEST = 0.15
+# Gaps of the broad fits are told from noise over this radius (standard deviation).
+_GAP_MM = 6.0
+# Variance of the broad fit over that of the detail's noise.
+_BROAD = 0.25
+# In a hole a fit is worth this share of one between seeds, at least.
+_LEAST = 0.05
+# Where the detail of the sides, averaged over the first radius, differs by more than noise, the
+# mirror image is left out as far as the second around.
+_DIFFERENT_MM = 4.0
+_AROUND_MM = 12.0
+_DIFFERENT = 0.6
+
+
+def helped_by_mirror(
+    field: Image, kept: Image, plane: MirrorPlane, noise: float, window: float,
+    origin: tuple[float, float], step: float,
+) -> Image:
+    """Find what the mirror image adds to a face.
+
+    Parameters
+    ----------
+    field : (rows, columns, 5) float32: the broad fit's height, mm; share of its normal along z;
+        weight as a mirror image, 0-1; detail, mm along the normal; weight of the seeds, 0-1
+    kept : (rows, columns) float32, the part of the detail that Lee's gain keeps, mm along z
+    plane : to mirror in
+    noise : variance of the noise in the detail, mm^2
+    window : over which detail counts as local (standard deviation), mm
+    origin : (x, y) of the first point, mm
+    step : distance of points, mm
+
+    Returns
+    -------
+    (rows, columns) float32, mm along z
+    """
+    image = mirror_image(field, kept, np.asarray(origin), step, plane.normal, plane.offset,
+                         _FARTHEST_MM, _STEEPEST)
+    gap, weight, mirrored = (image[..., k] for k in (0, 2, 3))
+    own, facing = field[..., 3], field[..., 1]
+    v = np.float32(max(noise, 1e-12))
+    energy, common = local_means(
+        weight, window / (2 * step), own * own + mirrored * mirrored, own * mirrored)
+    signal = np.maximum(energy / 2 - v, 0)
+    common = np.clip(common, -signal, signal)
+    # (P + v)^2 - C^2 and P (P + v) - C^2, so that nothing cancels where C = P.
+    alone = signal - common
+    scale = (alone + v) * (signal + common + v)
+    difference, = local_means(weight, _DIFFERENT_MM / (2 * step), own - mirrored)
+    same = _same(difference, shrunk(weight) > 0, v, step)
+    first, second = (
+        enlarged(np.asarray(same * part / scale, np.float32), own.shape)
+        for part in (alone * (signal + common) + signal * v, common * v))
+    # What Lee's gain keeps is there already.
+    found = first * own + second * mirrored - enlarged(same, own.shape) * kept * facing
+
+    here, there = (v * np.float32(_BROAD) / np.maximum(seeds, np.float32(_LEAST))
+                   for seeds in (field[..., 4], image[..., 4]))
+    differs, = local_means(weight, _GAP_MM / (2 * step), gap * gap)
+    found += here / np.maximum(here + there, enlarged(differs, own.shape)) * gap
+    return np.asarray(weight * found / facing, np.float32)
+
+
+def _same(
+    difference: Image, shown: NDArray[np.bool_], noise: np.float32, step: float
+) -> Image:
+    """How far the detail of both sides is alike but for noise, 0-1."""
+    excess = difference * difference * shown * (np.float32(_DIFFERENT / 2) / noise)
+    reach = _AROUND_MM / (2 * step)
+    side = 2 * math.ceil(reach) + 1
+    around = cv2.dilate(excess, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
+    around = cv2.GaussianBlur(around, (0, 0), reach / 2)
+    return np.asarray(1 / np.maximum(around, 1) ** 2, np.float32)
