@@ -68,10 +68,12 @@ def densify(
     origin = float(xs[0]), float(ys[0])
 
     heights, slopes_x, slopes_y = surface.sampled(xs, ys)
-    steep = slopes_x * slopes_x + slopes_y * slopes_y >= np.float32(_STEEP**2)
-    if steep.any():
-        near = _near_seeds(seeds, origin, step, support.shape, _UNREAD * spacing)
-        support &= ~steep | near.view(np.bool_)
+    bridge = slopes_x * slopes_x + slopes_y * slopes_y > np.float32(_STEEP**2)
+    if bridge.any():
+        bridge &= _near_seeds(seeds, origin, step, support.shape, _UNREAD * spacing) == 0
+        # Not for a speck: a surface riddled with pinholes is worse than a bridge.
+        support &= cv2.morphologyEx(
+            bridge.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) == 0
     sources = sources_of_error(
         seeds.points, support, heights, (slopes_x, slopes_y), origin, step, spacing)
     sigma = np.asarray(cv2.copyMakeBorder(

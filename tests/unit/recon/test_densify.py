@@ -154,20 +154,26 @@ def test_colours_stand_where_their_seeds_are(ratio):
 
 
 def test_a_step_is_not_bridged_where_nothing_was_read():
+    """Two halves, four spacings apart and 40 mm deeper on the right."""
     points = disc_seeds(1.0, 30)
-    right = points[:, 0] > 0
-    points[:, 2] = np.where(right, 740, 700)
-    points = points[np.abs(points[:, 0]) > 0.8]
+    points = points[np.abs(points[:, 0]) > 1.8]
+    points[:, 2] = np.where(points[:, 0] > 0, 740, 700)
     dense = densify(seeds(points), fit_surface(points, 4, 0.1), 1.0, 10, 0.5)
-    x, _, z = dense.points.T
-    far, _ = cKDTree(points[:, :2]).query(dense.points[:, :2])
-    normals = dense.normals
-    steep = np.hypot(normals[:, 0], normals[:, 1]) > 4.1 * np.abs(normals[:, 2])
-    assert not (steep & (far > 0.9)).any()
+    x, y, z = dense.points.T
+    assert not ((np.abs(x) < 1) & (np.abs(y) < 28)).any()
     # Neither side loses its own.
-    for side, depth in ((x < -2, 700), (x > 2, 740)):
-        assert side.sum() == pytest.approx(10 * (np.abs(points[:, 0]) > 2).sum() / 2, rel=0.1)
+    for side, depth in ((x < -3, 700), (x > 3, 740)):
+        assert side.sum() == pytest.approx(10 * (np.abs(points[:, 0]) > 3).sum() / 2, rel=0.1)
         assert np.abs(z[side] - depth).mean() < 2
+
+
+def test_a_gap_without_a_step_is_filled():
+    points = disc_seeds(1.0, 30)
+    points = points[np.abs(points[:, 0]) > 1.8]
+    dense = densify(seeds(points), fit_surface(points, 4, 0.1), 1.0, 10, 0.5)
+    x, y, _ = dense.points.T
+    assert ((np.abs(x) < 1) & (np.abs(y) < 28)).sum() == pytest.approx(
+        2 * 56 / dense.grid_step_mm**2, rel=0.1)
 
 
 def test_what_was_read_stays_however_steep():
