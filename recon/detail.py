@@ -40,8 +40,10 @@ _FADING = 0.005
 _FADING_WIDE = 0.05
 # Over what radius detail counts as local (standard deviation).
 _WINDOW_MM = 11.0
-# The smoothest part of a face shows what noise alone adds to the detail.
-_NOISE_PERCENTILE = 22
+# The smoothest part of a face shows what noise alone adds to the detail, away from the rim, where
+# broad averages leave less of it.
+_NOISE_PERCENTILE = 26
+_AT_RIM = 0.5
 # What lies within about so many spacings of the rim tells little of the noise, and of the other
 # side.
 _FADING_RIM = 1.5
@@ -137,7 +139,7 @@ def add_detail(
     some = np.s_[::_FINENESS, ::_FINENESS]
     shown = support[some].astype(np.float32)
     field = _field(heights[some], shown, detail[some], seeded[some], spacing)
-    gain, noise = _gain(field[..., 3], field[..., 2], spacing)
+    gain, noise = _gain(field[..., 3], field[..., 2], rim.nearness < _AT_RIM, spacing)
     origin = float(xs[0]), float(ys[0])
     plane = find_plane(field, origin, spacing) if symmetry else None
     kept = gain * detail[some]
@@ -225,15 +227,18 @@ def _field(
     return np.asarray(cv2.merge([heights, facing, inner, detail * facing, seeded]), np.float32)
 
 
-def _gain(detail: Image, inner: Image, step: float) -> tuple[Image, float]:
+def _gain(
+    detail: Image, inner: Image, narrow: NDArray[np.bool_], step: float
+) -> tuple[Image, float]:
     """How much of the detail is not noise, 0-1, place by place, and the variance of noise.
 
     detail : mm along the normal: along z, noise and detail both grow where a face is steep
     inner : 0-1, what counts as face
+    narrow : where the detail is of narrow averages; where it is so nowhere, all of it tells
     """
     local, = local_means(inner, _WINDOW_MM / (2 * step), detail * detail)
     local = enlarged(local, detail.shape)
-    seen = local[inner > 0]
+    seen = local[(inner > 0) & narrow] if narrow.any() else local[inner > 0]
     noise = percentile(seen, _NOISE_PERCENTILE) if seen.size else 0.0
     gain = 1 - np.float32(noise) / np.maximum(local, np.float32(max(noise, 1e-12)))
     return np.asarray(gain, np.float32), noise

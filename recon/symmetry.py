@@ -37,7 +37,7 @@ _LEAST = 0.05
 # mirror image is left out as far as the second around.
 _DIFFERENT_MM = 4.0
 _AROUND_MM = 12.0
-_DIFFERENT = 0.6
+_DIFFERENT = 1.3
 
 
 def helped_by_mirror(
