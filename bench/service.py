@@ -24,14 +24,14 @@ from recon import warm
 
 __all__: list[str] = []
 
-_STEPS = ("decode", "checksum", "write", "write and sync", "encode")
+_STEPS = ("decode", "checksum", "cached write", "direct write and sync", "encode")
 _MB = 2**20
 
 
 def _print_overhead(laps: Laps, source: Path, runs: int) -> None:
     medians = {name: statistics.median(taken) for name, taken in laps.ms.items()}
     bare = medians["reconstruct"]
-    print(f"\nThe hub's process without its sockets ({source.stem}, frame of "
+    print(f"\nThe hub's process without its sockets, and its files written in the same thread ({source.stem}, frame of "
           f"{laps.frame_bytes / 1e6:.1f} MB, face of {laps.points:,} points and "
           f"{laps.face_bytes / 1e6:.1f} MB), {runs} captures, each step by turns with the bare "
           "function, medians:\n")

@@ -98,10 +98,10 @@ def _steps(laps: Laps, folder: Path, frame: RgbdFrame) -> None:
         laps.time(f"{what}: encode", lambda packet=packet: encode(packet))
         laps.time(f"{what}: checksum", lambda parts=parts: list(map(zlib.crc32, parts)))
         path = folder / f"{what}.tmp"
-        laps.time(f"{what}: write", lambda path=path, parts=parts: write_atomically(
+        laps.time(f"{what}: cached write", lambda path=path, parts=parts: write_atomically(
             path, parts, durable=False))
-        laps.time(f"{what}: write and sync", lambda path=path, parts=parts: write_atomically(
-            path, parts))
+        laps.time(f"{what}: direct write and sync", lambda path=path, parts=parts: write_atomically(
+            path, parts, direct=True))
         laps.time(f"{what}: read", path.read_bytes)
 
 
