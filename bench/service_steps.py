@@ -100,8 +100,8 @@ def _steps(laps: Laps, folder: Path, frame: RgbdFrame) -> None:
         path = folder / f"{what}.tmp"
         laps.time(f"{what}: cached write", lambda path=path, parts=parts: write_atomically(
             path, parts, durable=False))
-        laps.time(f"{what}: direct write and sync", lambda path=path, parts=parts: write_atomically(
-            path, parts, direct=True))
+        laps.time(f"{what}: direct write and sync",
+                  lambda path=path, parts=parts: write_atomically(path, parts, direct=True))
         laps.time(f"{what}: read", path.read_bytes)
 
 
