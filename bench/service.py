@@ -31,10 +31,10 @@ _MB = 2**20
 def _print_overhead(laps: Laps, source: Path, runs: int) -> None:
     medians = {name: statistics.median(taken) for name, taken in laps.ms.items()}
     bare = medians["reconstruct"]
-    print(f"\nThe hub's process without its sockets, and its files written in the same thread ({source.stem}, frame of "
-          f"{laps.frame_bytes / 1e6:.1f} MB, face of {laps.points:,} points and "
-          f"{laps.face_bytes / 1e6:.1f} MB), {runs} captures, each step by turns with the bare "
-          "function, medians:\n")
+    print("\nThe hub's process without its sockets, and its files written in the same thread "
+          f"({source.stem}, frame of {laps.frame_bytes / 1e6:.1f} MB, face of {laps.points:,} "
+          f"points and {laps.face_bytes / 1e6:.1f} MB), {runs} captures, each step by turns with "
+          "the bare function, medians:\n")
     print("| | ms | share of `reconstruct` |\n| --- | --- | --- |")
     hub = ("accept to dispatch", "result to publication")
     rows = {"`reconstruct`": bare, **{name: medians[name] for name in hub},
