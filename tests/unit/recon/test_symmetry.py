@@ -59,7 +59,7 @@ def errors(symmetry, pose=TURNED, one_side=None, hole=False, seeds=3):
         points = noisy(face_points(pose, SPACING, one_side), pose, seed)
         if hole:
             at = pose.own(points)
-            points = points[np.hypot(at[:, 0] - 30, at[:, 1] + 22) > 11]
+            points = points[np.hypot(at[:, 0] - 30, at[:, 1] + 22) > 6]
         broad = fit_surface(points, 14 * SPACING, 12)
         surface = add_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=symmetry)
         found.append([surface.on_grid(true[k:k + 1, 0], true[k:k + 1, 1])[0, 0]
@@ -87,7 +87,7 @@ def test_sides_that_differ_broadly_lose_nothing():
 
 def test_a_hole_is_filled_by_what_the_other_side_shows():
     def inside(x, y):
-        return np.hypot(x - 30, y + 22) < 9
+        return np.hypot(x - 30, y + 22) < 5
 
     assert rms(inside, True, hole=True) < 0.85 * rms(inside, False, hole=True)
 
