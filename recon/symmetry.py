@@ -33,7 +33,7 @@ _GAP_MM = 6.0
 _BROAD = 0.25
 # In a hole a fit is worth this share of one between seeds; with less of it, the mirror image fills
 # the hole even where the sides differ.
-_LEAST = 0.3
+_LEAST = 0.2
 # Where the detail of the sides, averaged over the first radius, differs by more than noise, the
 # mirror image is left out as far as the second around.
 _DIFFERENT_MM = 4.0
