@@ -32,11 +32,11 @@ __all__ = ["Sources", "average_cutoff", "cutoff", "noise_share", "sources_of_err
            "standard_error"]
 
 # From bench/calibration.py: H, S, E above, and those of `noise_share`.
-_HOLE = 0.59
-_SLOPE = 0.091
+_HOLE = 0.51
+_SLOPE = 0.083
 _RIM = 1.3
-_SHARE = 95.0
-_DETAIL_PART = 0.23
+_SHARE = 98.0
+_DETAIL_PART = 0.14
 
 # Over what radius (standard deviation) residuals and slopes count as local, spacings.
 _WINDOW = 2.5
