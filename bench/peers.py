@@ -10,6 +10,7 @@ from functools import partial
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from bench.cases import Case, recorded, simulated, with_preset
 from bench.flags import add_flags, check_flags, open_pcl
@@ -54,11 +55,14 @@ def _timed(function: Callable[[Case], NDArray[np.float64]], case: Case) -> Resul
 
 
 def _ours(preset: Preset, case: Case) -> Result:
+    """A preset's own grid is not that of `best`: its points are carried along their tangents."""
     face = reconstruct(case.frame, with_preset(preset))
-    if len(face.dense) != len(case.queries):
-        raise RuntimeError(f"preset {preset.value}: {len(face.dense)} places, "
-                           f"expected the {len(case.queries)} of `best`")
-    return face.dense.points.astype(np.float64), _ours_ms(face.report.timings_ms)
+    points, normals = (one.astype(np.float64) for one in (face.dense.points, face.dense.normals))
+    away, nearest = cKDTree(points[:, :2]).query(case.queries)
+    step, n = case.queries - points[nearest, :2], normals[nearest]
+    z = points[nearest, 2] - (step * n[:, :2]).sum(axis=1) / n[:, 2]
+    z[away > face.dense.grid_step_mm] = np.nan
+    return case.at(z), _ours_ms(face.report.timings_ms)
 
 
 def _methods(pcl: Pcl | None, *, more: bool) -> Iterator[_Method]:

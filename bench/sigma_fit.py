@@ -21,17 +21,23 @@ _FREEDOM = 5.0
 # The rim is a small part of the points; it shall be right too.
 _RIM_WEIGHT = 3.0
 _WITHIN = (0.6827, 0.9545)
+_FITS_ALONE = (Preset.FAITHFUL, Preset.PAPER)
 
 Floats = NDArray[np.float64]
 
 
 def fitted(samples: dict[Preset, Samples]) -> dict[str, float]:
-    """Fit all coefficients: slope, rim and hole on `best`, the share of noise on all presets."""
+    """Fit all coefficients: slope, rim and hole on `best`, the share of noise on all presets.
+
+    The rim of a fit alone, without detail, is that of the other two presets.
+    """
     best = samples[Preset.BEST]
     share, hole, slope, rim = _most_likely(best.sources, best)
-    found = {"_HOLE": hole / share, "_SLOPE": slope, "_RIM": rim}
+    alone = [_most_likely(samples[preset].sources, samples[preset])[3] for preset in _FITS_ALONE]
+    found = {"_HOLE": hole / share, "_SLOPE": slope, "_RIM": rim,
+             "_RIM_ALONE": math.sqrt(math.prod(alone))}
     scale = math.sqrt(math.prod(_scale(preset, samples[preset], found)
-                                for preset in (Preset.FAITHFUL, Preset.PAPER)))
+                                for preset in _FITS_ALONE))
     settings = Settings.of(Preset.BEST)
     base = scale * cutoff(settings.r0_factor, settings.smoothing) ** 2
     detail = scale * average_cutoff(settings.detail_factor or math.inf) ** 2
@@ -62,7 +68,7 @@ def _most_likely(sources: Floats, of: Samples) -> Floats:
 def _scale(preset: Preset, of: Samples, known: dict[str, float]) -> float:
     """Give what balances a preset of one fit, where all else is known: its share by (h / L)^2."""
     noise = of.sources[:, 0] + known["_HOLE"] * of.sources[:, 1]
-    rest = of.sources[:, 2:] @ [known["_SLOPE"], known["_RIM"]]
+    rest = of.sources[:, 2:] @ [known["_SLOPE"], known["_RIM_ALONE"]]
     settings = Settings.of(preset)
     share = brentq(lambda share: _imbalance(np.sqrt(share * noise + rest), of), 0.01, 20)
     return float(share) / cutoff(settings.r0_factor, settings.smoothing) ** 2

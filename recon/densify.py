@@ -76,8 +76,8 @@ def densify(
             bridge.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) == 0
     sources = sources_of_error(
         seeds.points, support, heights, (slopes_x, slopes_y), origin, step, spacing)
-    sigma = np.asarray(cv2.copyMakeBorder(
-        standard_error(sources, share), 0, 1, 0, 1, cv2.BORDER_REPLICATE), np.float32)
+    error = standard_error(sources, share, detailed=isinstance(surface, DetailedSurface))
+    sigma = np.asarray(cv2.copyMakeBorder(error, 0, 1, 0, 1, cv2.BORDER_REPLICATE), np.float32)
     # Colours have no detail finer than the seeds: every so many points are enough.
     every = max(1, round(_COLOR_STEP * spacing / step))
     colors = _colors(seeds, origin, every * step, spacing, _coarser(support, every))

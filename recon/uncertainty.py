@@ -31,12 +31,14 @@ from recon.settings import Settings
 __all__ = ["Sources", "average_cutoff", "cutoff", "noise_share", "sources_of_error",
            "standard_error"]
 
-# From bench/calibration.py: H, S, E above, and those of `noise_share`.
+# From bench/calibration.py: H, S, E above, E of a fit without detail, which has no broad average at
+# the rim, and those of `noise_share`.
 _HOLE = 0.51
 _SLOPE = 0.083
 _RIM = 1.3
-_SHARE = 98.0
-_DETAIL_PART = 0.14
+_RIM_ALONE = 2.6
+_SHARE = 92.0
+_DETAIL_PART = 0.16
 
 # Over what radius (standard deviation) residuals and slopes count as local, spacings.
 _WINDOW = 2.5
@@ -128,19 +130,21 @@ def sources_of_error(
                    rim=np.asarray(across * slope * edge, np.float32), every=every)
 
 
-def standard_error(sources: Sources, share: float) -> NDArray[np.float32]:
+def standard_error(sources: Sources, share: float, *, detailed: bool) -> NDArray[np.float32]:
     """Give sigma on the nodes of its sources.
 
     Parameters
     ----------
     sources : of this face
     share : k, of the settings that the surface was fitted with
+    detailed : whether detail was added to the fit
 
     Returns
     -------
     (rows, columns) float32, mm: 68 % of the errors along the viewing ray are within it, 95 % within
     twice
     """
+    rim = np.float32(_RIM if detailed else _RIM_ALONE)
     variance = (np.float32(share) * (sources.noise + np.float32(_HOLE) * sources.hole)
-                + np.float32(_SLOPE) * sources.slope + np.float32(_RIM) * sources.rim)
+                + np.float32(_SLOPE) * sources.slope + rim * sources.rim)
     return np.asarray(np.maximum(np.sqrt(variance), np.float32(_LEAST_MM)), np.float32)

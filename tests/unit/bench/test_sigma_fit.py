@@ -7,7 +7,7 @@ from recon import Preset, Settings
 from recon.uncertainty import average_cutoff, cutoff, noise_share
 
 COUNT = 60_000
-HOLE, SLOPE, RIM, SHARE, DETAIL_PART = 0.8, 0.1, 2.0, 50.0, 0.6
+HOLE, SLOPE, RIM, RIM_ALONE, SHARE, DETAIL_PART = 0.8, 0.1, 2.0, 3.0, 50.0, 0.6
 
 
 def made_up(preset: Preset, seed: int) -> Samples:
@@ -18,7 +18,8 @@ def made_up(preset: Preset, seed: int) -> Samples:
     share = SHARE * cutoff(settings.r0_factor, settings.smoothing) ** 2
     if settings.detail_factor is not None:
         share += DETAIL_PART * SHARE * average_cutoff(settings.detail_factor) ** 2
-    sigma = np.sqrt(sources @ [share, share * HOLE, SLOPE, RIM])
+    rim = RIM if settings.detail_factor else RIM_ALONE
+    sigma = np.sqrt(sources @ [share, share * HOLE, SLOPE, rim])
     everything = np.ones(COUNT, bool)
     return Samples(error=rng.normal(0, sigma), distance=np.full(COUNT, np.nan), sigma=sigma,
                    z=np.full(COUNT, 700.0), sources=sources, hole=~everything,
@@ -27,8 +28,8 @@ def made_up(preset: Preset, seed: int) -> Samples:
 
 def test_the_coefficients_that_made_the_errors_are_found():
     found = fitted({preset: made_up(preset, seed) for seed, preset in enumerate(Preset)})
-    expected = {"_HOLE": HOLE, "_SLOPE": SLOPE, "_RIM": RIM, "_SHARE": SHARE,
-                "_DETAIL_PART": DETAIL_PART}
+    expected = {"_HOLE": HOLE, "_SLOPE": SLOPE, "_RIM": RIM, "_RIM_ALONE": RIM_ALONE,
+                "_SHARE": SHARE, "_DETAIL_PART": DETAIL_PART}
     assert found.keys() == expected.keys()
     for name, value in expected.items():
         assert found[name] == pytest.approx(value, rel=0.12), name
