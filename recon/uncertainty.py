@@ -36,9 +36,9 @@ __all__ = ["Sources", "average_cutoff", "cutoff", "noise_share", "sources_of_err
 _HOLE = 0.51
 _SLOPE = 0.083
 _RIM = 1.3
-_RIM_ALONE = 2.6
-_SHARE = 92.0
-_DETAIL_PART = 0.16
+_RIM_ALONE = 2.4
+_SHARE = 90.0
+_DETAIL_PART = 0.168
 
 # Over what radius (standard deviation) residuals and slopes count as local, spacings.
 _WINDOW = 2.5
