@@ -72,10 +72,10 @@ def regions_by_depth(
     fill_layers(registered.pixels, registered.color_depth, registered.visible, edges, cell, filled)
     regions = []
     for near, far, layer in zip(edges[:-1].tolist(), edges[1:].tolist(), filled, strict=True):
-        if not layer.any():
+        least = _LEAST_MM * focal_px / far / cell
+        if least > CELLS or not layer.any():
             continue
         closed = cv2.morphologyEx(layer, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-        least = _LEAST_MM * focal_px / far / cell
         side = 2 * round(_MIDDLE_MM * focal_px / np.sqrt(near * far) / cell / 2) + 1
         middles = cv2.blur(255 * closed, (side, side), borderType=cv2.BORDER_CONSTANT
                            ) > 255 * _LEAST_SHARE

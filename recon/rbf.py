@@ -196,20 +196,22 @@ def fit_surface(
     trend = Trend.of(x, y, z, W)
     charges = Charges.of(x, y, (W, trend.rest), _DENSITY / r0**2)
     extent = (float(x.min()), float(x.max())), (float(y.min()), float(y.max()))
-    return _fit(trend, charges, extent, float(W.sum()), r0, smoothing)
+    return _fit(trend, charges, extent, float(W.sum()), r0, smoothing,
+                sharp=smoothing < _SHARP_BELOW * float(W.max()))
 
 
 def _fit(
     trend: Trend, charges: Charges, extent: tuple[tuple[float, float], tuple[float, float]],
-    total: float, r0: float, smoothing: float,
+    total: float, r0: float, smoothing: float, *, sharp: bool,
 ) -> Surface:
     """Fit what the trend leaves of the seeds.
 
     charges : two kinds, W_i and W_i rest_i
     extent : the least and the largest x, and y, mm
     total : the sum of W_i
+    sharp : smoothing is little against the largest W_i
     """
-    q = _NODE_STEP_SHARP if smoothing < _SHARP_BELOW else _NODE_STEP
+    q = _NODE_STEP_SHARP if sharp else _NODE_STEP
     # How many steps exp(-2 q^2 r^2), and its square root, are not negligible.
     near, far = (int(np.ceil(np.sqrt(-np.log(_NEGLIGIBLE) / k) / q)) for k in (2, 1))
     nodes_x, nodes_y = (_nodes(low, high, q * r0, near) for low, high in extent)
