@@ -48,9 +48,12 @@ def open_socket(
 
 
 def send_parts(socket: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bool:
-    """Send without waiting; False where nobody can take it now."""
+    """Send without waiting; False where nobody can take it now.
+
+    Large parts are not copied: nobody may change them afterwards.
+    """
     try:
-        socket.send_multipart(parts, flags=zmq.DONTWAIT)
+        socket.send_multipart(parts, flags=zmq.DONTWAIT, copy=False)
     except zmq.Again:
         return False
     return True
@@ -65,7 +68,7 @@ def publish_parts(publisher: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bo
     publisher.set(zmq.XPUB_NODROP, 1)
     for _ in range(2):
         try:
-            publisher.send_multipart(parts, flags=zmq.DONTWAIT)
+            publisher.send_multipart(parts, flags=zmq.DONTWAIT, copy=False)
         except zmq.Again:
             # Has libzmq take note of what was read meanwhile: it does not look at every sending,
             # and would take a subscriber that keeps up for one that does not.
@@ -73,7 +76,7 @@ def publish_parts(publisher: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bo
         else:
             return True
     publisher.set(zmq.XPUB_NODROP, 0)
-    publisher.send_multipart(parts, flags=zmq.DONTWAIT)
+    publisher.send_multipart(parts, flags=zmq.DONTWAIT, copy=False)
     return False
 
 
