@@ -37,9 +37,9 @@ MIN_SEEDS = 50
 # The sharpness, over R0^2, of a node's Gaussian and of its square, which the matrix is made of.
 _NODE = 2.0
 _DENSITY = 4.0
-_NODE_STEP = 0.50
-_NODE_STEP_SHARP = 0.40
-_SHARP_BELOW = 0.3
+# Distance of the nodes, in R0: the less smoothing there is for the largest weight, the closer they
+# are; (smoothing over weight from which on, step).
+_NODE_STEPS = ((8.0, 0.50), (0.3, 0.45), (0.0, 0.40))
 _NEGLIGIBLE = 3e-5
 # Of the preconditioned residual.
 _TOLERANCE = 3e-5
@@ -197,21 +197,21 @@ def fit_surface(
     charges = Charges.of(x, y, (W, trend.rest), _DENSITY / r0**2)
     extent = (float(x.min()), float(x.max())), (float(y.min()), float(y.max()))
     return _fit(trend, charges, extent, float(W.sum()), r0, smoothing,
-                sharp=smoothing < _SHARP_BELOW * float(W.max()))
+                relative=smoothing / float(W.max()))
 
 
 def _fit(
     trend: Trend, charges: Charges, extent: tuple[tuple[float, float], tuple[float, float]],
-    total: float, r0: float, smoothing: float, *, sharp: bool,
+    total: float, r0: float, smoothing: float, *, relative: float,
 ) -> Surface:
     """Fit what the trend leaves of the seeds.
 
     charges : two kinds, W_i and W_i rest_i
     extent : the least and the largest x, and y, mm
     total : the sum of W_i
-    sharp : smoothing is little against the largest W_i
+    relative : smoothing over the largest W_i
     """
-    q = _NODE_STEP_SHARP if sharp else _NODE_STEP
+    q = next(step for least, step in _NODE_STEPS if relative >= least)
     # How many steps exp(-2 q^2 r^2), and its square root, are not negligible.
     near, far = (int(np.ceil(np.sqrt(-np.log(_NEGLIGIBLE) / k) / q)) for k in (2, 1))
     nodes_x, nodes_y = (_nodes(low, high, q * r0, near) for low, high in extent)
