@@ -4,20 +4,16 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-import numpy as np
-from numpy.typing import NDArray
-
 from bench.cases import Case
 from recon import Settings
 from recon.densify import densify
-from recon.detail import DetailedSurface, add_detail
 from recon.neighbors import mean_spacing
-from recon.rbf import Surface, fit_surface
+from recon.pipeline import surface_of
 from recon.registration import look_up, register
 from recon.segment import segment_face
 from recon.uncertainty import noise_share
 
-__all__ = ["after_segmentation", "milliseconds", "surface_of"]
+__all__ = ["after_segmentation", "milliseconds"]
 
 
 def milliseconds(call: Callable[[], object]) -> float:
@@ -25,16 +21,6 @@ def milliseconds(call: Callable[[], object]) -> float:
     start = time.process_time()
     call()
     return (time.process_time() - start) * 1e3
-
-
-def surface_of(
-    points: NDArray[np.float32], spacing: float, known: Settings
-) -> Surface | DetailedSurface:
-    """Fit (n, 3) points, mm, as `reconstruct` does."""
-    fit = fit_surface(points, known.r0_factor * spacing, known.smoothing)
-    if known.detail_factor is None:
-        return fit
-    return add_detail(fit, points, spacing, known.detail_factor * spacing)
 
 
 def after_segmentation(case: Case, known: Settings) -> Callable[[], object]:

@@ -21,10 +21,11 @@ from bench.flags import add_flags, check_flags, open_pcl
 from bench.growth import growth
 from bench.machine import describe
 from bench.memory import extra_memory, resident_mb
-from bench.own import after_segmentation, milliseconds, surface_of
+from bench.own import after_segmentation, milliseconds
 from bench.pcl_peer import Pcl
 from bench.peer_methods import inpaint_points, rbf_points
 from recon import Preset, Settings, pipeline, reconstruct, warm
+from recon.pipeline import surface_of
 from recon.rbf import MIN_SEEDS, fit_surface
 
 __all__: list[str] = []

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from recon._image_kernels import add_between
 from recon._percentile import percentile
 from recon._scatter_kernels import BILINEAR_VARIANCE, read_between, share_out
-from recon.local_means import enlarged, local_means
+from recon.local_means import blurred, enlarged, local_means
 from recon.mirror_plane import find_plane
 from recon.rbf import Surface
 from recon.rim import BROADER, Rim, broad_average, halved
@@ -185,7 +185,7 @@ class _Seeded:
     def spread(self, values: Image | None, sigma: float) -> Image:
         """Sum the seeds' values, or the seeds, weighted by a Gaussian."""
         # Sharing a value among four pixels blurs by as much already.
-        return _blur(self.sums(values), math.sqrt(sigma * sigma - BILINEAR_VARIANCE))
+        return blurred(self.sums(values), math.sqrt(sigma * sigma - BILINEAR_VARIANCE))
 
     def at_seeds(self, image: Image) -> Image:
         """Interpolate an image, (n,)."""
@@ -223,7 +223,7 @@ def _field(
     """What `helped_by_mirror` asks for, (rows, columns, 5)."""
     across, down = _slopes(heights, step)
     facing = 1 / np.sqrt(across * across + down * down + 1)
-    inner = np.clip(2 * _blur(shown, _FADING_RIM) - 1, 0, 1) * shown
+    inner = np.clip(2 * blurred(shown, _FADING_RIM) - 1, 0, 1) * shown
     return np.asarray(cv2.merge([heights, facing, inner, detail * facing, seeded]), np.float32)
 
 
@@ -250,8 +250,3 @@ def _between(coarse: Image, shape: tuple[int, ...]) -> Image:
     rows, columns = ((np.arange(side) / _FINENESS).astype(np.float32) for side in shape)
     add_between(image, coarse, rows, columns)
     return image
-
-
-def _blur(image: Image, sigma: float) -> Image:
-    return np.asarray(
-        cv2.GaussianBlur(image, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT), np.float32)

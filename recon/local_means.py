@@ -1,12 +1,18 @@
-"""Local means over part of an image, told at half its resolution."""
+"""Blurs, and local means over part of an image, told at half its resolution."""
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["enlarged", "local_means", "shrunk"]
+__all__ = ["blurred", "enlarged", "local_means", "shrunk"]
 
 Image = NDArray[np.float32]
+
+
+def blurred(image: Image, sigma: float) -> Image:
+    """Filter by a Gaussian of that standard deviation, pixels; zero outside."""
+    return np.asarray(
+        cv2.GaussianBlur(image, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT), np.float32)
 
 
 def shrunk(image: Image) -> Image:
@@ -25,8 +31,7 @@ def local_means(weight: Image, sigma: float, *values: Image) -> list[Image]:
     values : (rows, columns) float32
     """
     planes = shrunk(np.asarray(cv2.merge([weight, *(weight * one for one in values)]), np.float32))
-    share, *sums = cv2.split(
-        cv2.GaussianBlur(planes, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT))
+    share, *sums = cv2.split(blurred(planes, sigma))
     share = np.maximum(share, np.float32(1e-6))
     return [np.asarray(one / share, np.float32) for one in sums]
 

@@ -25,7 +25,7 @@ from recon.segment import segment_face, window_of_box
 from recon.settings import Settings
 from recon.uncertainty import noise_share
 
-__all__ = ["reconstruct"]
+__all__ = ["reconstruct", "surface_of"]
 
 _FEW_SEEDS = 2000
 # Every so many pixels are enough to find a face and weigh its depth.
@@ -69,7 +69,7 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     clock.lap("segmentation")
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     clock.lap("neighbors")
-    surface = _fit(seeds.points, spacing, settings)
+    surface = surface_of(seeds.points, spacing, settings)
     clock.lap("rbf")
     dense = densify(seeds, surface, spacing, settings.ratio, noise_share(settings),
                     partial(look_up, frame, registered))
@@ -107,9 +107,21 @@ def _version() -> str:
     return version("denseface")
 
 
-def _fit(
+def surface_of(
     points: NDArray[np.float32], spacing: float, settings: Settings
 ) -> Surface | DetailedSurface:
+    """Fit the seeds, and add the detail that the settings ask for.
+
+    Parameters
+    ----------
+    points : (n, 3) float32, mm, depth camera frame
+    spacing : their mean spacing, mm
+
+    Raises
+    ------
+    TooLittleDepthError
+        Where there are too few points, or all on a line.
+    """
     surface = fit_surface(points, settings.r0_factor * spacing, settings.smoothing)
     if settings.detail_factor is None:
         return surface

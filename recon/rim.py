@@ -12,6 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from recon.local_means import blurred
+
 __all__ = ["BROADER", "Rim", "broad_average", "halved"]
 
 Image = NDArray[np.float32]
@@ -61,7 +63,7 @@ class Rim:
         """
         away = cv2.distanceTransform(support.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
         away = (away - np.float32(0.5)) * np.float32(step)
-        return cls(_blur(halved(support.astype(np.float32)), _AROUND / (2 * step)),
+        return cls(blurred(halved(support.astype(np.float32)), _AROUND / (2 * step)),
                    halved(away))
 
     @property
@@ -110,14 +112,14 @@ def broad_average(
     -------
     float32, mm, on the rim's grid
     """
-    weight = _blur(seeds, radius) + np.float32(_FADING * usual)
+    weight = blurred(seeds, radius) + np.float32(_FADING * usual)
     weight /= np.float32(_RELAXATION)
     total = np.zeros_like(seeds)
     inside = total
     for number in range(_PASSES_AT_RIM):
         if number == _PASSES:
             inside = total.copy()
-        total += _blur(values - seeds * total, radius) / weight
+        total += blurred(values - seeds * total, radius) / weight
     rows, columns = rim.away.shape
     inside, total = (
         np.asarray(cv2.resize(one, None, fx=finer, fy=finer, interpolation=cv2.INTER_LINEAR),
@@ -137,8 +139,3 @@ def _falling(values: Image, one: float, none: float) -> Image:
     """1 up to a value, 0 from another on, smooth between (3 t^2 - 2 t^3)."""
     t = np.clip((np.float32(none) - values) / np.float32(none - one), 0, 1)
     return np.asarray(t * t * (3 - 2 * t), np.float32)
-
-
-def _blur(image: Image, sigma: float) -> Image:
-    return np.asarray(
-        cv2.GaussianBlur(image, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT), np.float32)

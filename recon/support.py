@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._scatter_kernels import bounds, mark
+from recon.local_means import blurred
 from recon.masks import disc, fill_holes
 
 __all__ = ["support_on_grid"]
@@ -52,19 +53,20 @@ def support_on_grid(
     # Of a Gaussian that far inside a straight edge, so much is inside.
     inside = 0.5 + 0.5 * math.erf((_CLOSING - _RIM) * spacing / step / (even * math.sqrt(2)))
     most = cv2.dilate(closed, disc(_GROWTH * spacing / step))
-    return xs, ys, (most > 0) & (_blurred(closed, even) > inside)
+    return xs, ys, (most > 0) & (_broadly_blurred(closed, even) > inside)
 
 
-def _blurred(image: NDArray[np.uint8], sigma: float) -> NDArray[np.float32]:
+def _broadly_blurred(image: NDArray[np.uint8], sigma: float) -> NDArray[np.float32]:
     """Blur by a broad Gaussian, on fewer pixels where they are enough."""
     every = max(1, int(sigma / _EVEN_PX))
     rows, columns = (-(-side // every) for side in image.shape)
     whole = cv2.copyMakeBorder(
         image.astype(np.float32), 0, rows * every - image.shape[0], 0,
         columns * every - image.shape[1], cv2.BORDER_CONSTANT, value=0)
-    small = cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA)
-    blurred = cv2.GaussianBlur(small, (0, 0), sigma / every, borderType=cv2.BORDER_CONSTANT)
-    return np.asarray(cv2.resize(blurred, whole.shape[::-1], interpolation=cv2.INTER_LINEAR),
+    small = np.asarray(
+        cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA), np.float32)
+    broad = blurred(small, sigma / every)
+    return np.asarray(cv2.resize(broad, whole.shape[::-1], interpolation=cv2.INTER_LINEAR),
                       np.float32)[:image.shape[0], :image.shape[1]]
 
 
