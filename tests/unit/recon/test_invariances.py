@@ -12,10 +12,9 @@ from scipy.spatial import cKDTree
 from capture.frame import CameraModel, DepthToColor, RgbdFrame
 from recon import Settings
 from recon.densify import densify
-from recon.detail import add_detail
 from recon.face import DenseCloud
 from recon.neighbors import exact_spacing, mean_spacing
-from recon.rbf import fit_surface
+from recon.pipeline import surface_of
 from recon.registration import look_up, register
 from recon.segment import Seeds
 from recon.settings import Neighbors
@@ -35,9 +34,7 @@ def dense_of(seeds: Seeds) -> DenseCloud:
     """What follows segmentation, as `reconstruct` does it, but with exact neighbours."""
     points = seeds.points
     spacing = exact_spacing(np.ascontiguousarray(points[:, :2]))
-    fit = fit_surface(points, HOW.r0_factor * spacing, HOW.smoothing)
-    surface = add_detail(fit, points, spacing, HOW.detail_factor * spacing,
-                         symmetry=HOW.symmetry)
+    surface = surface_of(points, spacing, HOW)
     return densify(seeds, surface, spacing, HOW.ratio, share=0.5)
 
 
