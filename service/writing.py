@@ -103,7 +103,8 @@ class AtOnce:
 class Threads:
     """Writes frames in one thread and faces in another.
 
-    A presser waits for a frame, so none waits for a face. What has ended makes `fileno` readable.
+    A presser waits for a frame, so none waits for a face. What has ended makes `fileno` readable
+    until it is taken.
     """
 
     def __init__(self) -> None:
@@ -118,11 +119,10 @@ class Threads:
         """Give the descriptor that is readable where something has ended."""
         return self._event
 
-    def drain(self) -> bool:
-        """Forget what made it readable; False where nothing did."""
-        with suppress(BlockingIOError):
-            return os.eventfd_read(self._event) > 0
-        return False
+    def any_ended(self) -> bool:
+        """Whether `take` would give anything; `fileno` is readable as long as it would."""
+        with self._changed:
+            return bool(self._done)
 
     def start(self, draft: Draft) -> None:
         """Begin to write one."""
@@ -134,6 +134,8 @@ class Threads:
         """Give what has ended since the last call."""
         with self._changed:
             done, self._done = self._done, []
+            if done and self._event >= 0:
+                os.eventfd_read(self._event)
         return done
 
     def settle(self) -> None:
@@ -145,17 +147,18 @@ class Threads:
         with self._changed:
             self._begun -= len(written)
             self._done += written
+            os.eventfd_write(self._event, 1)
             self._changed.notify_all()
-        os.eventfd_write(self._event, 1)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Write what was begun and end both threads."""
+        """Write what was begun and end both threads; `take` still gives it."""
         for lane in (self._frames, self._faces):
             lane.close()
         os.close(self._event)
+        self._event = -1
 
 
 class _Lane:

@@ -37,6 +37,10 @@ def synced(monkeypatch):
     return steps
 
 
+def readable(writer):
+    return bool(select.select([writer], [], [], 0)[0])
+
+
 def test_files_that_wait_together_share_the_sync_of_their_folder(store, monkeypatch):
     accept(store, frame("z"), Settings(), "0f")
     drafts = [draft(store, "a"), store.face_draft(result("z", store)), draft(store, "b")]
@@ -98,14 +102,18 @@ def test_frames_do_not_wait_for_a_face_and_each_kind_stays_in_order(store, monke
         done = []
         while len(done) < len(frames):
             assert select.select([writer], [], [], 20)[0]
-            assert writer.drain()
+            assert writer.any_ended()
             done += writer.take()
         assert [one.draft for one in done] == frames
-        assert not writer.drain()
+        assert not writer.any_ended()
+        assert not readable(writer)
         go.set()
         writer.settle()
+        assert writer.any_ended()
+        assert readable(writer)
         assert [one.draft for one in writer.take()] == [face]
-        assert writer.drain()
+        assert not writer.any_ended()
+        assert not readable(writer)
 
 
 def test_at_the_end_what_was_begun_is_written(store):
