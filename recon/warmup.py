@@ -14,6 +14,7 @@ from recon.detect import detect_face
 from recon.errors import NoFaceError
 from recon.heap import keep_freed_memory
 from recon.neighbors import mean_spacing
+from recon.packing import pack
 from recon.rbf import fit_surface
 from recon.registration import look_up, register
 from recon.segment import segment_face
@@ -29,7 +30,7 @@ _NEAREST_MM = 700.0
 
 @cache
 def warm() -> None:
-    """Go once through every stage, with a ball for a face; does nothing when repeated.
+    """Go once through every stage, with a ball for a face, and pack it; does nothing when repeated.
 
     From then on the process keeps memory that a frame frees for the next: `recon.heap`.
     """
@@ -46,7 +47,8 @@ def warm() -> None:
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     fit = fit_surface(seeds.points, settings.r0_factor * spacing, settings.smoothing)
     surface = add_detail(fit, seeds.points, spacing, spacing, symmetry=True)
-    densify(seeds, surface, spacing, settings.ratio, 1.0, partial(look_up, frame, registered))
+    pack(densify(
+        seeds, surface, spacing, settings.ratio, 1.0, partial(look_up, frame, registered)))
 
 
 def _ball() -> RgbdFrame:

@@ -116,7 +116,7 @@ class Jobs:
         failpoint("hub.result.received")
         if self._expected(peer, message, CaptureEvent.RESULT):
             try:
-                message.face.join(packet.arrays)
+                message.face.check(packet.arrays)
                 self._faces.keep(packet)
             except (ProtocolError, StoreError) as error:
                 self._retry(message.capture_id, type(error).__name__, str(error))

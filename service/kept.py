@@ -12,10 +12,11 @@ from typing import Annotated, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from service.errors import CorruptFileError, ProtocolError
+from service.former import decode_former
 from service.messages import Frame, Result
 from service.payload import Arrays
 from service.spool import read_parts, write_parts
-from service.wire import Packet, decode_kept, encode
+from service.wire import Packet, encode
 
 __all__ = ["Draft", "FaceAbout", "FrameAbout", "KeptFace", "KeptFrame", "read_face",
            "read_frame"]
@@ -125,7 +126,7 @@ def _read(path: Path, checksum: str | None, kind: type[_A]) -> tuple[Packet, _A,
     parts, found = read_parts(path, checksum)
     try:
         about = kind.model_validate_json(parts[0] if parts else b"")
-        return decode_kept(parts[1:]), about, found
+        return decode_former(parts[1:]), about, found
     except (ProtocolError, ValidationError) as error:
         # Whole, so written by another version.
         raise CorruptFileError(f"{path}: {error}") from error

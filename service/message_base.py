@@ -40,7 +40,7 @@ class BaseMessage(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    version: Literal[1] = 1
+    version: Literal[2] = 2
 
     @property
     def payload(self) -> Payload | None:

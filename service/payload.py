@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, FailFast, Field, model_validator
 
 from capture import Calibration, CaptureError, RgbdFrame
-from recon.face import DenseCloud, Face, PointCloud, Report
-from service.errors import RemoteProtocolError
+from recon.face import Face, PointCloud, Report
+from recon.packing import PackedCloud, pack, unpack
+from service.errors import LocalProtocolError, RemoteProtocolError
 
 __all__ = ["MAX_ARRAY_BYTES", "MAX_PAYLOAD_BYTES", "MAX_PREVIEW_SIDE", "ArrayInfo", "Arrays",
            "FaceHeader", "FrameHeader", "Payload", "PreviewHeader"]
@@ -25,13 +26,15 @@ MAX_PAYLOAD_BYTES = 96 * 2**20
 """Largest sum of a message's arrays."""
 MAX_PREVIEW_SIDE = 320
 """Longest side of a preview, pixels."""
+_SEED_BYTES, _POINT_BYTES = 15, 39
+"""Of a point of either cloud in memory."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
 _Count = Annotated[int, Field(gt=0, le=2**24)]
 _Side = Annotated[int, Field(ge=1, le=MAX_PREVIEW_SIDE)]
 _Int64 = Annotated[int, Field(ge=-(2**63), lt=2**63)]
-_DType = Literal["<u2", "|u1", "<f4", "<i4"]
+_DType = Literal["<u2", "|u1", "<f4", "<i2", "<f2"]
 
 
 class _Model(BaseModel):
@@ -127,26 +130,53 @@ class FaceHeader(_PayloadHeader):
     grid_step_mm: Annotated[float, Field(gt=0)]
 
     def layout(self) -> tuple[ArrayInfo, ...]:
-        """Give both clouds, as large as the counts say."""
+        """Give both clouds, the dense one packed, as large as counts and grid say."""
         n, m = self.initial_points, self.dense_points
+        rows, columns = self.grid_shape
         return (_info("initial_points", "<f4", n, 3), _info("initial_colors", "|u1", n, 3),
-                _info("dense_points", "<f4", m, 3), _info("dense_colors", "|u1", m, 3),
-                _info("dense_normals", "<f4", m, 3), _info("dense_sigma", "<f4", m),
-                _info("dense_cells", "<i4", m, 2))
+                _info("dense_support", "|u1", rows, -(-columns // 8)),
+                _info("dense_x", "<f4", columns), _info("dense_y", "<f4", rows),
+                _info("dense_z", "<f4", m), _info("dense_colors", "|u1", m, 3),
+                _info("dense_normals", "<i2", m, 2), _info("dense_sigma", "<f2", m))
+
+    @model_validator(mode="after")
+    def _unpacks(self) -> Self:
+        """Check what becomes of it in memory, several times as large."""
+        rows, columns = self.grid_shape
+        if rows * columns > MAX_ARRAY_BYTES:
+            raise ValueError(f"the grid has {rows} x {columns} places, "
+                             f"at most {MAX_ARRAY_BYTES} allowed")
+        size = _SEED_BYTES * self.initial_points + _POINT_BYTES * self.dense_points
+        if size > MAX_PAYLOAD_BYTES:
+            raise ValueError(f"both clouds have {size} bytes, at most {MAX_PAYLOAD_BYTES} allowed")
+        return self
 
     @classmethod
     def of(cls, face: Face) -> tuple[Self, Arrays]:
-        """Take a face apart."""
-        initial, dense = face.initial, face.dense
-        rows, columns = dense.grid_shape
+        """Take a face apart.
+
+        Raises
+        ------
+        LocalProtocolError
+            Where its dense cloud cannot be packed: `recon.packing.pack`.
+        """
+        initial = face.initial
+        try:
+            dense = pack(face.dense)
+        except ValueError as error:
+            raise LocalProtocolError(f"face: {error}") from error
         header = cls(
-            report=face.report, initial_points=len(initial), dense_points=len(dense),
-            grid_shape=(int(rows), int(columns)), grid_step_mm=float(dense.grid_step_mm))
+            report=face.report, initial_points=len(initial), dense_points=len(dense.z),
+            grid_shape=dense.grid_shape, grid_step_mm=dense.grid_step_mm)
         return header, {
             "initial_points": initial.points, "initial_colors": initial.colors,
-            "dense_points": dense.points, "dense_colors": dense.colors,
-            "dense_normals": dense.normals, "dense_sigma": dense.sigma,
-            "dense_cells": dense.cells}
+            "dense_support": dense.support, "dense_x": dense.x, "dense_y": dense.y,
+            "dense_z": dense.z, "dense_colors": dense.colors, "dense_normals": dense.normals,
+            "dense_sigma": dense.sigma}
+
+    def check(self, arrays: Arrays) -> None:
+        """Make sure that `join` would give a face, for a fraction of its time; raises as it."""
+        self._clouds(arrays)
 
     def join(self, arrays: Arrays) -> Face:
         """Put the face together again.
@@ -156,14 +186,15 @@ class FaceHeader(_PayloadHeader):
         RemoteProtocolError
             Where header and arrays do not make a face, or a coordinate is not finite.
         """
+        initial, dense = self._clouds(arrays)
+        return Face(initial, unpack(dense), self.report)
+
+    def _clouds(self, arrays: Arrays) -> tuple[PointCloud, PackedCloud]:
         try:
-            return Face(
-                PointCloud(arrays["initial_points"], arrays["initial_colors"]),
-                DenseCloud(
-                    arrays["dense_points"], arrays["dense_colors"], arrays["dense_normals"],
-                    arrays["dense_sigma"], arrays["dense_cells"], self.grid_shape,
-                    self.grid_step_mm),
-                self.report)
+            return PointCloud(arrays["initial_points"], arrays["initial_colors"]), PackedCloud(
+                arrays["dense_support"], arrays["dense_x"], arrays["dense_y"], arrays["dense_z"],
+                arrays["dense_colors"], arrays["dense_normals"], arrays["dense_sigma"],
+                self.grid_shape, self.grid_step_mm)
         except (ValueError, KeyError) as error:
             raise RemoteProtocolError(f"face: {error}") from error
 

@@ -259,9 +259,9 @@ def test_what_is_too_much_is_dropped(hub, knock, refused):
     peer.socket.send_multipart([b" " * 300_000 + ready[0]])
     peer.socket.send_multipart([b"x" * 30_000_000] * 5)
     refused("oversized", by=4)
-    peer.socket.send_multipart([ready[0].replace(b'"version":1', b'"version":2')])
-    peer.socket.send_multipart([ready[0].replace(b'"version":1,', b"").replace(
-        b',"version":1', b"")])
+    peer.socket.send_multipart([ready[0].replace(b'"version":2', b'"version":1')])
+    peer.socket.send_multipart([ready[0].replace(b'"version":2,', b"").replace(
+        b',"version":2', b"")])
     refused("version", by=2)
     peer.socket.send_multipart([ready[0], b"one array too many"])
     peer.socket.send_multipart([encode(Packet(messages.Frame(

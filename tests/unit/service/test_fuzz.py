@@ -65,7 +65,7 @@ def report(**changes) -> list[bytes]:
     return [json.dumps(tree, separators=(",", ":")).encode(), *arrays]
 
 
-LETTERS = b'{"kind":"dead_letters","version":1,"request":1,"letters":[' + b"0," * 100_000 + b"0]}"
+LETTERS = b'{"kind":"dead_letters","version":2,"request":1,"letters":[' + b"0," * 100_000 + b"0]}"
 CROWD = BY_KIND["status"][0].replace(b'"sensors":[]', b'"sensors":[' + b"0," * 100_000 + b"0]")
 
 
@@ -78,7 +78,7 @@ CROWD = BY_KIND["status"][0].replace(b'"sensors":[]', b'"sensors":[' + b"0," * 1
     (decode_to_hub, report(timings_ms={f"{n:x}": "" for n in range(6_000)}), "timings_ms.0"),
     (decode_from_hub, [LETTERS], "letters.0"),
     (decode_from_hub, [CROWD], "sensors.0"),
-    (decode_from_hub, [b'{"kind":"announce","version":1,'
+    (decode_from_hub, [b'{"kind":"announce","version":2,'
                        + b",".join(b'"%x":0' % n for n in range(28_000)) + b"}"], "Extra inputs"),
 ])
 def test_a_header_of_many_faults_is_refused_by_the_first(decode, parts, words):
@@ -110,7 +110,7 @@ def test_nothing_is_allocated_for_a_claim(size):
     ("\x1b[2J", r"'\\x1b\[2J'"), ("a\nb", r"'a\\nb'"), ("\u202e", r"'\\u202e'")])
 def test_a_refusal_cannot_forge_a_log_line(kind, shown):
     with pytest.raises(RemoteProtocolError, match=shown):
-        decode_to_hub([json.dumps({"kind": kind, "version": 1}).encode()])
+        decode_to_hub([json.dumps({"kind": kind, "version": 2}).encode()])
 
 
 def test_what_grows_when_written_again_is_kept_and_passed_on():

@@ -337,7 +337,7 @@ def test_results_that_nobody_asked_for_are_dropped(bench, capture_id, hashed):
 def test_a_result_with_a_bad_face_is_tried_again(bench):
     bench.accepted("a")
     bench.worker()
-    bad = FACE_ARRAYS | {"dense_points": FACE_ARRAYS["dense_points"] + np.float32("inf")}
+    bad = FACE_ARRAYS | {"dense_z": FACE_ARRAYS["dense_z"] + np.float32("inf")}
     bench.result(arrays=bad)
     assert bench.published == []
     assert bench.worker(credit=1)[0][1].attempt == 2

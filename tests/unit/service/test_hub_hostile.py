@@ -203,4 +203,4 @@ def test_a_time_that_does_not_exist_in_utc_is_refused_by_the_decoder(kind, momen
     name = {"find_start": "since", "purge": "before"}[kind]
     with pytest.raises(ProtocolError, match="does not exist in UTC"):
         decode_to_hub([json.dumps(
-            {"kind": kind, "version": 1, "request": 1, name: moment}).encode()])
+            {"kind": kind, "version": 2, "request": 1, name: moment}).encode()])

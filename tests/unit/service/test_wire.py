@@ -136,7 +136,7 @@ def test_the_hub_s_own_words_are_not_taken_from_others(packet):
 @given(st.lists(st.binary(max_size=300), max_size=20))
 @example([])
 @example([b"[" * 100_000])
-@example([b'{"kind":"press","version":1,"request":' + b"9" * 5000 + b',"capture_id":"a"}'])
+@example([b'{"kind":"press","version":2,"request":' + b"9" * 5000 + b',"capture_id":"a"}'])
 @example([b"\xff\xfe{}"])
 @settings(deadline=None)
 def test_garbage_is_a_protocol_error(parts):
@@ -186,12 +186,13 @@ def header(**changes) -> bytes:
 
 
 def asked(kind: str, **fields) -> bytes:
-    return json.dumps({"version": 1, "kind": kind, "request": 1} | fields).encode()
+    return json.dumps({"version": 2, "kind": kind, "request": 1} | fields).encode()
 
 
 @pytest.mark.parametrize(("parts", "message"), [
-    ([WIRES[0][0].replace(b'"version":1,', b"")], "no version"),
-    ([WIRES[0][0].replace(b'"version":1', b'"version":2')], "version: Input should be 1"),
+    ([WIRES[0][0].replace(b'"version":2,', b"")], "no version"),
+    ([WIRES[0][0].replace(b'"version":2', b'"version":1')], "version: Input should be 2"),
+    ([WIRES[0][0].replace(b'"version":2', b'"version":3')], "version: Input should be 2"),
     ([WIRES[0][0].replace(b'"a"', b'"../a"')], "capture_id"),
     ([WIRES[0][0].replace(b'"a"', b'"a\\n"')], "capture_id"),
     ([WIRES[0][0].replace(b"}", b',"more":1}')], "more: Extra inputs"),
@@ -248,20 +249,40 @@ def test_frame_and_face_survive_the_wire():
     assert (back.calibration, back.skew_us) == (frame.calibration, frame.skew_us)
 
 
-def test_a_face_with_a_coordinate_that_is_no_number_is_a_protocol_error():
-    points = FACE_ARRAYS["dense_points"].copy()
-    points[3, 1] = np.nan
-    with pytest.raises(RemoteProtocolError, match="finite"):
-        FACE.join(FACE_ARRAYS | {"dense_points": points})
+@pytest.mark.parametrize(("name", "value", "words"), [
+    ("initial_points", np.nan, "points must be finite"),
+    ("dense_z", np.nan, "z must be finite"),
+    ("dense_x", np.inf, "x must be finite"),
+    ("dense_y", -np.inf, "y must be finite"),
+    ("dense_sigma", 0, "sigma must be positive"),
+    ("dense_sigma", -1, "sigma must be positive"),
+    ("dense_sigma", np.nan, "sigma must be positive"),
+    ("dense_sigma", np.inf, "sigma must be positive"),
+    ("dense_support", 0, "support has 94 places for 102 points"),
+    ("dense_support", 255, "support must lie on"),
+])
+@pytest.mark.parametrize("take", ["check", "join"])
+def test_a_face_that_cannot_be_is_a_protocol_error(name, value, words, take):
+    array = FACE_ARRAYS[name].copy()
+    array[1, ...] = value
+    with pytest.raises(RemoteProtocolError, match=f"face: {words}"):
+        getattr(FACE, take)(FACE_ARRAYS | {name: array})
 
 
-def test_a_face_with_a_standard_error_of_nothing_is_a_protocol_error():
-    with pytest.raises(RemoteProtocolError, match="face: sigma must be positive"):
-        FACE.join(FACE_ARRAYS | {"dense_sigma": 0 * FACE_ARRAYS["dense_sigma"]})
+@pytest.mark.parametrize(("changes", "words"), [
+    ({"grid_shape": [8192, 8192]}, "the grid has 8192 x 8192 places"),
+    ({"dense_points": 2_600_000}, "both clouds have"),
+])
+def test_a_face_that_is_large_only_in_memory_is_refused_by_its_header(changes, words):
+    tree = json.loads(WIRES[2][0])
+    tree["face"] |= changes
+    del tree["face"]["arrays"]
+    with pytest.raises(RemoteProtocolError, match=words):
+        decode_to_hub([json.dumps(tree).encode(), *WIRES[2][1:]])
 
 
 def test_a_status_of_another_release_can_be_read():
-    given = {"kind": "status", "version": 1, "epoch": "0f", "sequence": 3, "hub_version": "9",
+    given = {"kind": "status", "version": 2, "epoch": "0f", "sequence": 3, "hub_version": "9",
              "sensors": [], "workers": ["w"], "pressed": 0, "queued": 0, "working": 0, "done": 1,
              "failed": 0, "dead": 0}
     older = decode_from_hub([json.dumps(given).encode()]).message

@@ -1,0 +1,46 @@
+"""The loop that packs a dense cloud, compiled."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+__all__ = ["pack"]
+
+
+# Another thread computes the next frame meanwhile.
+@njit(cache=True, nogil=True)
+def pack(
+    points: NDArray[np.float32], normals: NDArray[np.float32], cells: NDArray[np.int32],
+    rows: int, columns: int, unit: float,
+) -> tuple[int, NDArray[np.uint8], NDArray[np.float32], NDArray[np.float32],
+           NDArray[np.float32], NDArray[np.int16]]:
+    """Give how many points could be packed, then support, xs, ys, zs and normals.
+
+    It stops at the first that is not where its cell says, comes before the one before, or whose
+    normal points away from the camera.
+    """
+    n = len(points)
+    support = np.zeros((rows, (columns + 7) // 8), np.uint8)
+    xs, ys = np.zeros(columns, np.float32), np.zeros(rows, np.float32)
+    known_x, known_y = np.zeros(columns, np.bool_), np.zeros(rows, np.bool_)
+    zs, tilts = np.empty(n, np.float32), np.empty((n, 2), np.int16)
+    scale = np.float32(unit)
+    before = np.int64(-1)
+    for i in range(n):
+        row, column = np.int64(cells[i, 0]), np.int64(cells[i, 1])
+        place = row * columns + column
+        x, y = points[i, 0], points[i, 1]
+        if not known_x[column]:
+            known_x[column], xs[column] = True, x
+        if not known_y[row]:
+            known_y[row], ys[row] = True, y
+        if place <= before or xs[column] != x or ys[row] != y or normals[i, 2] > 0:
+            return i, support, xs, ys, zs, tilts
+        before = place
+        support[row, column >> 3] |= np.uint8(128 >> (column & 7))
+    for i in range(n):
+        zs[i] = points[i, 2]
+    for i in range(n):
+        for j in range(2):
+            tilts[i, j] = np.int16(np.rint(normals[i, j] * scale))
+    return n, support, xs, ys, zs, tilts
