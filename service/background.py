@@ -2,6 +2,7 @@
 
 import os
 import time
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import suppress
@@ -10,48 +11,64 @@ from typing import Generic, Self, TypeVar
 __all__ = ["Background"]
 
 _T = TypeVar("_T")
+_MOST = 2
 
 
 class Background(Generic[_T]):
-    """Runs one call at a time in always the same thread."""
+    """Runs one call at a time in always the same thread.
+
+    One more may wait: it begins as soon as the one before ends, whether or not that was taken.
+    """
 
     def __init__(self, name: str) -> None:
         self._pool = ThreadPoolExecutor(1, thread_name_prefix=name)
         self._event = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
-        self._future: Future[_T] | None = None
-        self._started = 0.0
+        self._calls: deque[Future[_T]] = deque()
+        self._begun = 0.0
 
     def __bool__(self) -> bool:
         """Say whether a call was started and its end not yet taken."""
-        return self._future is not None
+        return bool(self._calls)
 
     @property
     def elapsed_s(self) -> float:
         """How long the present call has taken, seconds; 0 where there is none."""
-        return time.monotonic() - self._started if self._future else 0.0
+        return time.monotonic() - self._begun if self._calls else 0.0
 
     def fileno(self) -> int:
         """Give the descriptor that is readable when the call has ended."""
         return self._event
 
     def start(self, call: Callable[[], _T]) -> None:
-        """Start a call; the one before must have been taken."""
-        if self._future is not None:
-            raise RuntimeError("the call before has not been taken")
-        self._started = time.monotonic()
-        self._future = self._pool.submit(call)
-        self._future.add_done_callback(lambda _: os.eventfd_write(self._event, 1))
+        """Start a call, behind the one that is under way; at most one may wait so."""
+        if len(self._calls) == _MOST:
+            raise RuntimeError("a call waits already")
+        if not self._calls:
+            self._begun = time.monotonic()
+        future = self._pool.submit(self._run, call)
+        self._calls.append(future)
+        future.add_done_callback(lambda _: os.eventfd_write(self._event, 1))
+
+    def _run(self, call: Callable[[], _T]) -> _T:
+        self._begun = time.monotonic()
+        return call()
 
     def ended(self) -> bool:
         """Say whether there is an end to be taken."""
-        return self._future is not None and self._future.done()
+        return bool(self._calls) and self._calls[0].done()
 
     def take(self) -> _T:
-        """Wait for the call's end and give what it gave, or raise what it raised."""
-        if self._future is None:
+        """Wait for the first call's end and give what it gave, or raise what it raised."""
+        if not self._calls:
             raise RuntimeError("no call was started")
-        future, self._future = self._future, None
-        return future.result()
+        return self._calls.popleft().result()
+
+    def withdraw(self) -> bool:
+        """Take back the call that waits; False where there is none, or it has begun."""
+        if len(self._calls) < _MOST or not self._calls[-1].cancel():
+            return False
+        self._calls.pop()
+        return True
 
     def drain(self) -> None:
         """Forget what woke the poll; to be called before `ended` is asked."""
@@ -59,8 +76,8 @@ class Background(Generic[_T]):
             os.eventfd_read(self._event)
 
     def ends_within(self, seconds: float) -> bool:
-        """Wait for the call under way, if any; False where it takes longer."""
-        return self._future is None or not wait([self._future], seconds).not_done
+        """Wait for the first call, if any; False where it takes longer."""
+        return not self._calls or not wait([self._calls[0]], seconds).not_done
 
     def __enter__(self) -> Self:
         return self
@@ -69,6 +86,6 @@ class Background(Generic[_T]):
         self.close()
 
     def close(self) -> None:
-        """Wait for the call under way, if any, and end the thread."""
+        """Wait for what was started, if anything, and end the thread."""
         self._pool.shutdown()
         os.close(self._event)

@@ -80,7 +80,8 @@ class HubLink:
                 stop.drain()
             elif self._socket in ready:
                 try:
-                    packet = decode_from_hub(self._socket.recv_multipart())
+                    packet = decode_from_hub(
+                        [part.buffer for part in self._socket.recv_multipart(copy=False)])
                 except ProtocolError as error:
                     self._log.warning("message dropped", reason=str(error))
                     continue

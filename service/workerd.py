@@ -3,6 +3,7 @@
 import os
 import socket
 import time
+from collections import deque
 from collections.abc import Callable
 
 import cv2
@@ -22,6 +23,7 @@ from service.wire import Packet
 __all__ = ["run"]
 
 
+_MOST_JOBS = 2
 _FINISH_S = 3.0
 """Time for the job under way once told to stop, seconds; the supervisor kills after 5."""
 
@@ -54,9 +56,8 @@ class _Worker:
         self._link = link
         self._compute = compute
         self._log = structlog.get_logger("worker")
-        self._job: Job | None = None
-        self._next: Packet | None = None
-        """The job that follows."""
+        self._jobs: deque[Job] = deque()
+        """The one under way, and the one that follows."""
         self._answer: Callable[[], bool] | None = None
         self._credit = 0
 
@@ -65,11 +66,11 @@ class _Worker:
             if packet is not None:
                 self._receive(packet)
             self._deliver()
-            if self._compute.ended():
-                if self._answer is None:
-                    self._answer = self._computed()
-                    self._deliver()
-            elif self._compute.elapsed_s > self._settings.job_timeout_s:
+            while self._answer is None and self._compute.ended():
+                self._answer = self._computed()
+                self._deliver()
+            if not self._compute.ended() and (
+                    self._compute.elapsed_s > self._settings.job_timeout_s):
                 self._log.error("job takes too long", capture_id=self._holding(),
                                 seconds=self._compute.elapsed_s)
                 os._exit(1)
@@ -81,21 +82,22 @@ class _Worker:
 
     def finish(self) -> None:
         """End the job under way and deliver it; where that takes too long, leave it."""
-        self._next = None
-        deadline = time.monotonic() + _FINISH_S
-        while not self._compute.ends_within(min(self._settings.heartbeat_s, _FINISH_S)):
-            if time.monotonic() >= deadline:
-                self._log.warning("job handed back", capture_id=self._holding(),
-                                  seconds=round(self._compute.elapsed_s, 1))
-                return
-            self._link.send(Heartbeat(holding=self._holding()))
         self._deliver()
-        if self._compute:
+        if self._compute.withdraw():
+            self._jobs.pop()
+        deadline = time.monotonic() + _FINISH_S
+        while self._compute:
+            while not self._compute.ends_within(min(self._settings.heartbeat_s, _FINISH_S)):
+                if time.monotonic() >= deadline:
+                    self._log.warning("job handed back", capture_id=self._holding(),
+                                      seconds=round(self._compute.elapsed_s, 1))
+                    return
+                self._link.send(Heartbeat(holding=self._holding()))
             self._answer = self._computed()
             self._deliver()
 
     def _holding(self) -> str | None:
-        return self._job.capture_id if self._job else None
+        return self._jobs[0].capture_id if self._jobs else None
 
     def _ready(self) -> None:
         self._link.send(WorkerReady(
@@ -104,34 +106,32 @@ class _Worker:
     def _receive(self, packet: Packet) -> None:
         match packet.message:
             case Announce():
-                if self._next is None:
+                if len(self._jobs) < _MOST_JOBS:
                     self._ready()
             case Job() as job:
-                if self._next is not None:  # the hub redelivers what this worker does not hold
+                if len(self._jobs) == _MOST_JOBS:  # the hub redelivers what is not held here
                     self._log.warning("job dropped, busy", capture_id=job.capture_id)
                     return
                 failpoint("worker.job.received")
-                self._next = packet
-                if self._job is None:
-                    self._begin()
+                self._jobs.append(job)
+                self._compute.start(lambda: _face_of(job, packet.arrays))
+                if len(self._jobs) == 1:
+                    self._begun()
 
-    def _begin(self) -> None:
-        """Work on the next job, if there is one, and ask for the one after it."""
-        packet, self._next, self._job = self._next, None, None
-        if packet and isinstance(packet.message, Job):
-            self._job = job = packet.message
-            self._log.info("job", capture_id=job.capture_id, attempt=job.attempt)
-            self._compute.start(lambda: _face_of(job, packet.arrays))
+    def _begun(self) -> None:
+        """Ask for the job that follows the one under way, if there is one."""
+        if self._jobs:
             self._credit += 1
             self._ready()
+            job = self._jobs[0]
+            self._log.info("job", capture_id=job.capture_id, attempt=job.attempt)
 
     def _computed(self) -> Callable[[], bool]:
-        """Begin the next job and give what sends the answer to the one before."""
-        job = self._job
-        if job is None:
-            raise RuntimeError("a computation without a job ended")
+        """Give what sends the answer to the job that ended; the next one is under way already."""
+        job = self._jobs.popleft()
+        self._begun()
         try:
-            face = self._taken()
+            face = self._compute.take()
             failpoint("worker.job.computed")
             report = face.report.model_copy(update={"capture_id": job.capture_id})
             header, arrays = FaceHeader.of(Face(face.initial, face.dense, report))
@@ -151,13 +151,6 @@ class _Worker:
         self._log.info("face", capture_id=job.capture_id, points=report.dense_points,
                        total_ms=round(report.timings_ms.get("total", 0.0)))
         return lambda: self._link.send(result, arrays)
-
-
-    def _taken(self) -> Face:
-        try:
-            return self._compute.take()
-        finally:
-            self._begin()
 
 
 def _face_of(job: Job, arrays: Arrays) -> Face:

@@ -15,8 +15,9 @@ from service.workerd import _Worker
 from tests.unit.service.faces import small_face, small_frame
 
 FRAME, ARRAYS = FrameHeader.of(small_frame())
-SETTINGS = ServiceSettings(address="ipc:///unused")
+SETTINGS = ServiceSettings(address="ipc:///unused", heartbeat_s=0.05)
 DONE = "the computation may end, and has"
+BOTH_DONE = "both may end, and have"
 
 
 def job(capture_id: str) -> Packet:
@@ -36,6 +37,9 @@ class Link:
         self.sent = []
 
     def send(self, message, _=None):
+        if message.kind == "heartbeat":
+            self.gate.release()
+            return True
         if self.up:
             self.sent.append((message.kind, getattr(message, "capture_id", None)
                               or getattr(message, "credit", None)))
@@ -46,6 +50,10 @@ class Link:
             if one is DONE:
                 self.gate.release()
                 assert self.compute.ends_within(20)
+                yield None
+            elif one is BOTH_DONE:
+                self.gate.release(2)
+                assert self.compute._calls[-1].exception(20) is None
                 yield None
             elif isinstance(one, bool):
                 self.up = one
@@ -97,9 +105,32 @@ def test_answers_wait_for_the_hub_in_order(run):
     assert link.sent == [("worker_ready", 1), ("result", "a"), ("result", "b")]
 
 
+def test_two_that_end_before_it_looks_are_both_answered(run):
+    _, link = run(job("a"), job("b"), BOTH_DONE)
+    assert link.sent == [("worker_ready", 1), ("worker_ready", 2), ("result", "a"),
+                         ("result", "b")]
+
+
 def test_told_to_stop_it_answers_what_it_has_begun_and_begins_nothing(run):
     worker, link = run(job("a"), job("b"))
-    link.gate.release()
-    worker.finish()
+    worker.finish()  # a may end at the first heartbeat
     assert link.sent == [("worker_ready", 1), ("result", "a")]
     assert not worker._compute
+
+
+def test_told_to_stop_it_ends_the_job_that_began_by_itself_too(run):
+    worker, link = run(job("a"), job("b"))
+    link.gate.release()
+    worker._compute._calls[0].result(20)
+    while not worker._compute._calls[1].running():
+        pass
+    worker.finish()  # b may end at the first heartbeat
+    assert link.sent == [("worker_ready", 1), ("worker_ready", 2), ("result", "a"),
+                         ("result", "b")]
+    assert not worker._compute
+
+
+def test_told_to_stop_it_sends_what_waited_for_the_hub(run):
+    worker, link = run(job("a"), False, DONE, True)
+    worker.finish()
+    assert link.sent == [("worker_ready", 1), ("result", "a")]
