@@ -190,7 +190,8 @@ class AsyncClient:
     def _take_answers(self) -> None:
         while True:
             try:
-                packet = decode_from_hub(self._socket.recv_multipart(zmq.DONTWAIT))
+                packet = decode_from_hub([part.buffer for part in self._socket.recv_multipart(
+                    zmq.DONTWAIT, copy=False)])
             except zmq.Again:
                 return
             except ProtocolError:

@@ -248,7 +248,8 @@ class Client:
             if not self._socket.poll(max(0, math.ceil(left * 1000))):
                 return None
             try:
-                packet = decode_from_hub(self._socket.recv_multipart())
+                packet = decode_from_hub(
+                    [part.buffer for part in self._socket.recv_multipart(copy=False)])
             except ProtocolError:
                 continue
             if getattr(packet.message, "request", None) == request:

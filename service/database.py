@@ -147,9 +147,14 @@ class Database:
     def all(
         self, statement: str, *values: str | float | None, synced: bool = True
     ) -> list[sqlite3.Row]:
-        """Run one statement, durably where it changes something, and give its rows."""
+        """Run one statement that changes something, durably, and give its rows."""
         with self.transaction(synced=synced) as connection:
             return connection.execute(statement, values).fetchall()
+
+    def rows(self, statement: str, *values: str | float | None) -> list[sqlite3.Row]:
+        """Run one statement that only reads and give its rows."""
+        with self._named():
+            return self._connection.execute(statement, values).fetchall()
 
     def one(self, statement: str, *values: str | float | None) -> sqlite3.Row | None:
         """Run one statement that only reads and give its first row."""

@@ -42,7 +42,7 @@ class Ear:
         """
         try:
             _, parts = receive_parts(self.socket, MAX_PARTS, MAX_HEADER_BYTES + MAX_PAYLOAD_BYTES)
-            return decode_from_hub([part.bytes for part in parts])
+            return decode_from_hub([part.buffer for part in parts])
         except ProtocolError:
             return None
 

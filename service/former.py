@@ -67,7 +67,7 @@ def _header(parts: Sequence[Buffer]) -> dict[str, Any] | None:
 def _face(header: FaceHeader, buffers: Sequence[Buffer]) -> Face:
     counts = {"initial": header.initial_points, "dense": header.dense_points}
     of: dict[str, NDArray[Any]] = {
-        name: np.frombuffer(buffer, dtype).reshape(counts[name.split("_")[0]], *each)
+        name: np.frombuffer(bytes(buffer), dtype).reshape(counts[name.split("_")[0]], *each)
         for (name, (dtype, each)), buffer in zip(_ARRAYS.items(), buffers, strict=True)}
     return Face(
         PointCloud(of["initial_points"], of["initial_colors"]),

@@ -125,7 +125,7 @@ _A = TypeVar("_A", bound=_About)
 def _read(path: Path, checksum: str | None, kind: type[_A]) -> tuple[Packet, _A, str]:
     parts, found = read_parts(path, checksum)
     try:
-        about = kind.model_validate_json(parts[0] if parts else b"")
+        about = kind.model_validate_json(bytes(parts[0]) if parts else b"")
         return decode_former(parts[1:]), about, found
     except (ProtocolError, ValidationError) as error:
         # Whole, so written by another version.

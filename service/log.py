@@ -26,9 +26,7 @@ def configure(how: LogFormat, process: str) -> None:
         renderers = [structlog.processors.format_exc_info, _finite,
                      structlog.processors.JSONRenderer()]
     else:
-        renderers = [structlog.dev.ConsoleRenderer(
-            colors=sys.stderr.isatty(),
-            exception_formatter=structlog.dev.plain_traceback)]
+        renderers = [_colored() if sys.stderr.isatty() else _plain]
 
     def name(
         _: Any, __: str, event: structlog.typing.EventDict
@@ -50,6 +48,28 @@ def configure(how: LogFormat, process: str) -> None:
     )
     if how == "json":
         _catch_the_rest()
+
+
+def _colored(*, colors: bool = True) -> structlog.dev.ConsoleRenderer:
+    return structlog.dev.ConsoleRenderer(
+        colors=colors, exception_formatter=structlog.dev.plain_traceback)
+
+
+_console = _colored(colors=False)
+_QUOTED = frozenset(" \t=\r\n\"'")
+
+
+def _plain(logger: Any, name: str, event: structlog.typing.EventDict) -> str:
+    """Write a line as `_console` does, in a quarter of its time: of a capture there are seven."""
+    if not event.keys().isdisjoint(("exc_info", "exception", "stack")):
+        return _console(logger, name, event)
+    stamp, level, what = event.pop("timestamp"), event.pop("level"), event.pop("event")
+    shown = [f"{key}={_quoted(value)}" for key, value in sorted(event.items())]
+    return " ".join((stamp, f"[{level:<9}]", f"{what!s:<30}", *shown)).rstrip(" ")
+
+
+def _quoted(value: Any) -> str:
+    return value if isinstance(value, str) and _QUOTED.isdisjoint(value) else repr(value)
 
 
 def _without_data(

@@ -6,9 +6,9 @@ other side says of its buffers needs to be believed.
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
-import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, FailFast, Field, model_validator
 
@@ -35,14 +35,19 @@ _Count = Annotated[int, Field(gt=0, le=2**24)]
 _Side = Annotated[int, Field(ge=1, le=MAX_PREVIEW_SIDE)]
 _Int64 = Annotated[int, Field(ge=-(2**63), lt=2**63)]
 _DType = Literal["<u2", "|u1", "<f4", "<i2", "<f2"]
+_ITEM_BYTES = {"<u2": 2, "|u1": 1, "<f4": 4, "<i2": 2, "<f2": 2}
 
 
 class _Model(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-class ArrayInfo(_Model):
+@dataclass(frozen=True)
+class ArrayInfo:
     """One raw buffer: little-endian, C order."""
+
+    # No model: one is made for each array of each message, which takes a model five times as long.
+    __pydantic_config__ = ConfigDict(extra="forbid")
 
     name: Annotated[str, Field(max_length=32)]
     dtype: _DType
@@ -51,7 +56,7 @@ class ArrayInfo(_Model):
     @property
     def nbytes(self) -> int:
         """Size of the buffer."""
-        return np.dtype(self.dtype).itemsize * math.prod(self.shape)
+        return _ITEM_BYTES[self.dtype] * math.prod(self.shape)
 
 
 class _PayloadHeader(_Model):
@@ -69,11 +74,12 @@ class _PayloadHeader(_Model):
             object.__setattr__(self, "arrays", expected)
         elif self.arrays != expected:
             raise ValueError(f"arrays must be {_names(expected)}, found {_names(self.arrays)}")
-        for info in expected:
-            if info.nbytes > MAX_ARRAY_BYTES:
+        sizes = [info.nbytes for info in expected]
+        for info, size in zip(expected, sizes, strict=True):
+            if size > MAX_ARRAY_BYTES:
                 raise ValueError(
-                    f"array {info.name} has {info.nbytes} bytes, at most {MAX_ARRAY_BYTES} allowed")
-        total = sum(info.nbytes for info in expected)
+                    f"array {info.name} has {size} bytes, at most {MAX_ARRAY_BYTES} allowed")
+        total = sum(sizes)
         if total > MAX_PAYLOAD_BYTES:
             raise ValueError(f"arrays have {total} bytes, at most {MAX_PAYLOAD_BYTES} allowed")
         return self
@@ -216,7 +222,7 @@ Payload = FrameHeader | FaceHeader | PreviewHeader
 
 
 def _info(name: str, dtype: _DType, *shape: int) -> ArrayInfo:
-    return ArrayInfo(name=name, dtype=dtype, shape=shape)
+    return ArrayInfo(name, dtype, shape)
 
 
 def _names(infos: tuple[ArrayInfo, ...]) -> str:

@@ -124,9 +124,9 @@ class _Adoption:
         self._database = database
         self._account = account
         self._quarantine = quarantine
-        self._known = {row["capture_id"]: row for row in database.all("SELECT * FROM captures")}
+        self._known = {row["capture_id"]: row for row in database.rows("SELECT * FROM captures")}
         self._concluded = {
-            row["capture_id"] for row in database.all("SELECT capture_id FROM outcomes")}
+            row["capture_id"] for row in database.rows("SELECT capture_id FROM outcomes")}
         self._captures: dict[str, _Capture] = {}
         self._outcomes: dict[str, _Outcome] = {}
         self._damaged: dict[str, str] = {}

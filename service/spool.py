@@ -99,7 +99,7 @@ def _checksum(index: bytes, parts: Sequence[bytes | memoryview]) -> bytes:
     return hashlib.sha256(index + sums).digest()
 
 
-def read_parts(path: Path, checksum: str | None = None) -> tuple[list[bytes], str]:
+def read_parts(path: Path, checksum: str | None = None) -> tuple[list[memoryview], str]:
     """Read what `write_parts` wrote and give it with its checksum.
 
     Parameters
@@ -115,7 +115,9 @@ def read_parts(path: Path, checksum: str | None = None) -> tuple[list[bytes], st
     """
     try:
         with path.open("rb") as file:
-            data = memoryview(file.read(_MOST_BYTES + 1))
+            # Not more than there is: the memory for it would be fetched anew each time.
+            size = min(os.fstat(file.fileno()).st_size, _MOST_BYTES) + 1
+            data = memoryview(file.read(size))
     except OSError as error:
         passing = error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
         raise (StoreError if passing else CorruptFileError)(
@@ -139,7 +141,7 @@ def read_parts(path: Path, checksum: str | None = None) -> tuple[list[bytes], st
     return parts, found
 
 
-def _split(data: memoryview) -> list[bytes] | None:
+def _split(data: memoryview) -> list[memoryview] | None:
     """Give the parts behind their index; None where they do not fill the data exactly."""
     try:
         (count,) = struct.unpack_from("<I", data)
@@ -151,7 +153,7 @@ def _split(data: memoryview) -> list[bytes] | None:
         return None
     parts = []
     for length in lengths:
-        parts.append(bytes(data[start:start + length]))
+        parts.append(data[start:start + length])
         start += length
     return parts
 

@@ -80,6 +80,8 @@ class FolderStore:
             self._database, self._account, self._quarantine = recover(
                 self._layout, clock or SystemClock())
             self._epoch = self._database.meta("epoch") or ""
+            self._found: tuple[tuple[str, int], Stored | None] = ("", -1), None
+            """The row that was asked for last."""
             self._counts: dict[CaptureState, int] = {}
             self._counted_at = -1
             self._ballast = Ballast(self._layout.ballast)
@@ -142,13 +144,16 @@ class FolderStore:
 
     def find(self, capture_id: str) -> Stored | None:
         """Give a capture's row."""
-        row = self._database.one(
-            "SELECT * FROM captures WHERE capture_id = ? AND state != ?",
-            capture_id, CaptureState.REMOVED)
-        if row is None:
-            return None
-        return Stored(CaptureState(row["state"]), row["settings_hash"], row["frame_sha256"],
-                      row["attempts"], row["pressed_by"])
+        # Asked again and again of what comes next, between two changes.
+        asked = capture_id, self._database.changes
+        if self._found[0] != asked:
+            row = self._database.one(
+                "SELECT * FROM captures WHERE capture_id = ? AND state != ?",
+                capture_id, CaptureState.REMOVED)
+            self._found = asked, None if row is None else Stored(
+                CaptureState(row["state"]), row["settings_hash"], row["frame_sha256"],
+                row["attempts"], row["pressed_by"])
+        return self._found[1]
 
     def unfinished(self) -> list[str]:
         """Give the ids of what was accepted and has no outcome, oldest first."""
@@ -271,7 +276,7 @@ class FolderStore:
             sequence=row["sequence"], capture_id=row["capture_id"], error=row["error"],
             message=row["message"][:_SHOWN], attempts=row["attempts"],
             accepted_at=row["accepted_at"], finished_at=row["finished_at"],
-        ) for row in self._database.all(
+        ) for row in self._database.rows(
             "SELECT * FROM outcomes JOIN captures USING (capture_id) WHERE dead AND sequence > ?"
             " ORDER BY sequence LIMIT ?", after, most)]
 
@@ -281,7 +286,7 @@ class FolderStore:
         if self._counted_at != self._database.changes:
             self._counted_at = self._database.changes
             self._counts = {
-                CaptureState(row["state"]): row["count"] for row in self._database.all(
+                CaptureState(row["state"]): row["count"] for row in self._database.rows(
                     "SELECT state, count(*) AS count FROM captures WHERE state != ?"
                     " GROUP BY state", CaptureState.REMOVED)}
         return dict(self._counts)
@@ -293,7 +298,7 @@ class FolderStore:
         # By the store's own count of seconds and by the wall clock both, unless that was set back
         # behind what it said then: a clock that is wrong for a while removes nothing.
         now = self._account.wall()
-        return [row["capture_id"] for row in self._database.all(
+        return [row["capture_id"] for row in self._database.rows(
             "SELECT capture_id FROM outcomes WHERE finished_age_s <= ?"
             " AND (julianday(?) - julianday(finished_at) >= ? OR finished_at > ?)"
             " ORDER BY sequence LIMIT ?",
@@ -399,7 +404,7 @@ class FolderStore:
         return Packet(FaceDone(**common, face=fresh.message.face), fresh.arrays)
 
     def _ids(self, which: str, *values: str | int) -> list[str]:
-        return [row["capture_id"] for row in self._database.all(
+        return [row["capture_id"] for row in self._database.rows(
             f"SELECT capture_id FROM captures WHERE {which}", *values)]  # noqa: S608
 
 

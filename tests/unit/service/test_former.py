@@ -64,7 +64,7 @@ def test_its_checksum_stays_that_of_the_file():
 
 def parts(**changes):
     _, header, *arrays = read_parts(FACE)[0]
-    return [json.dumps(json.loads(header) | changes).encode(), *arrays]
+    return [json.dumps(json.loads(bytes(header)) | changes).encode(), *map(bytes, arrays)]
 
 
 def of_face(**changes):

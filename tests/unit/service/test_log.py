@@ -10,8 +10,11 @@ import threading
 import numpy as np
 import pytest
 import structlog
+from hypothesis import given
+from hypothesis import strategies as st
+from structlog.dev import ConsoleRenderer
 
-from service.log import configure
+from service.log import _plain, configure
 
 
 def lines(text):
@@ -43,6 +46,26 @@ def test_arrays_and_bytes_are_never_written(how, capsys):
     assert "secret" not in text
     assert "uint8 [4, 5, 3]" in text
     assert "60 bytes" in text
+
+
+@given(st.text(), st.sampled_from(["info", "warning", "error", "critical"]), st.dictionaries(
+    st.from_regex("[a-z_]+", fullmatch=True).filter(lambda key: key not in {
+        "timestamp", "level", "event", "logger", "logger_name", "stack", "exception", "exc_info"}),
+    st.text() | st.integers() | st.floats() | st.none() | st.booleans() | st.lists(st.text())))
+def test_a_line_is_as_structlog_writes_it(event, level, values):
+    entry = values | {"timestamp": "2026-01-31T12:00:00Z", "level": level, "event": event}
+    assert _plain(None, "", entry.copy()) == ConsoleRenderer(colors=False)(None, "", entry.copy())
+
+
+def test_an_error_in_text_has_its_traceback(capsys):
+    configure("text", "test")
+    try:
+        raise ValueError("two\nlines")  # noqa: TRY301
+    except ValueError:
+        structlog.get_logger("x").exception("failed", capture_id="a")
+    text = capsys.readouterr().err
+    assert "[error    ] failed                         capture_id=a process=test\n" in text
+    assert "ValueError: two\nlines" in text
 
 
 def test_every_line_is_json_whatever_is_in_it(capsys):
