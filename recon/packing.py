@@ -16,6 +16,8 @@ __all__ = ["PackedCloud", "pack", "unpack"]
 
 _UNIT = 32767
 """What stands for a normal's component of 1."""
+_SIGMA_MM = 1e-4, 65e3
+"""What a float16 holds with all its digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +77,7 @@ def pack(cloud: DenseCloud) -> PackedCloud:
     ------
     ValueError
         Where a point is not at its place on a grid, they are not sorted, a normal points away from
-        the camera, or sigma is beyond what 16 bits hold (6e-8 to 65504 mm).
+        the camera, or sigma is beyond what 16 bits hold in full (0.0001 to 65,000 mm).
     """
     from recon import _packing_kernels  # numba takes most of a second: who unpacks shall not wait
 
@@ -85,8 +87,10 @@ def pack(cloud: DenseCloud) -> PackedCloud:
     if done < len(cloud):
         raise ValueError(f"point {done} is not at its place on a grid, not behind the one before, "
                          "or its normal points away from the camera")
-    with np.errstate(over="ignore", under="ignore"):
-        sigma = cloud.sigma.astype(np.float16)
+    least, most = _SIGMA_MM
+    if len(cloud) and not least <= cloud.sigma.min() <= cloud.sigma.max() <= most:
+        raise ValueError(f"sigma must be within {least} and {most:.0f} mm")
+    sigma = _packing_kernels.halved(cloud.sigma.view(np.uint32)).view(np.float16)
     return PackedCloud(support, x, y, z, cloud.colors, normals, sigma,
                        (int(rows), int(columns)), float(cloud.grid_step_mm))
 
@@ -96,22 +100,22 @@ def unpack(packed: PackedCloud) -> DenseCloud:
     rows, columns = packed.grid_shape
     n = len(packed.z)
     on = np.unpackbits(packed.support, axis=1, count=columns).view(np.bool_)
-    each = np.count_nonzero(on, axis=1)
+    each = np.bitwise_count(packed.support).sum(axis=1, dtype=np.intp)
     cells = np.empty((n, 2), np.int32)
     cells[:, 0] = np.repeat(np.arange(rows, dtype=np.int32), each)
-    cells[:, 1] = np.flatnonzero(on) - cells[:, 0] * np.int64(columns)
+    cells[:, 1] = np.broadcast_to(np.arange(columns, dtype=np.int32), on.shape)[on]
     points = np.empty((n, 3), np.float32)
-    points[:, 0] = packed.x[cells[:, 1]]
+    points[:, 0] = np.broadcast_to(packed.x, on.shape)[on]
     points[:, 1] = np.repeat(packed.y, each)
     points[:, 2] = packed.z
-    normals = np.empty((n, 3), np.float32)
-    np.multiply(packed.normals, np.float32(1 / _UNIT), out=normals[:, :2])
-    x, y = normals[:, 0], normals[:, 1]
-    rest = 1 - x * x - y * y
+    across = packed.normals * np.float32(1 / _UNIT)
+    rest = 1 - across[:, 0] ** 2 - across[:, 1] ** 2
     beyond = rest < 0  # rounded up, at right angles to the view
     if beyond.any():
-        normals[beyond, :2] /= np.sqrt(1 - rest[beyond])[:, None]
+        across[beyond] /= np.sqrt(1 - rest[beyond])[:, None]
         rest[beyond] = 0
+    normals = np.empty((n, 3), np.float32)
+    normals[:, :2] = across
     normals[:, 2] = -np.sqrt(rest)
     return DenseCloud(points, packed.colors, normals, packed.sigma.astype(np.float32), cells,
                       packed.grid_shape, packed.grid_step_mm)

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from recon._packing_kernels import halved
 from recon.face import DenseCloud
 from recon.packing import pack, unpack
 
@@ -109,8 +110,16 @@ def test_a_cloud_that_is_no_grid_is_refused(spoil):
 def test_an_error_beyond_sixteen_bits_is_refused(sigma):
     before = cloud()
     before.sigma[3] = sigma
-    with pytest.raises(ValueError, match="sigma must be positive and finite"):
+    with pytest.raises(ValueError, match=r"sigma must be within 0\.0001 and 65000 mm"):
         pack(before)
+
+
+@given(st.lists(st.floats(2**-13, 65e3, width=32), min_size=1, max_size=50))
+@example([2**-13 * (1 + n / 4096) for n in range(17)])
+def test_errors_are_rounded_as_numpy_rounds_them(values):
+    sigma = np.array(values, np.float32)
+    np.testing.assert_array_equal(
+        halved(sigma.view(np.uint32)).view(np.float16), sigma.astype(np.float16))
 
 
 @pytest.mark.parametrize(("name", "value", "words"), [
