@@ -156,6 +156,10 @@ class Database:
         with self._named():
             return self._connection.execute(statement, values).fetchall()
 
+    def ids(self, statement: str, *values: str | float | None) -> list[str]:
+        """Run one statement that only reads and give the captures that it names."""
+        return [row["capture_id"] for row in self.rows(statement, *values)]
+
     def one(self, statement: str, *values: str | float | None) -> sqlite3.Row | None:
         """Run one statement that only reads and give its first row."""
         with self._named():

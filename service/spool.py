@@ -14,15 +14,15 @@ import hashlib
 import os
 import struct
 import zlib
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from service.direct import write_direct
 from service.errors import CorruptFileError, DiskFullError, StoreError
 from service.failpoints import failpoint
 
-__all__ = ["read_parts", "store_error", "sync_folder", "write_atomically", "write_parts"]
+__all__ = ["naming", "read_parts", "store_error", "sync_folder", "write_atomically", "write_parts"]
 
 _MAGIC = b"denseface spool 3\n"
 _BEFORE = b"denseface spool 2\n"
@@ -166,6 +166,15 @@ def store_error(path: Path, error: OSError) -> StoreError:
     if error.errno == errno.EIO:
         return StoreError(f"the disk fails ({reason})")
     return StoreError(reason)
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Say of what the system refuses within where it was; raises StoreError."""
+    try:
+        yield
+    except OSError as error:
+        raise store_error(path, error) from error
 
 
 def sync_folder(folder: Path) -> None:

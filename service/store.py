@@ -5,8 +5,8 @@ A file is written and synced before the row that names it, so a row never names 
 
 import os
 import shutil
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from sqlite3 import Connection
@@ -14,7 +14,6 @@ from typing import Self
 
 from recon.settings import Settings
 from service.ages import Clock, SystemClock, stamp
-from service.ballast import Ballast
 from service.errors import (
     CorruptFileError,
     DamagedDatabaseError,
@@ -36,8 +35,9 @@ from service.layout import Layout
 from service.locking import lock
 from service.messages import CaptureFailed, DeadLetter, FaceDone, Frame, Result
 from service.recovery import recover
+from service.removal import Removal
 from service.settings import private_folder
-from service.spool import store_error, sync_folder
+from service.spool import naming, store_error
 from service.states import CaptureState
 from service.stored import Stored
 from service.wire import Packet
@@ -68,7 +68,7 @@ class FolderStore:
     """
 
     def __init__(self, folder: Path, clock: Clock | None = None) -> None:
-        with _naming(folder):
+        with naming(folder):
             self._layout = Layout(private_folder(folder))
         self._fresh = FreshFrames()
         self._fresh_faces: dict[str, KeptFace] = {}
@@ -84,8 +84,8 @@ class FolderStore:
             """The row that was asked for last."""
             self._counts: dict[CaptureState, int] = {}
             self._counted_at = -1
-            self._ballast = Ballast(self._layout.ballast)
-            self._ballast.take_in()
+            self._removal = Removal(
+                self._layout, self._database, self._account, self._quarantine, self._forget)
         except OSError as error:
             os.close(self._lock)
             if isinstance(error, StoreError):
@@ -121,7 +121,7 @@ class FolderStore:
         if not isinstance(message, Frame):
             raise TypeError(f"a Frame is accepted, found {message.kind}")
         capture_id = message.capture_id
-        self._finish_removal(self._removed(capture_id))
+        self._removal.finish(capture_id)
         clock = self._account.save()
         about = FrameAbout(
             accepted_at=stamp(self._account.wall()), clock=clock,
@@ -157,7 +157,9 @@ class FolderStore:
 
     def unfinished(self) -> list[str]:
         """Give the ids of what was accepted and has no outcome, oldest first."""
-        return self._ids("state = ? ORDER BY position", CaptureState.ACCEPTED)
+        return self._database.ids(
+            "SELECT capture_id FROM captures WHERE state = ? ORDER BY position",
+            CaptureState.ACCEPTED)
 
     def start_attempt(self, capture_id: str) -> int:
         """Count an attempt before it is made and give its number, from 1."""
@@ -293,79 +295,29 @@ class FolderStore:
 
     def expired(self, retention_s: float, most: int) -> list[str]:
         """Give ids of what was finished longer ago than the retention, oldest first."""
-        if not self._account.settled(retention_s):
-            return []
-        # By the store's own count of seconds and by the wall clock both, unless that was set back
-        # behind what it said then: a clock that is wrong for a while removes nothing.
-        now = self._account.wall()
-        return [row["capture_id"] for row in self._database.rows(
-            "SELECT capture_id FROM outcomes WHERE finished_age_s <= ?"
-            " AND (julianday(?) - julianday(finished_at) >= ? OR finished_at > ?)"
-            " ORDER BY sequence LIMIT ?",
-            self._account.now() - retention_s, stamp(now), retention_s / 86400, stamp(now), most)]
+        return self._removal.expired(retention_s, most)
 
     def accepted_before(self, moment: datetime | None, most: int) -> list[str]:
         """Give ids of what was accepted before a time, oldest first; all where it is None."""
-        limit = stamp(moment) if moment else "a"  # later than any number
-        return self._ids("state != ? AND accepted_at < ? ORDER BY position LIMIT ?",
-                         CaptureState.REMOVED, limit, most)
+        return self._removal.accepted_before(moment, most)
 
     def remove(self, capture_ids: Sequence[str]) -> None:
         """Remove frames, faces, reports and rows, so that nothing of them can be read again."""
-        self._ballast.overboard(lambda: self._mark_removed(capture_ids))
-        self._ballast.overboard(lambda: self._finish_removal(capture_ids))
+        self._removal.remove(capture_ids)
 
     def sweep(self, retention_s: float | None) -> None:
         """Finish what `remove` began; remove what is in quarantine for longer than that."""
-        self._ballast.overboard(lambda: self._finish_removal(
-            self._ids("state = ?", CaptureState.REMOVED)))
-        self._database.set_meta("clock", self._account.save())
-        if retention_s is not None and self._account.settled(retention_s):
-            with _naming(self._layout.quarantine):
-                self._quarantine.remove_older(retention_s)
+        self._removal.sweep(retention_s)
 
     def clear_quarantine(self) -> None:
         """Remove all that is in quarantine."""
-        with _naming(self._layout.quarantine):
-            self._quarantine.clear()
+        self._removal.clear_quarantine()
 
-    def _removed(self, capture_id: str) -> list[str]:
-        return self._ids("state = ? AND capture_id = ?", CaptureState.REMOVED, capture_id)
-
-    def _mark_removed(self, capture_ids: Sequence[str]) -> None:
-        with self._database.transaction() as database:
-            for capture_id in capture_ids:
-                database.execute("DELETE FROM outcomes WHERE capture_id = ?", (capture_id,))
-                database.execute("UPDATE captures SET state = ? WHERE capture_id = ?",
-                                 (CaptureState.REMOVED, capture_id))
-
-    def _finish_removal(self, capture_ids: Sequence[str]) -> None:
-        """Remove the files, then the rows: a row of a file that is gone says so in its state."""
-        if not capture_ids:
-            return
+    def _forget(self, capture_ids: Sequence[str]) -> None:
         for capture_id in capture_ids:
             self._fresh.pop(capture_id)
             self._fresh_faces.pop(capture_id, None)
         self._unread.difference_update(capture_ids)
-        for capture_id in capture_ids:
-            row = self._database.one(
-                "SELECT settings_hash FROM captures WHERE capture_id = ?", capture_id)
-            paths = [self._layout.frame(capture_id)]
-            if row:
-                paths.append(self._layout.face(capture_id, row["settings_hash"]))
-            for path in paths:
-                with _naming(path):
-                    path.unlink(missing_ok=True)
-        for folder in (self._layout.frames, self._layout.faces):
-            with _naming(folder):
-                sync_folder(folder)
-        with _naming(self._layout.quarantine):
-            self._quarantine.remove(capture_ids)
-        with self._database.transaction() as database:
-            database.executemany(
-                "DELETE FROM captures WHERE capture_id = ? AND state = ?",
-                [(capture_id, CaptureState.REMOVED) for capture_id in capture_ids])
-        self._database.truncate_log()
 
     def _conclude(
         self, database: Connection, capture_id: str, state: CaptureState, now: str, *,
@@ -403,10 +355,6 @@ class FolderStore:
             raise DamagedFaceError(capture_id, str(error)) from error
         return Packet(FaceDone(**common, face=fresh.message.face), fresh.arrays)
 
-    def _ids(self, which: str, *values: str | int) -> list[str]:
-        return [row["capture_id"] for row in self._database.rows(
-            f"SELECT capture_id FROM captures WHERE {which}", *values)]  # noqa: S608
-
 
 def _kept_frame(written: Written) -> KeptFrame:
     draft = written.draft
@@ -420,11 +368,3 @@ def _kept_face(written: Written) -> KeptFace:
     if not isinstance(draft.packet.message, Result) or not isinstance(draft.about, FaceAbout):
         raise TypeError(f"a face finishes a capture, found {draft.packet.message.kind}")
     return KeptFace(draft.packet.message, draft.packet.arrays, draft.about, written.checksum)
-
-
-@contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise store_error(path, error) from error

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 import service.kept
-import service.store
+import service.removal
 import service.writing
 from recon.settings import Settings
 from service import messages
@@ -47,7 +47,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.patches = [
             patch(f"{module.__name__}.{name}", self.last_step(name, getattr(module, name)))
             for module, name in ((service.kept, "write_parts"), (service.writing, "sync_folder"),
-                                 (service.store, "sync_folder"))]
+                                 (service.removal, "sync_folder"))]
         for one in self.patches:
             one.start()
         self.folder = Path(tempfile.mkdtemp(dir=_MEMORY if _MEMORY.is_dir() else None))

@@ -226,7 +226,7 @@ def test_a_removal_that_was_cut_short_is_finished(data, monkeypatch):
         raise StoreError("killed")
 
     with FolderStore(data, FakeClock()) as store:
-        monkeypatch.setattr(store, "_finish_removal", killed)
+        monkeypatch.setattr(store._removal, "_finish", killed)
         with pytest.raises(StoreError):
             store.remove(["done", "waits"])
     monkeypatch.undo()
@@ -293,14 +293,14 @@ def test_a_full_database_leaves_no_frame(data):
 
 def test_a_purge_makes_room_on_a_full_disk(data, monkeypatch):
     with FolderStore(data, FakeClock()) as store:
-        real = store._mark_removed
+        real = store._removal._mark
 
         def full(capture_ids):
             if (data / "ballast").exists():
                 raise DiskFullError("no room on the disk")
             real(capture_ids)
 
-        monkeypatch.setattr(store, "_mark_removed", full)
+        monkeypatch.setattr(store._removal, "_mark", full)
         assert (data / "ballast").stat().st_size == 2**20
         store.remove(["waits"])
         assert store.find("waits") is None
