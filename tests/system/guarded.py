@@ -3,7 +3,6 @@
 import contextlib
 import itertools
 import os
-import socket
 import subprocess
 import sys
 import tempfile
@@ -22,10 +21,13 @@ from service.keyring import Role, allow
 from service.keys import KeyPair, new_pair, read_pair, read_public
 from service.payload import FaceHeader, FrameHeader
 from service.wire import Packet, decode_from_hub, encode
+from tests.ports import free_port
 from tests.system.running import REPOSITORY, until
 from tests.unit.service.faces import small_face, small_frame
 
 WAIT_MS = 10_000
+_PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_LIVENESS": "100"}
+"""The peers here send no heartbeats: none is to count as gone before its test is through."""
 
 
 class Peer:
@@ -153,7 +155,7 @@ def guarded_hub(folder: Path, host: str = "127.0.0.1", port: int | None = None,
                  "sys.exit(main(sys.argv[1:]))", "hub", "--address", local, "--listen", address,
                  "--keys", str(keys), "--data", str(folder / "data")],
                 cwd=REPOSITORY, stderr=stderr, text=True,
-                env=os.environ | {"DENSEFACE_HEARTBEAT_S": "0.2"} | environment)
+                env=os.environ | _PACE | environment)
         hub = GuardedHub(process, local, address, keys, log)
         try:
             until(lambda: "listening" in log.read_text() or process.poll() is not None)
@@ -165,18 +167,6 @@ def guarded_hub(folder: Path, host: str = "127.0.0.1", port: int | None = None,
                 process.wait(10)
             finally:
                 process.kill()
-
-
-def free_port(host: str) -> int:
-    """Give a port that is free, and the next one too."""
-    for _ in range(100):
-        with socket.socket() as one, socket.socket() as two:
-            one.bind((host, 0))
-            port = one.getsockname()[1]
-            with contextlib.suppress(OSError, OverflowError):
-                two.bind((host, port + 1))
-                return int(port)
-    raise AssertionError("no two free ports")
 
 
 FRAME, FRAME_ARRAYS = FrameHeader.of(small_frame())
@@ -210,11 +200,16 @@ def press_through(hub: GuardedHub, capture_id: str) -> None:
             request=2, capture_id=capture_id, wait_s=10)).kind == "face_done"
         until(lambda: subscriber.socket.recv_multipart()[0] == b"faces")
     finally:
-        for one in (sensor, worker):
-            one.say(messages.Goodbye())
-        until(lambda: not hub.status().workers)
+        leave(hub, sensor, worker)
         for one in (sensor, worker, presser, subscriber):
             one.close()
+
+
+def leave(hub: GuardedHub, *peers: Peer) -> None:
+    """Have all sensors and workers say goodbye, and wait until the hub has heard it."""
+    for one in peers:
+        one.say(messages.Goodbye())
+    until(lambda: not hub.status().sensors + hub.status().workers)
 
 
 def happened(peer: Peer, *events: zmq.Event, within_ms: int = 15_000) -> bool:

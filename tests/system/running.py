@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import psutil
 
@@ -17,7 +18,11 @@ from service.messages import Status
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 RECORDINGS = REPOSITORY / "fixtures" / "recorded_oni"
-_HEARTBEAT_S = "0.2"
+_T = TypeVar("_T")
+
+PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_LIVENESS": "15"}
+"""Quick to say how things are, and as patient as in earnest: a busy machine stops a process for
+longer than three of these heartbeats."""
 
 
 def denseface(*arguments: object, **environment: str) -> "subprocess.CompletedProcess[str]":
@@ -51,9 +56,14 @@ class Service:
         return [up, *up.children(recursive=True)]
 
     def worker(self) -> psutil.Process:
-        """Give the process of the only worker."""
-        (name,) = self.status().workers
-        return psutil.Process(int(name.rpartition("/")[2]))
+        """Give the process of the only worker, once there is one alone and it lives."""
+        def only() -> psutil.Process | None:
+            pids = [int(name.rpartition("/")[2]) for name in self.status().workers]
+            return psutil.Process(*pids) if len(pids) == 1 and psutil.pid_exists(*pids) else None
+
+        worker = until(only)
+        assert worker
+        return worker
 
 
 @contextmanager
@@ -70,7 +80,7 @@ def service(
                 [sys.executable, "-m", "service", "up", "--source", str(source), "--data",
                  str(data), "--address", address, "--workers", "1", *map(str, arguments)],
                 cwd=REPOSITORY, stderr=stderr, text=True,
-                env=os.environ | (environment or {}) | {"DENSEFACE_HEARTBEAT_S": _HEARTBEAT_S})
+                env=os.environ | (environment or {}) | PACE)
         running = Service(process, address, data, log)
         try:
             if ready:
@@ -109,9 +119,10 @@ def hub_alone(address: str, data: Path, *arguments: str) -> Iterator[Path]:
         assert process.wait(10) == 0
 
 
-def until(true: Callable[[], bool], within_s: float = 30.0) -> None:
-    """Look again and again until something is so."""
+def until(true: Callable[[], _T], within_s: float = 30.0) -> _T:
+    """Look again and again until something is so, and give it."""
     deadline = time.monotonic() + within_s
-    while not true():
+    while not (found := true()):
         assert time.monotonic() < deadline, "did not come about"
         time.sleep(0.02)
+    return found

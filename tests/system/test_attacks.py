@@ -20,6 +20,7 @@ from service.keyring import Role, allow, revoke
 from service.keys import KeyPair, new_pair, read_pair, read_public
 from service.payload import MAX_ARRAY_BYTES
 from service.wire import Packet, encode
+from tests.ports import free_port
 from tests.system.guarded import (
     FACE,
     FACE_ARRAYS,
@@ -27,7 +28,6 @@ from tests.system.guarded import (
     FRAME_ARRAYS,
     PRESS,
     as_role,
-    free_port,
     guarded_hub,
     happened,
     press_through,
@@ -37,7 +37,7 @@ from tests.system.running import REPOSITORY, denseface, until
 # --- no way in without a hub key, an allowed key and an authenticator
 
 def test_without_keys_the_hub_does_not_open_the_door(tmp_path):
-    keys, address = tmp_path / "keys", f"tcp://127.0.0.1:{free_port('127.0.0.1')}"
+    keys, address = tmp_path / "keys", f"tcp://127.0.0.1:{free_port()}"
     hub = ("hub", "--address", f"ipc://{tmp_path}/h"[:90], "--listen", address, "--keys", keys,
            "--data", tmp_path / "data")
     for wrong, mend in (("no hub key", lambda: new_pair(keys, "hub")),

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from service.export import load_face
+from tests.ports import free_port
 from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, until
 
 FRONTAL = RECORDINGS / "frontal_700.oni"
@@ -70,7 +71,7 @@ def test_ctrl_c_ends_a_waiting_command_quietly(command, tmp_path):
 
 
 def test_the_log_is_json_when_asked_for(tmp_path):
-    address = f"tcp://127.0.0.1:{21000 + os.getpid() % 20000}"
+    address = f"tcp://127.0.0.1:{free_port()}"
     with hub_alone(address, tmp_path / "data", "--log", "json") as log:
         until(lambda: "listening" in log.read_text())
     for line in log.read_text().splitlines():

@@ -17,10 +17,12 @@ from service.client import Client
 from service.export import load_face
 from service.keyring import Role, allow
 from service.keys import new_pair, read_public
-from tests.system.guarded import free_port
-from tests.system.running import RECORDINGS, REPOSITORY, until
+from tests.ports import free_port
+from tests.system.running import PACE, RECORDINGS, REPOSITORY, until
 
-_HERE, _THERE = "10.231.77.1", "10.231.77.2"
+# Of this run alone: another on the same machine has addresses of its own.
+_HERE, _THERE = (f"10.231.{os.getpid() % 256}.{os.getpid() // 256 % 63 * 4 + end}"
+                 for end in (1, 2))
 
 
 def _ip(*arguments: str) -> None:
@@ -61,7 +63,7 @@ def test_a_face_is_made_on_another_machine(machines, tmp_path):
     guarded = f"tcp://{host}:{free_port(host)}"
     to_hub = ("--hub", guarded, "--key", str(secret), "--hub-key", str(hub_key))
     environment = {name: value for name, value in os.environ.items()
-                   if name != "DENSEFACE_ADDRESS"} | {"DENSEFACE_HEARTBEAT_S": "0.2"}
+                   if name != "DENSEFACE_ADDRESS"} | PACE
     with tempfile.TemporaryDirectory(prefix="df-") as folder, contextlib.ExitStack() as running:
         local = f"ipc://{folder}/hub"
 

@@ -12,6 +12,7 @@ import zmq
 from service import messages
 from service.errors import ClientTimeoutError, KeyRefusedError
 from service.keyring import Role, revoke
+from service.operator import Operator
 from service.wire import Packet, encode
 from tests.system.guarded import (
     FACE,
@@ -21,6 +22,7 @@ from tests.system.guarded import (
     PRESS,
     as_role,
     happened,
+    leave,
 )
 from tests.system.running import until
 
@@ -57,8 +59,7 @@ def test_a_revoked_worker_s_job_goes_to_another(hub, knock, refused):
                              frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
     good.say(messages.WorkerReady(name="good", credit=0))
     refused("replayed", by=2)
-    for peer in (sensor, good):
-        peer.say(messages.Goodbye())
+    leave(hub, sensor, good)
 
 
 def test_a_revoked_key_that_floods_is_cut_off(hub, knock, refused):
@@ -163,6 +164,8 @@ def test_the_wrong_role_is_told_so(hub, knock, refused, role, message):
     refused("role")
     status = hub.status()
     assert "evil" not in status.sensors + status.workers
+    with Operator(hub.local) as operator:
+        operator.purge(capture_id="foreign")
 
 
 @pytest.mark.parametrize(("role", "message", "arrays"), [
@@ -191,7 +194,7 @@ def _foreign(hub, knock):
     sensor.say(messages.Frame(capture_id="foreign", frame=FRAME), FRAME_ARRAYS)
     presser.hears("press_accepted")
     assert presser.ask(messages.GetFace(request=2, capture_id="foreign")).kind == "capture_pending"
-    sensor.say(messages.Goodbye())
+    leave(hub, sensor)
 
 
 @pytest.mark.parametrize("role", ["worker", "sensor", "presser", "operator"])

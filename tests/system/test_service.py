@@ -19,6 +19,7 @@ from service.errors import (
     UnknownCaptureError,
 )
 from service.export import load_face
+from tests.ports import free_port
 from tests.system.running import RECORDINGS, denseface, hub_alone, service, sockets, until
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.process import environment, play
@@ -219,9 +220,7 @@ def test_without_a_hub_the_client_says_so(tmp_path):
 
 
 def test_a_press_without_a_sensor_is_refused(tmp_path):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = f"tcp://127.0.0.1:{probe.getsockname()[1]}"
+    address = f"tcp://127.0.0.1:{free_port()}"
     with hub_alone(address, tmp_path / "data"), Client(address) as client:
         with pytest.raises(PressRefusedError, match="no sensor"):
             client.press(timeout=20)

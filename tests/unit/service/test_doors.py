@@ -16,6 +16,7 @@ from service.keys import KeyPair, new_pair, read_public
 from service.memory import MemoryWatch
 from service.refusals import Refusals
 from service.settings import ServiceSettings
+from tests.ports import free_port
 
 
 class _Never:
@@ -42,10 +43,8 @@ def wakes():
         end.close()
 
 
-def _address(host="127.0.0.1", family=socket.AF_INET):
-    with socket.socket(family) as probe:
-        probe.bind((host, 0))
-        return f"tcp://{f'[{host}]' if ':' in host else host}:{probe.getsockname()[1]}"
+def _address(host="127.0.0.1"):
+    return f"tcp://{f'[{host}]' if ':' in host else host}:{free_port(host)}"
 
 
 def _until(entrance, true):
@@ -60,7 +59,7 @@ def _until(entrance, true):
 
 def test_a_door_on_the_other_loopback(context):
     try:
-        address = _address("::1", socket.AF_INET6)
+        address = _address("::1")
     except OSError:
         pytest.skip("this machine has no IPv6")
     door = Door(context, address, None, Refusals(Counters()))
