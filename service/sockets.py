@@ -65,19 +65,17 @@ def publish_parts(publisher: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bo
     It went to the others all the same. While a queue stays full libzmq passes over it unseen, so
     what is counted is how often a subscriber fell behind, not how much it missed.
     """
+    # Has libzmq take note of what was read meanwhile. It does not look at every sending: it would
+    # take a subscriber that keeps up for one that does not, and pass over one that has caught up.
+    publisher.get(zmq.EVENTS)
     publisher.set(zmq.XPUB_NODROP, 1)
-    for _ in range(2):
-        try:
-            publisher.send_multipart(parts, flags=zmq.DONTWAIT, copy=False)
-        except zmq.Again:
-            # Has libzmq take note of what was read meanwhile: it does not look at every sending,
-            # and would take a subscriber that keeps up for one that does not.
-            publisher.get(zmq.EVENTS)
-        else:
-            return True
-    publisher.set(zmq.XPUB_NODROP, 0)
-    publisher.send_multipart(parts, flags=zmq.DONTWAIT, copy=False)
-    return False
+    try:
+        publisher.send_multipart(parts, flags=zmq.DONTWAIT, copy=False)
+    except zmq.Again:
+        publisher.set(zmq.XPUB_NODROP, 0)
+        publisher.send_multipart(parts, flags=zmq.DONTWAIT, copy=False)
+        return False
+    return True
 
 
 def receive_parts(

@@ -6,7 +6,7 @@ from service.client import Client
 from service.errors import UnknownCaptureError
 from service.keys import read_pair
 from tests.system.guarded import Peer, guarded_hub, press_through
-from tests.system.running import until
+from tests.waiting import until
 
 
 @pytest.fixture(scope="module")

@@ -22,8 +22,9 @@ from service.keys import KeyPair, new_pair, read_pair, read_public
 from service.payload import FaceHeader, FrameHeader
 from service.wire import Packet, decode_from_hub, encode
 from tests.ports import free_port
-from tests.system.running import REPOSITORY, until
+from tests.system.running import REPOSITORY
 from tests.unit.service.faces import small_face, small_frame
+from tests.waiting import until
 
 WAIT_MS = 10_000
 _PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_LIVENESS": "100"}

@@ -4,22 +4,19 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 import psutil
 
 from service.client import Client
 from service.messages import Status
+from tests.waiting import until
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 RECORDINGS = REPOSITORY / "fixtures" / "recorded_oni"
-_T = TypeVar("_T")
-
 PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_LIVENESS": "15"}
 """Quick to say how things are, and as patient as in earnest: a busy machine stops a process for
 longer than three of these heartbeats."""
@@ -117,12 +114,3 @@ def hub_alone(address: str, data: Path, *arguments: str) -> Iterator[Path]:
     finally:
         process.terminate()
         assert process.wait(10) == 0
-
-
-def until(true: Callable[[], _T], within_s: float = 30.0) -> _T:
-    """Look again and again until something is so, and give it."""
-    deadline = time.monotonic() + within_s
-    while not (found := true()):
-        assert time.monotonic() < deadline, "did not come about"
-        time.sleep(0.02)
-    return found

@@ -11,7 +11,8 @@ import pytest
 
 from service.export import load_face
 from tests.ports import free_port
-from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, until
+from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone
+from tests.waiting import until
 
 FRONTAL = RECORDINGS / "frontal_700.oni"
 SHARED = Path(os.environ.get("DENSEFACE_SHARED", REPOSITORY.parent / "shared"))

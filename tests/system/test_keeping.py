@@ -16,14 +16,23 @@ from recon.settings import Settings
 from service.client import Client
 from service.errors import PressRefusedError, UnknownCaptureError
 from service.hub import settings_hash
-from service.messages import Frame, FrameAccepted, Heartbeat, Result, SensorReady, Take
+from service.messages import (
+    Announce,
+    Frame,
+    FrameAccepted,
+    Heartbeat,
+    Result,
+    SensorReady,
+    Take,
+)
 from service.operator import Operator
 from service.payload import FaceHeader, FrameHeader
 from service.store import FolderStore
 from service.wire import Packet, decode_from_hub, encode
-from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, service, until
+from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, service
 from tests.unit.service.faces import small_face, small_frame
 from tests.unit.service.keep import accept, finish
+from tests.waiting import until
 
 FRAME, FRAME_ARRAYS = FrameHeader.of(small_frame())
 FACE, FACE_ARRAYS = FaceHeader.of(small_face())
@@ -121,7 +130,8 @@ def sensor(address):
         with zmq.Context() as context, context.socket(zmq.DEALER) as dealer:
             dealer.linger = 0
             dealer.connect(address)
-            dealer.send_multipart(encode(Packet(SensorReady(name="s", source="x"))))
+            ready = encode(Packet(SensorReady(name="s", source="x")))
+            dealer.send_multipart(ready)
             while not stop.is_set():
                 if not dealer.poll(200):
                     dealer.send_multipart(encode(Packet(Heartbeat())))
@@ -130,6 +140,8 @@ def sensor(address):
                 if isinstance(message, Take):
                     dealer.send_multipart(encode(Packet(
                         Frame(capture_id=message.capture_id, frame=FRAME), FRAME_ARRAYS)))
+                elif isinstance(message, Announce):
+                    dealer.send_multipart(ready)
                 elif isinstance(message, FrameAccepted):
                     accepted.append(message.capture_id)
 

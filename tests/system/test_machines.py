@@ -18,7 +18,8 @@ from service.export import load_face
 from service.keyring import Role, allow
 from service.keys import new_pair, read_public
 from tests.ports import free_port
-from tests.system.running import PACE, RECORDINGS, REPOSITORY, until
+from tests.system.running import PACE, RECORDINGS, REPOSITORY
+from tests.waiting import until
 
 # Of this run alone: another on the same machine has addresses of its own.
 _HERE, _THERE = (f"10.231.{os.getpid() % 256}.{os.getpid() // 256 % 63 * 4 + end}"

@@ -24,7 +24,7 @@ from tests.system.guarded import (
     happened,
     leave,
 )
-from tests.system.running import until
+from tests.waiting import until
 
 # --- revoked while connected
 

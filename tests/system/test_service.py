@@ -20,9 +20,10 @@ from service.errors import (
 )
 from service.export import load_face
 from tests.ports import free_port
-from tests.system.running import RECORDINGS, denseface, hub_alone, service, sockets, until
+from tests.system.running import RECORDINGS, denseface, hub_alone, service, sockets
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.process import environment, play
+from tests.waiting import until
 
 
 @pytest.fixture(scope="module")

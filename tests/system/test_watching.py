@@ -12,9 +12,10 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from denseface import AsyncClient
-from tests.system.running import RECORDINGS, REPOSITORY, service, until
+from tests.system.running import RECORDINGS, REPOSITORY, service
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.process import environment, play
+from tests.waiting import until
 
 
 @pytest.fixture(scope="module")

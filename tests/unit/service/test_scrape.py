@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from service import scrape
 from service.errors import AddressError
 from service.loopback import loopback_place
 from service.scrape import ScrapeServer
@@ -34,8 +33,7 @@ def asked():
 
 
 @pytest.fixture
-def server(asked, monkeypatch):
-    monkeypatch.setattr(scrape, "_REQUEST_S", 0.2)
+def server(asked):
     with ScrapeServer(("127.0.0.1", 0), lambda: b"figures 1\n", asked.health) as server:
         yield server
 

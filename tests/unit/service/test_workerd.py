@@ -39,7 +39,7 @@ class Link:
     def send(self, message, _=None):
         if message.kind == "heartbeat":
             self.gate.release()
-            return True
+            return self.up
         if self.up:
             self.sent.append((message.kind, getattr(message, "capture_id", None)
                               or getattr(message, "credit", None)))
