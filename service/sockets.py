@@ -62,8 +62,8 @@ def send_parts(socket: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bool:
 def publish_parts(publisher: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bool:
     """Send to all subscribers of an XPUB; False where the queue of one at least was found full.
 
-    It went to the others all the same. While a queue stays full libzmq passes over it unseen, so
-    what is counted is how often a subscriber fell behind, not how much it missed.
+    It went to the others all the same. Until half of a full queue is taken libzmq passes over it
+    unseen, so what is counted is how often a subscriber fell behind, not how much it missed.
     """
     # Has libzmq take note of what was read meanwhile. It does not look at every sending: it would
     # take a subscriber that keeps up for one that does not, and pass over one that has caught up.
