@@ -17,7 +17,6 @@ _MAX_WAITERS = 1000
 @dataclass(frozen=True)
 class _Waiter:
     capture_id: str
-    request: int
     deadline: float
 
 
@@ -28,8 +27,8 @@ class Outcomes:
         """Publish and give; `remake` takes up a damaged face, True where it was kept before."""
         self._store = store
         self._remake = remake
-        self._waiters: dict[bytes, _Waiter] = {}
-        """A client waits for one capture at a time."""
+        self._waiters: dict[tuple[bytes, int], _Waiter] = {}
+        """By client and request."""
 
     def concluded(self, capture_id: str) -> Iterator[Output]:
         """Publish the outcome of a capture and answer those who wait for it."""
@@ -40,20 +39,19 @@ class Outcomes:
             return
         if packet:
             yield Publish(Topic.FACES, packet)
-            for peer, waiter in self._take_waiters([capture_id]):
-                yield _answer(peer, waiter.request, packet)
+            for peer, request, _ in self._take_waiters([capture_id]):
+                yield _answer(peer, request, packet)
 
     def removed(self, capture_ids: Collection[str]) -> Iterator[Output]:
         """Answer those who wait for captures that are gone."""
-        for peer, waiter in self._take_waiters(capture_ids):
-            yield send(peer, messages.CaptureUnknown(
-                request=waiter.request, capture_id=waiter.capture_id))
+        for peer, request, capture_id in self._take_waiters(capture_ids):
+            yield send(peer, messages.CaptureUnknown(request=request, capture_id=capture_id))
 
-    def _take_waiters(self, capture_ids: Collection[str]) -> list[tuple[bytes, _Waiter]]:
-        waiting = [(peer, waiter) for peer, waiter in self._waiters.items()
+    def _take_waiters(self, capture_ids: Collection[str]) -> list[tuple[bytes, int, str]]:
+        waiting = [(*key, waiter.capture_id) for key, waiter in self._waiters.items()
                    if waiter.capture_id in capture_ids]
-        for peer, _ in waiting:
-            del self._waiters[peer]
+        for peer, request, _ in waiting:
+            del self._waiters[peer, request]
         return waiting
 
     def get_face(self, now: float, peer: bytes, message: messages.GetFace) -> Iterator[Output]:
@@ -68,8 +66,10 @@ class Outcomes:
             yield _answer(peer, request, packet)
         elif self._store.find(capture_id) is None:
             yield send(peer, messages.CaptureUnknown(request=request, capture_id=capture_id))
+        elif (peer, request) in self._waiters:
+            return  # a repeat: its wait does not begin anew
         elif message.wait_s > 0 and len(self._waiters) < _MAX_WAITERS:
-            self._waiters[peer] = _Waiter(capture_id, request, now + message.wait_s)
+            self._waiters[peer, request] = _Waiter(capture_id, now + message.wait_s)
         else:
             yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
 
@@ -100,10 +100,10 @@ class Outcomes:
 
     def tick(self, now: float) -> Iterator[Output]:
         """Answer those who waited long enough."""
-        for peer in [peer for peer, waiter in self._waiters.items() if now >= waiter.deadline]:
-            waiter = self._waiters.pop(peer)
+        for peer, request in [key for key, one in self._waiters.items() if now >= one.deadline]:
+            waiter = self._waiters.pop((peer, request))
             yield send(peer, messages.CapturePending(
-                request=waiter.request, capture_id=waiter.capture_id))
+                request=request, capture_id=waiter.capture_id))
 
 
 def _answer(peer: bytes, request: int, packet: Packet) -> Send:

@@ -20,6 +20,10 @@ from tests.chaos.scene import Scene
 from tests.chaos.source import CHEAP, write_small_frame
 from tests.system.running import REPOSITORY
 
+PATIENT = {"DENSEFACE_LIVENESS": "15"}
+"""For scenes in which a press is refused only for the reason at hand: a sensor that a busy machine
+stopped for half a second would be given up."""
+
 
 @pytest.fixture(scope="module", autouse=True)
 def quick_client():
@@ -106,7 +110,7 @@ def test_whoever_hangs_is_given_up_and_may_come_back_late(scene):
 def test_a_full_disk_refuses_presses_and_keeps_what_was_accepted(scene):
     full = {"hub.frame.synced": "raise:ENOSPC", "hub.frame.renamed": "raise:EIO",
             "hub.face.written": "raise:ENOSPC", "hub.face.renamed": "raise:EIO"}
-    running = scene(actions=full)
+    running = scene(actions=full, environment=PATIENT)
     for name, reason in (("hub.frame.synced", "no room on the disk"),
                          ("hub.frame.renamed", "the disk fails")):
         fail_at(running, name)
@@ -122,7 +126,7 @@ def test_a_full_disk_refuses_presses_and_keeps_what_was_accepted(scene):
 
 
 def test_spoiled_frames_end_as_dead_letters_and_the_rest_goes_on(scene):
-    running = scene()
+    running = scene(environment=PATIENT)
     running.cluster.workers[0].end()
     pressed = running.press("p", 3)
     until(pressed.done, "three accepted presses")

@@ -383,6 +383,28 @@ def test_waiting_for_a_face_ends(bench):
         (CLIENT, "capture_unknown")]
 
 
+def test_repeating_a_request_does_not_prolong_its_wait(bench):
+    bench.accepted("a")
+    ask = messages.GetFace(request=5, capture_id="a", wait_s=2)
+    for _ in range(3):
+        assert bench.say(CLIENT, ask) == []
+        assert bench.wait(0.6) == []
+    assert kinds(bench.wait(0.3)) == [(CLIENT, "capture_pending")]
+
+
+def test_a_client_may_wait_for_several_captures(bench):
+    bench.accepted("a", "b")
+    for request, capture_id in ((5, "a"), (6, "b"), (7, "a")):
+        assert bench.say(CLIENT, messages.GetFace(
+            request=request, capture_id=capture_id, wait_s=9)) == []
+    bench.worker()
+    assert [(one.kind, one.request) for peer, one in bench.result("a") if peer == CLIENT] == [
+        ("face_done", 5), ("face_done", 7)]
+    bench.worker(credit=1)
+    assert [(one.kind, one.request) for peer, one in bench.result("b") if peer == CLIENT] == [
+        ("face_done", 6)]
+
+
 def test_outcomes_can_be_asked_for_in_order(bench):
     bench.accepted("a", "b")
     bench.worker()
