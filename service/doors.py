@@ -236,7 +236,7 @@ class Door:
         try:
             socket.bind(address)
         except zmq.ZMQError as error:
-            raise AddressError(f"{address}: {error.strerror}") from error
+            raise AddressError(f"{address}: {zmq.strerror(error.errno or 0)}") from error
 
     def _user(self, first: zmq.Frame) -> Allowed | None:
         if self._guard is None:

@@ -5,6 +5,7 @@ durable goes through the store before the message that says so is given out. The
 is the table in `service.states`.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from hashlib import sha256
 from importlib.metadata import version
@@ -51,12 +52,13 @@ class Hub:
     figures : what the status says of this process
     refusals : counts what was not let through
     writer : writes the files; what it has ended is taken at each call
+    opened : since when sensors can reach it, seconds
     """
 
     def __init__(
         self, store: Store, settings: ServiceSettings, recon: Settings,
         figures: Figures | None = None, refusals: Refusals | None = None,
-        writer: Writer | None = None,
+        writer: Writer | None = None, opened: float = -math.inf,
     ) -> None:
         self._store = store
         self._writer = writer = writer or AtOnce()
@@ -68,7 +70,7 @@ class Hub:
         self._jobs = Jobs(store, writer, self._roster, settings.attempts,
                           self._outcomes.concluded, self._refusals)
         self._intake = Intake(store, writer, self._roster, settings, recon, settings_hash(recon),
-                              self._jobs.add)
+                              self._jobs.add, opened + settings.silence_s)
         self._keeper = Keeper(
             store, settings, self._intake, self._jobs, self._outcomes, self._figures.counters)
         self._viewfinder = Viewfinder(self._roster, settings.heartbeat_s)

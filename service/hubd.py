@@ -54,7 +54,7 @@ def run(settings: ServiceSettings, recon: Settings) -> int:
         refusals = Refusals(observer.figures.counters)
         entrance = Entrance(context, settings, refusals, (stop, writer))
         try:
-            hub = Hub(store, settings, recon, observer.figures, refusals, writer)
+            hub = Hub(store, settings, recon, observer.figures, refusals, writer, time.monotonic())
             loop = _Loop(entrance, hub, refusals, observer, writer)
             log.info("listening", address=" ".join(entrance.addresses), data=str(settings.data))
             with _scrapes(settings, observer):

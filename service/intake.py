@@ -45,12 +45,16 @@ class Intake:
 
     def __init__(
         self, store: Store, writer: Writer, roster: Roster, settings: ServiceSettings,
-        recon: Settings, recon_hash: str, accepted: Callable[[str], None],
+        recon: Settings, recon_hash: str, accepted: Callable[[str], None], all_here: float,
     ) -> None:
-        """Take presses; `accepted` is told of each frame that is safe."""
+        """Take presses; `accepted` is told of each frame that is safe.
+
+        Until the time `all_here`, sensors may not have had time to say that they are there.
+        """
         self._store = store
         self._writer = writer
         self._accepted = accepted
+        self._all_here = all_here
         self._roster = roster
         self._settings = settings
         self._recon = recon
@@ -80,6 +84,8 @@ class Intake:
             yield send(peer, messages.PressAccepted(request=request, capture_id=capture_id))
             return
         sensor = self._roster.sensor()
+        if sensor is None and now < self._all_here:
+            return  # the client repeats it in a moment
         obstacle = self._obstacle(queued)
         if sensor is None or obstacle:
             reason, why = obstacle or ("no_sensor", "no sensor is connected")

@@ -112,7 +112,7 @@ class Talks:
 
     def press(self, capture_id: str | None, timeout: float) -> Talk[str]:
         """See `Client.press`."""
-        chosen = capture_id or uuid.uuid4().hex
+        chosen = uuid.uuid4().hex if capture_id is None else capture_id
         try:
             message = messages.Press(request=self.number(), capture_id=chosen)
         except ValidationError as error:

@@ -11,7 +11,9 @@ import structlog
 
 from recon import ReconstructionError, reconstruct, warm
 from recon.face import Face
+from service.addresses import check_connectable
 from service.background import Background
+from service.credentials import Credentials
 from service.failpoints import failpoint
 from service.link import HubLink
 from service.messages import Announce, Heartbeat, Job, JobFailed, Result, WorkerReady
@@ -32,7 +34,14 @@ def run(settings: ServiceSettings) -> int:
     """Work until SIGINT or SIGTERM and give the exit status.
 
     The job under way is finished, or handed back to the hub where that takes too long.
+
+    Raises
+    ------
+    SettingsError
+        Where the address or a key cannot be used.
     """
+    check_connectable(settings.address)  # what is wrong with these is said before it is warm
+    Credentials.of(settings)
     cv2.setNumThreads(1)  # one worker for each core; more threads would only fight
     with StopSignal() as stop:
         begun = time.monotonic()

@@ -121,6 +121,7 @@ def test_what_was_accepted_survives_a_killed_hub(running):
         epoch = client.status().epoch
         hub.kill()
         hub.wait(10)
+        client.press("at-once")  # a hub that is starting refuses nobody
         for one in running.family():
             if "worker" in one.cmdline():
                 one.resume()

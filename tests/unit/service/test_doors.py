@@ -81,7 +81,7 @@ def test_a_door_on_the_other_loopback(context):
 def test_an_address_in_use_is_named(context):
     address = _address()
     door = Door(context, address, None, Refusals(Counters()))
-    with pytest.raises(AddressError, match=rf"{address}: Address already in use"):
+    with pytest.raises(AddressError, match=rf"^{address}: Address already in use$"):
         Door(context, address, None, Refusals(Counters()))
     door.close()
 

@@ -383,6 +383,20 @@ def test_waiting_for_a_face_ends(bench):
         (CLIENT, "capture_unknown")]
 
 
+def test_a_hub_that_has_just_started_waits_for_its_sensor(tmp_path):
+    with FolderStore(tmp_path / "data") as store:
+        hub = Hub(store, SETTINGS, Settings(), opened=100.0)
+        bench = Bench(hub, store, 100.0)
+        assert bench.press() == []
+        bench.now += SETTINGS.silence_s - 0.1
+        assert bench.press() == []
+        bench.sensor()
+        assert kinds(bench.press()) == [(SENSOR, "take")]
+        bench.say(SENSOR, messages.Goodbye())
+        bench.now += 0.1
+        assert kinds(bench.press("b", request=8)) == [(CLIENT, "press_refused")]
+
+
 def test_repeating_a_request_does_not_prolong_its_wait(bench):
     bench.accepted("a")
     ask = messages.GetFace(request=5, capture_id="a", wait_s=2)
