@@ -9,6 +9,7 @@ import socket
 import time
 from collections import deque
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 import structlog
@@ -40,6 +41,8 @@ __all__ = ["run"]
 
 _CLOSING_S = 3.0
 """Longest wait at the end for a frame under way, seconds."""
+_LONGEST_PAUSE_S = 30.0
+"""Between two tries to have the hub take a frame, seconds."""
 
 
 def run(settings: ServiceSettings, uri: str, calibration: Path | None = None) -> int:
@@ -74,6 +77,16 @@ def _close(driver: Background[RgbdFrame | None], sensor: Sensor) -> None:
     driver.take()
 
 
+@dataclass
+class _Unsafe:
+    """A frame that is sent until the hub says that it is safe."""
+
+    frame: RgbdFrame
+    due: float
+    """When it is to be sent again, seconds."""
+    pause_s: float
+
+
 class _Capture:
     def __init__(
         self, settings: ServiceSettings, link: HubLink, sensor: Sensor,
@@ -89,8 +102,8 @@ class _Capture:
         self._preview_asked = False
         self._looking = False
         """The call under way is for a preview."""
-        self._unsafe: dict[str, tuple[RgbdFrame, float]] = {}
-        """Frames that the hub has not yet said are safe, and when each is to be sent again."""
+        self._unsafe: dict[str, _Unsafe] = {}
+        """Frames that the hub has not yet said are safe."""
 
     def serve(self, stop: StopSignal) -> None:
         self._driver.start(self._sensor.open)
@@ -118,7 +131,7 @@ class _Capture:
             case Take(capture_id=capture_id):
                 failpoint("capture.take.received")
                 if capture_id in self._unsafe:
-                    self._send(capture_id, self._unsafe[capture_id][0])
+                    self._send_once_more(capture_id)
                 elif capture_id not in self._asked:
                     self._asked.append(capture_id)
             case TakePreview():
@@ -177,15 +190,22 @@ class _Capture:
             {"image": image})
 
     def _send(self, capture_id: str, frame: RgbdFrame) -> None:
-        header, arrays = FrameHeader.of(frame)
-        self._unsafe[capture_id] = frame, time.monotonic() + self._settings.resend_s
+        self._unsafe[capture_id] = _Unsafe(frame, 0.0, self._settings.resend_s)
+        self._send_once_more(capture_id)
+
+    def _send_once_more(self, capture_id: str) -> None:
+        unsafe = self._unsafe[capture_id]
+        unsafe.due = time.monotonic() + unsafe.pause_s
+        header, arrays = FrameHeader.of(unsafe.frame)
         self._link.send(Frame(capture_id=capture_id, frame=header), arrays)
         failpoint("capture.frame.sent")
 
     def _send_again(self) -> None:
         """Repeat what got no answer: the hub accepts it, or says that nobody waits any more."""
         now = time.monotonic()
-        for capture_id, (frame, due) in list(self._unsafe.items()):
-            if now >= due:
-                self._log.warning("frame not acknowledged, sent again", capture_id=capture_id)
-                self._send(capture_id, frame)
+        for capture_id, unsafe in self._unsafe.items():
+            if now >= unsafe.due:
+                unsafe.pause_s = min(2 * unsafe.pause_s, _LONGEST_PAUSE_S)
+                self._log.warning("frame not acknowledged, sent again", capture_id=capture_id,
+                                  next_in_s=unsafe.pause_s)
+                self._send_once_more(capture_id)

@@ -294,6 +294,25 @@ def test_depth_without_sense_is_a_named_error_or_a_sound_face(shot, seed):
     check_sound(one)
 
 
+@pytest.mark.parametrize("size", [(320, 240), (1280, 960)])
+def test_frames_of_half_and_twice_the_size(face, shot, size):
+    def resized(image):
+        rows, columns = (np.arange(new) * old // new
+                         for new, old in zip(size[::-1], image.shape, strict=False))
+        return np.ascontiguousarray(image[np.ix_(rows, columns)])
+
+    known, factor = shot.frame.calibration, size[0] / 640
+    one = reconstruct(replace(
+        shot.frame, depth=resized(shot.frame.depth), color=resized(shot.frame.color),
+        calibration=known.model_copy(update={
+            "depth": known.depth.scaled(factor), "color": known.color.scaled(factor)})))
+    check_sound(one)
+    assert len(one.initial) == pytest.approx(factor**2 * len(face.initial), rel=0.03)
+    errors = shot.truth.surface_distance(one.dense.points)
+    assert errors.mean() < 0.75
+    assert (errors > 5.5).mean() < 0.001
+
+
 def test_a_sharper_colour_camera_leaves_the_same_seeds(face, shot):
     """What is measured in depth pixels must not be counted in the colour camera's."""
     known = shot.frame.calibration

@@ -47,7 +47,12 @@ class Driver:
 
 
 class Link:
-    """Tells the process one thing after the other and notes what it says and does."""
+    """Tells the process one thing after the other and notes what it says and does.
+
+    A number in its script is so many seconds.
+    """
+
+    now = 0.0
 
     def __init__(self, driver, script):
         self.driver = driver
@@ -62,6 +67,9 @@ class Link:
         for one in self.script:
             if one is ENDED:
                 self.driver.done = True
+                yield None
+            elif isinstance(one, float):
+                Link.now += one
                 yield None
             else:
                 yield Packet(one)
@@ -127,6 +135,18 @@ def test_a_recording_s_press_takes_the_frame_that_was_looked_at():
 
 def test_no_preview_while_a_frame_is_not_safe():
     assert served(Eye(live=False), take("a"), ENDED, LOOK) == (["a"], ["take"])
+
+
+def test_a_frame_that_is_not_acknowledged_is_sent_again_at_growing_intervals(monkeypatch):
+    def times(seconds, *then):
+        monkeypatch.setattr(Link, "now", 0.0)
+        return len(served(Eye(live=False), take("a"), ENDED, *[1.0] * seconds, *then)[0])
+
+    monkeypatch.setattr("service.captured.time.monotonic", lambda: Link.now)
+    sent = [times(seconds) for seconds in range(91)]
+    assert [seconds for seconds in range(1, 91) if sent[seconds] > sent[seconds - 1]] == [
+        2, 6, 14, 30, 60, 90]
+    assert times(3, safe("a"), *[1.0] * 90) == times(3)
 
 
 def test_a_preview_that_fails_is_no_frame_that_fails():

@@ -1,10 +1,14 @@
 """The process table and its supervisor."""
 
+import os
 import signal
+import threading
+from pathlib import Path
 
 import pytest
 
 from service.supervisor import ProcessSpec, Supervisor, _Process, processes
+from tests.waiting import until
 
 
 def test_the_table_names_what_runs():
@@ -40,6 +44,27 @@ def test_a_storm_ends_all_with_status_1(monkeypatch):
     monkeypatch.setattr("service.supervisor._STORM_RESTARTS", 1)
     assert Supervisor([ProcessSpec("x", ("status", "--address", "ipc:///none", "--wait", "0.01"))
                        ]).run() == 1
+
+
+def test_whoever_does_not_end_in_time_is_killed(tmp_path, monkeypatch, capsys):
+    stubborn = tmp_path / "stubborn"
+    stubborn.write_text("#!/bin/sh\ntrap '' TERM\necho $$ >\"$(dirname \"$0\")/pid\"\n"
+                        "while :; do sleep 1; done\n")
+    stubborn.chmod(0o700)
+    monkeypatch.setattr("service.supervisor.sys.executable", str(stubborn))
+    monkeypatch.setattr("service.supervisor._GRACE_S", 0.2)
+    pid = tmp_path / "pid"
+
+    def stop():
+        until(lambda: pid.exists() and pid.read_text())
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    stopper = threading.Thread(target=stop)
+    stopper.start()
+    assert Supervisor([ProcessSpec("x", ())]).run() == 0
+    stopper.join()
+    assert not Path("/proc", pid.read_text().strip()).exists()
+    assert "killed" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
