@@ -29,9 +29,11 @@ def after_segmentation(case: Case, known: Settings) -> Callable[[], object]:
     registered = register(frame, known.depth_offset_mm)
     seeds = segment_face(registered, case.face.report.face_box, frame.calibration.color.fx)
 
+    looked_up = partial(look_up, frame, registered)
+
     def call() -> object:
         spacing = mean_spacing(seeds.points, seeds.pixels, known.neighbors)
-        return densify(seeds, surface_of(seeds.points, spacing, known), spacing, known.ratio,
-                       noise_share(known), partial(look_up, frame, registered))
+        surface = surface_of(seeds.points, spacing, known, looked_up)
+        return densify(seeds, surface, spacing, known.ratio, noise_share(known), looked_up)
 
     return call

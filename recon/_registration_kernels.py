@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["EMPTY", "look", "project", "see"]
+__all__ = ["EMPTY", "look", "project", "project_points", "see"]
 
 EMPTY = np.float32(1e30)
 """Where nothing is in the z-buffer, mm; no infinity, which compiled code may take for no number."""
@@ -79,6 +79,34 @@ def project(
                 top, bottom = min(top, row), max(bottom, row)
                 left, right = min(left, column), max(right, column)
     return top, bottom, left, right
+
+
+@compiled
+def project_points(
+    points: NDArray[np.float32], rotation: NDArray[np.float64],
+    translation: NDArray[np.float64], camera: NDArray[np.float64], pixels: NDArray[np.float32],
+    color_depth: NDArray[np.float32],
+) -> None:
+    """Move points, (1, n, 3), to the colour camera, and project them there, as `project` does.
+
+    pixels, color_depth : (1, n, 2) and (1, n), written; the last 0 behind the camera
+    """
+    _, _, fx, fy, cx, cy, k1, k2, p1, p2, k3 = camera
+    r00, r01, r02 = rotation[0, 0], rotation[0, 1], rotation[0, 2]
+    r10, r11, r12 = rotation[1, 0], rotation[1, 1], rotation[1, 2]
+    r20, r21, r22 = rotation[2, 0], rotation[2, 1], rotation[2, 2]
+    t0, t1, t2 = translation
+    for i in range(points.shape[1]):
+        x0, y0, z = points[0, i, 0], points[0, i, 1], points[0, i, 2]
+        far = r20 * x0 + r21 * y0 + r22 * z + t2
+        share = 1 / (far if far > 0 else 1.0)
+        x = (r00 * x0 + r01 * y0 + r02 * z + t0) * share
+        y = (r10 * x0 + r11 * y0 + r12 * z + t1) * share
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        pixels[0, i, 0] = fx * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx
+        pixels[0, i, 1] = fy * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy
+        color_depth[0, i] = far if far > 0 else 0.0
 
 
 @compiled

@@ -4,8 +4,6 @@ Inside a hole there are no neighbours to be coloured by, often because it is dar
 hair, pupils. Their place in the colour image says more than the hole's border.
 """
 
-from collections.abc import Callable
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +15,12 @@ from recon.detail import DetailedSurface
 from recon.face import DenseCloud
 from recon.masks import disc
 from recon.rbf import Surface
+from recon.registration import LookUp
 from recon.segment import Seeds
 from recon.support import support_on_grid
 from recon.uncertainty import sources_of_error, standard_error
 
-__all__ = ["LookUp", "densify"]
-
-LookUp = Callable[[NDArray[np.float32]], tuple[NDArray[np.uint8], NDArray[np.bool_]]]
-"""Points, (n, 3) float32, mm, to their colours, (n, 3) uint8, and which are seen, (n,) bool."""
+__all__ = ["densify"]
 
 # In units of the mean spacing.
 # A colour is the mean of the seeds around it, weighted by a Gaussian of this radius.

@@ -19,7 +19,9 @@ from recon._scatter_kernels import BILINEAR_VARIANCE, read_between, share_out
 from recon.local_means import blurred, enlarged, local_means
 from recon.mirror_plane import find_plane
 from recon.rbf import Surface
+from recon.registration import LookUp
 from recon.rim import BROADER, Rim, broad_average, halved
+from recon.shading import shading_detail
 from recon.support import support_on_grid
 from recon.symmetry import helped_by_mirror
 
@@ -100,7 +102,7 @@ class DetailedSurface:
 
 def add_detail(
     base: Surface, points: NDArray[np.float32], spacing: float, radius: float, *,
-    symmetry: bool = False,
+    symmetry: bool = False, look_up: LookUp | None = None,
 ) -> DetailedSurface:
     """Add to a broad fit what its seeds show besides.
 
@@ -111,6 +113,7 @@ def add_detail(
     spacing : mean spacing of the points, mm
     radius : of the average (standard deviation), mm
     symmetry : let each side of the face be helped by the other's mirror image
+    look_up : tells points' colours, of whose shading more detail is taken; None: of depth alone
     """
     step = spacing / _FINENESS
     xs, ys, support = support_on_grid(points, spacing, step)
@@ -148,6 +151,11 @@ def add_detail(
         detail += _between(helped_by_mirror(field, kept, plane, noise, _WINDOW_MM, origin, spacing),
                            detail.shape)
 
+    if look_up is not None:
+        surface = heights[some] + detail[some]
+        places = xs[::_FINENESS], ys[::_FINENESS]
+        detail += _between(shading_detail(surface, shown * rim.within, _slopes(surface, spacing),
+                                          places, look_up), detail.shape)
     detail += _doubled(rim.frayed_depth(_slopes(halved(heights), 2 * step), spacing), detail)
     heights += detail
     return DetailedSurface(

@@ -20,7 +20,7 @@ from recon.errors import NoDepthError, TooLittleDepthError
 from recon.face import Face, PointCloud, Report
 from recon.neighbors import mean_spacing
 from recon.rbf import MIN_SEEDS, Surface, fit_surface
-from recon.registration import Registration, look_up, register
+from recon.registration import LookUp, Registration, look_up, register
 from recon.segment import segment_face, window_of_box
 from recon.settings import Settings
 from recon.uncertainty import noise_share
@@ -69,10 +69,11 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     clock.lap("segmentation")
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     clock.lap("neighbors")
-    surface = surface_of(seeds.points, spacing, settings)
+    looked_up = partial(look_up, frame, registered)
+    surface = surface_of(seeds.points, spacing, settings, looked_up)
     clock.lap("rbf")
     dense = densify(seeds, surface, spacing, settings.ratio, noise_share(settings),
-                    partial(look_up, frame, registered))
+                    looked_up)
     clock.lap("propagation")
     initial = PointCloud(seeds.points, seeds.colors)
     report = Report(
@@ -108,7 +109,8 @@ def _version() -> str:
 
 
 def surface_of(
-    points: NDArray[np.float32], spacing: float, settings: Settings
+    points: NDArray[np.float32], spacing: float, settings: Settings,
+    look_up: LookUp | None = None,
 ) -> Surface | DetailedSurface:
     """Fit the seeds, and add the detail that the settings ask for.
 
@@ -116,6 +118,7 @@ def surface_of(
     ----------
     points : (n, 3) float32, mm, depth camera frame
     spacing : their mean spacing, mm
+    look_up : tells points' colours; None, and there is no detail by shading
 
     Raises
     ------
@@ -126,7 +129,8 @@ def surface_of(
     if settings.detail_factor is None:
         return surface
     return add_detail(surface, points, spacing, settings.detail_factor * spacing,
-                      symmetry=settings.symmetry)
+                      symmetry=settings.symmetry,
+                      look_up=look_up if settings.shading else None)
 
 
 def _warnings(frame: RgbdFrame, seeds: int) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """Stage 1: every depth pixel as a 3D point, and where the colour camera sees it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -7,10 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from capture.frame import RgbdFrame
-from recon._registration_kernels import EMPTY, look, project, see
+from recon._registration_kernels import EMPTY, look, project, project_points, see
 from recon.errors import NoDepthError
 
-__all__ = ["Registration", "look_up", "register"]
+__all__ = ["LookUp", "Registration", "look_up", "register"]
+
+LookUp = Callable[[NDArray[np.float32]], tuple[NDArray[np.uint8], NDArray[np.bool_]]]
+"""Points, (n, 3) float32, mm, to their colours, (n, 3) uint8, and which are seen, (n,) bool."""
 
 # A point is hidden when another, nearer one falls on the same spot of the colour image. A steep
 # surface differs by a few millimetres from spot to spot without hiding itself.
@@ -86,16 +90,13 @@ def register(
     color_depth = np.zeros(depth.shape, np.float32)
     (first_row, _, row_step), (first_column, _, column_step) = (
         part.indices(side) for part, side in zip((rows, columns), frame.depth.shape, strict=True))
-    camera, moved = frame.calibration.color, frame.depth_to_color
+    camera = frame.calibration.color
     pitch = max(1.0, camera.fx / frame.depth_camera.fx * row_step)
     height, width = frame.color.shape[:2]
     nearest = np.full([int(np.ceil(side / pitch)) + 1 for side in (height, width)], EMPTY)
     top, bottom, left, right = project(
         depth, depth_offset_mm, frame.depth_camera.rays(), (first_row, first_column),
-        (row_step, column_step), np.array(moved.rotation, np.float64),
-        np.array(moved.translation_mm, np.float64),
-        np.array((camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
-                  *camera.distortion)), pitch, points, pixels, color_depth, nearest)
+        (row_step, column_step), *_pose(frame), pitch, points, pixels, color_depth, nearest)
     # Each point covers about its cell and the next: without this, a far surface would shine
     # through between the samples of a near one.
     if bottom >= 0:
@@ -135,15 +136,23 @@ def look_up(
     colors : (n, 3) uint8, RGB, bilinear; zero where not `seen`
     seen : (n,) bool, inside the colour image and hidden by nothing registered
     """
-    moved = frame.depth_to_color.apply(points)
-    ahead = moved[:, 2] > 0
-    pixels = np.zeros((1, len(points), 2), np.float32)
-    pixels[0, ahead] = frame.calibration.color.project(moved[ahead])
-    z = np.where(ahead, moved[:, 2], 0).astype(np.float32)[None]
+    pixels = np.empty((1, len(points), 2), np.float32)
+    z = np.empty((1, len(points)), np.float32)
+    project_points(np.ascontiguousarray(points)[None], *_pose(frame), pixels, z)
     height, width = frame.color.shape[:2]
     seen = see(pixels, z, registered.nearest, registered.pitch, _HIDDEN_MM, _HIDDEN_SHARE, width,
                height)
     return look(pixels, seen, _read_only(frame.color))[0], seen[0]
+
+
+def _pose(
+    frame: RgbdFrame,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Rotation, translation and intrinsics of the colour camera, as the loops take them."""
+    camera, moved = frame.calibration.color, frame.depth_to_color
+    return (np.array(moved.rotation, np.float64), np.array(moved.translation_mm, np.float64),
+            np.array((camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
+                      *camera.distortion), np.float64))
 
 
 def _read_only(image: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -24,6 +24,8 @@ BROADER = 4.0
 # In units of the mean spacing: up to the first the broad average stands alone, from the second on
 # it does not count.
 _ALONE, _NONE = 3.0, 8.0
+# A colour up to the first may be of what lies behind, from the second on it is the face's own.
+_BEHIND, _OWN = 0.5, 2.5
 # How often it is taken of what it leaves, and how often within so much of the rim, where fewer
 # would leave a slope that has seeds on one side alone. Each adds what it finds times a factor:
 # below 2, all is found in the end, above 1 sooner.
@@ -70,6 +72,12 @@ class Rim:
     def nearness(self) -> Image:
         """How much the broad average counts, 0-1."""
         return _falling(self.away, _ALONE, _NONE)
+
+    @property
+    def within(self) -> Image:
+        """How much what is seen there is of the face and not of what is behind it, 0-1."""
+        share = (self.away - np.float32(_BEHIND)) / np.float32(_OWN - _BEHIND)
+        return np.asarray(np.clip(share, 0, 1), np.float32)
 
     def frayed_depth(self, slopes: tuple[Image, Image], spacing: float) -> Image:
         """Give what is to be added to the depths: a shift toward the rim, times the slope.

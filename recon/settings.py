@@ -35,7 +35,7 @@ _PRESETS: dict[Preset, dict[str, Any]] = {
                    "depth_offset_mm": 0.0},
     Preset.FAITHFUL: {"r0_factor": 6.0, "smoothing": 3.0, "neighbors": Neighbors.RANDOMIZED},
     Preset.BEST: {"r0_factor": 14.0, "smoothing": 12.0, "detail_factor": 1.5, "symmetry": True,
-                  "neighbors": Neighbors.LATTICE},
+                  "shading": True, "neighbors": Neighbors.LATTICE},
 }
 
 
@@ -54,6 +54,9 @@ class Settings(BaseModel):
     the fit alone."""
     symmetry: bool = False
     """Let each side of the face be helped by the mirror image of the other; only where detail is
+    added (`detail_factor`)."""
+    shading: bool = False
+    """Let the colour image's shading tell slopes that depth's noise hides; only where detail is
     added (`detail_factor`)."""
     neighbors: Neighbors = Neighbors.LATTICE
     """How the mean spacing is measured."""

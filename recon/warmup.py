@@ -46,9 +46,9 @@ def warm() -> None:
     seeds = segment_face(registered, _BOX, _FOCAL_PX)
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     fit = fit_surface(seeds.points, settings.r0_factor * spacing, settings.smoothing)
-    surface = add_detail(fit, seeds.points, spacing, spacing, symmetry=True)
-    pack(densify(
-        seeds, surface, spacing, settings.ratio, 1.0, partial(look_up, frame, registered)))
+    looked_up = partial(look_up, frame, registered)
+    surface = add_detail(fit, seeds.points, spacing, spacing, symmetry=True, look_up=looked_up)
+    pack(densify(seeds, surface, spacing, settings.ratio, 1.0, looked_up))
 
 
 def _ball() -> RgbdFrame:

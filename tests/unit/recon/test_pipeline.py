@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,7 +20,11 @@ from recon import (
     TooLittleDepthError,
     reconstruct,
 )
-from recon.registration import register
+from recon.neighbors import mean_spacing
+from recon.pipeline import surface_of
+from recon.registration import look_up, register
+from recon.segment import segment_face
+from recon.settings import Neighbors
 from tests.simulator import Accuracy, Light, Person, Scene, measure, simulate
 from tests.unit.frames import resampled
 
@@ -164,7 +169,7 @@ def test_other_resolutions(shot, factor, error_mm):
     assert one.report.mean_spacing_mm == pytest.approx(1.22 / factor, rel=0.15)
 
 
-def test_depth_that_is_registered_already(shot, face):
+def test_depth_that_is_tiedalready(shot, face):
     frame = registered(shot.frame)
     one = reconstruct(frame)
     check_sound(one)
@@ -322,3 +327,29 @@ def test_a_sharper_colour_camera_leaves_the_same_seeds(face, shot):
         calibration=known.model_copy(update={"color": known.color.scaled(2)})))
     assert len(sharp.initial) == pytest.approx(len(face.initial), rel=0.005)
     assert apart(face.initial.points, sharp.initial.points) < 0.3
+
+
+@pytest.mark.parametrize("light", [Light(), Light((1.0, -0.2, -0.45), 0.9, 0.18),
+                                   Light((0.0, -1.0, -0.6))])
+def test_shading_brings_a_face_nearer_to_the_truth(light):
+    shot, = simulate(Scene((Person(distance_mm=760, yaw=8),), light=light), seed=4)
+    without, with_it = (
+        measure(reconstruct(shot.frame, Settings(shading=shading)), shot.truth, shot.frame)
+        for shading in (False, True))
+    assert with_it.mean_mm < 0.99 * without.mean_mm
+    assert with_it.gross <= without.gross + 1e-4
+
+
+def test_without_colour_the_face_is_that_of_depth(shot):
+    """What is there to see is one grey, so that nothing but its border can be told from it."""
+    box = reconstruct(shot.frame).report.face_box
+    grey = replace(shot.frame, color=np.full_like(shot.frame.color, 128))
+    heights = []
+    for frame, shading in ((grey, True), (shot.frame, False)):
+        tied = register(frame, 0.5)
+        seeds = segment_face(tied, box, frame.calibration.color.fx)
+        spacing = mean_spacing(seeds.points, seeds.pixels, Neighbors.LATTICE)
+        surface = surface_of(seeds.points, spacing, Settings(shading=shading),
+                             partial(look_up, frame, tied))
+        heights.append(surface.detail[0])
+    assert np.abs(heights[0] - heights[1]).mean() < 0.02

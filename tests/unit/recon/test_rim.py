@@ -86,3 +86,8 @@ def test_a_wall_counts_no_more_than_a_slope():
     found = [frayed(support, (np.sign(x) * slope, 0 * x), 1.0, 0.5) for slope in (1.5, 20)]
     np.testing.assert_allclose(found[0][25:-25], found[1][25:-25], atol=1e-6)
     assert found[0][25:-25].max() > 0.5
+
+
+def test_a_colour_is_the_face_s_own_within_the_rim():
+    away = np.array([[-1, 0.5, 1.5, 2.5, 50]], np.float32)
+    np.testing.assert_allclose(Rim(np.ones_like(away), away).within, [[0, 0, 0.5, 1, 1]])

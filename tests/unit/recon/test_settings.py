@@ -11,6 +11,7 @@ def test_best_is_the_default():
     assert Settings().r0_factor == 14
     assert Settings().detail_factor == 1.5
     assert Settings().symmetry
+    assert Settings().shading
     assert Settings().neighbors is Neighbors.LATTICE
 
 
@@ -22,6 +23,7 @@ def test_the_papers_presets_have_its_r0_and_its_trees(preset):
     assert settings.neighbors is Neighbors.RANDOMIZED
     assert settings.detail_factor is None
     assert not settings.symmetry
+    assert not settings.shading
     assert settings.ratio == 10
 
 
