@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["connect", "cut_depth", "large_parts", "nearest_to", "row_medians", "within",
-           "within_reach"]
+__all__ = ["connect", "cut_depth", "cut_under", "large_parts", "long_axis", "nearest_to",
+           "row_medians", "within", "within_reach"]
 
 _EMPTY, _HIDDEN, _WANTED, _FOUND, _BLOCKED = 0, 1, 2, 3, 4
 
@@ -210,19 +210,51 @@ def large_parts(image: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
 
 
 @compiled
+def long_axis(among: NDArray[np.bool_]) -> tuple[float, float]:
+    """Give the direction, (down, right), in which some pixels reach farthest, by second moments.
+
+    A unit vector that never points up; straight down where they reach alike in all directions.
+    """
+    count = rows_sum = columns_sum = 0
+    for row in range(among.shape[0]):
+        for column in range(among.shape[1]):
+            if among[row, column]:
+                count += 1
+                rows_sum += row
+                columns_sum += column
+    down = right = both = 0.0
+    for row in range(among.shape[0]):
+        for column in range(among.shape[1]):
+            if among[row, column]:
+                a, b = row - rows_sum / count, column - columns_sum / count
+                down += a * a
+                right += b * b
+                both += a * b
+    angle = 0.5 * np.arctan2(2 * both, down - right)
+    return np.cos(angle), np.sin(angle)
+
+
+@compiled
 def cut_depth(
     face: NDArray[np.bool_],
     z: NDArray[np.float32],
     pixels: NDArray[np.float32],
     front: float,
+    middle: tuple[float, float],
+    axis: tuple[float, float],
     below: NDArray[np.float64],
     behind: NDArray[np.float64],
 ) -> None:
-    """Drop from `face` what lies deeper than front + a line through (below, behind), by its v."""
+    """Drop from `face` what lies deeper than front + a line through (below, behind).
+
+    below : how far from the middle, (u, v), downward or along the axis, (down, right), a unit
+        vector, whichever is more; pixels
+    """
     for row in range(face.shape[0]):
         for column in range(face.shape[1]):
             if face[row, column]:
-                v = pixels[row, column, 1]
+                v = pixels[row, column, 1] - middle[1]
+                v = max(v, axis[0] * v + axis[1] * (pixels[row, column, 0] - middle[0]))
                 k = 0
                 while k < len(below) and v >= below[k]:
                     k += 1
@@ -234,3 +266,36 @@ def cut_depth(
                     share = (v - below[k - 1]) / (below[k] - below[k - 1])
                     most = behind[k - 1] + share * (behind[k] - behind[k - 1])
                 face[row, column] = z[row, column] < front + most
+
+
+@compiled
+def cut_under(
+    face: NDArray[np.bool_], z: NDArray[np.float32], start_row: int, start_column: int,
+    beyond: int, drop: float, reach: int,
+) -> None:
+    """Drop from `face` what lies behind a step down, on straight ways from a place.
+
+    Ways lead down, at most as far aside; a step counts more than `beyond` rows below the place,
+    where the depth grows by more than `drop` from one pixel of the face to the next on the way,
+    at most `reach` pixels farther.
+    """
+    rows, columns = face.shape
+    # Of the pixel before, on the way to each of a row: the last depth, how far back, and whether a
+    # step was passed.
+    last, gap = z[start_row].copy(), np.zeros(columns, np.int32)
+    passed = np.zeros(columns, np.bool_)
+    for row in range(start_row + 1, rows):
+        down = row - start_row
+        last_before, gap_before, passed_before = last.copy(), gap.copy(), passed.copy()
+        for column in range(max(start_column - down, 0), min(start_column + down + 1, columns)):
+            before = column - int(np.rint((column - start_column) / down))
+            behind = passed_before[before]
+            depth, away = last_before[before], gap_before[before] + 1
+            if face[row, column]:
+                here = z[row, column]
+                if down > beyond and depth > 0 and away <= reach and here - depth > drop:
+                    behind = True
+                if behind:
+                    face[row, column] = False
+                depth, away = here, 0
+            last[column], gap[column], passed[column] = depth, away, behind

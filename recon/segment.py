@@ -14,7 +14,9 @@ from recon._percentile import percentile
 from recon._segment_kernels import (
     connect,
     cut_depth,
+    cut_under,
     large_parts,
+    long_axis,
     nearest_to,
     row_medians,
     within,
@@ -35,8 +37,8 @@ __all__ = ["Seeds", "cluster_depths", "crop_to_box", "keep_face", "segment_face"
 _REACH_SIDE = 0.68
 _REACH_UP = 0.74
 _REACH_DOWN = 0.80
-# How far behind its front a face reaches, in widths of the box, by how far below the centre: the
-# ears at the top, the jaw, then the chin, behind which neck and chest begin.
+# How far behind its front a face reaches, in widths of the box, by how far the centre lies toward
+# the chin: the ears at the top, the jaw, then the chin, behind which neck and chest begin.
 _BELOW = np.array([0.20, 0.35, 0.50, 0.60, 0.70, 0.75, 0.80])
 _BEHIND = np.array([0.75, 0.60, 0.48, 0.415, 0.30, 0.20, 0.0])
 # A box that is wider or narrower than this is larger or smaller than its face.
@@ -44,6 +46,13 @@ _BROADEST_MM = 165.0
 _NARROWEST_MM = 130.0
 # The part of the box, each way from its centre, in which the front is sought.
 _FRONT_PART = 0.3
+# Where depth falls by more than the first, over at most the second, farther down than the third, in
+# widths of the box, the chin ends.
+_CHIN_DROP_MM = 30.0
+_CHIN_GAP_MM = 10.0
+_CHIN = 0.3
+# Of a face's front so much is longer than broad, and shows how the head is tipped.
+_OVAL_MM = 30.0
 # The part in which the slant of a lifted face is measured, and the most of it, mm a pixel.
 _SLANT_PART = 0.4
 _MOST_SLANT = 1.0
@@ -201,10 +210,14 @@ def keep_face(
     if hand.any():
         cover |= hand
         face = _connected(upright, wanted, cover, start, px)
-    inner = z[within(face, registered.pixels, middle, _FRONT_PART * width)]
-    front = percentile(inner if len(inner) else z[face], 2)
+    inner = within(face, registered.pixels, middle, _FRONT_PART * width)
+    inner = inner if inner.any() else face
+    front = percentile(z[inner], 2)
+    axis = long_axis(face & (upright < percentile(upright[inner], 2) + np.float32(_OVAL_MM)))
     box_mm = width * front / focal_px
-    cut_depth(face, z, registered.pixels, front, middle[1] + width * _BELOW,
+    cut_under(face, z, *start, round(_CHIN * box_mm * px), _CHIN_DROP_MM,
+              max(round(_CHIN_GAP_MM * px), _BRIDGE_PX))
+    cut_depth(face, z, registered.pixels, front, middle, axis, width * _BELOW,
               min(max(box_mm, _NARROWEST_MM), _BROADEST_MM) * _BEHIND)
     return face & _smooth_outline(
         face | cover, registered.valid & ~face, start, _EAR * box_mm * px, px)

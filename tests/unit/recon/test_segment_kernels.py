@@ -1,7 +1,16 @@
 import numpy as np
 import pytest
 
-from recon._segment_kernels import connect, nearest_to, row_medians, within, within_reach
+from recon._segment_kernels import (
+    connect,
+    cut_depth,
+    cut_under,
+    long_axis,
+    nearest_to,
+    row_medians,
+    within,
+    within_reach,
+)
 
 STEP, RISE, GAP, COVERED = 12.0, 25.0, 5, 12
 
@@ -86,3 +95,59 @@ def test_each_second_of_the_rows_that_hold_some_has_a_median():
     held = np.flatnonzero(among.any(axis=1))[::2]
     np.testing.assert_array_equal(rows, held)
     np.testing.assert_allclose(medians, [np.median(z[row][among[row]]) for row in held])
+
+
+@pytest.mark.parametrize("degrees", [-60, -20, 0, 35, 80])
+def test_the_long_axis_is_that_of_an_ellipse(degrees):
+    row, column = np.mgrid[-60:60, -70:80]
+    down, right = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    along, across = down * row + right * column, right * row - down * column
+    np.testing.assert_allclose(long_axis((along / 45) ** 2 + (across / 30) ** 2 < 1),
+                               (down, right), atol=0.01)
+
+
+def test_without_a_longer_way_the_axis_points_down():
+    assert long_axis(np.ones((9, 9), bool)) == (1.0, 0.0)
+
+
+def test_depth_is_cut_downward_or_along_the_axis_whichever_is_farther():
+    pixels = seen_at(60)
+    z = np.full((60, 60), 750, np.float32)
+    middle, axis = (80.0, 130.0), (np.cos(0.5), np.sin(0.5))
+    face = np.ones(z.shape, bool)
+    # 50 mm behind the front are allowed up to 10 below.
+    cut_depth(face, z, pixels, 700.0, middle, axis, np.array((0.0, 20.0)), np.array((100.0, 0.0)))
+    u, v = (pixels - middle).transpose(2, 0, 1)
+    np.testing.assert_array_equal(face, np.maximum(v, axis[0] * v + axis[1] * u) < 10)
+
+
+def stepped(drop_mm, *, gap=0, at=12):
+    """A chin before a neck, as wide as the image; followed from row 2 on, in column 10."""
+    z = np.full((24, 21), 700, np.float32)
+    z[at:] += drop_mm
+    face = np.ones(z.shape, bool)
+    face[at:at + gap] = False
+    cut_under(face, z, 2, 10, 5, 30.0, 4)
+    return face
+
+
+def test_what_lies_behind_a_step_down_is_cut_on_straight_ways_alone():
+    row, column = np.mgrid[:24, :21]
+    beside = np.abs(column - 10) > row - 2
+    np.testing.assert_array_equal(stepped(40), (row < 12) | beside)
+    assert stepped(25).all()
+
+
+def test_a_step_counts_below_a_place_and_over_a_narrow_gap():
+    assert stepped(40, at=6).all()
+    assert not stepped(40, gap=3)[15:, 10].any()
+    assert stepped(40, gap=4)[16:].all()
+
+
+def test_beyond_a_step_nothing_comes_back():
+    z = np.full((24, 1), 700, np.float32)
+    z[12:15] = 750
+    face = np.ones(z.shape, bool)
+    cut_under(face, z, 0, 0, 5, 30.0, 4)
+    assert face[:12].all()
+    assert not face[12:].any()
