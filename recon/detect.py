@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from recon._cascades import Look, Middles, look_for_faces
 from recon._detect_kernels import depths_in_box
+from recon._evened import evened
 from recon._regions import CELLS, Region, regions_by_depth, without_flat
 from recon._relief import bulge_mm
 from recon.errors import FaceWithoutDepthError, NoFaceError
@@ -41,15 +43,17 @@ _ROLLED = tuple(Look(_ALT2, _ROLLED_PX, 1.15, 3, roll=degrees) for degrees in (-
 _PROFILES = tuple(Look(_PROFILE, _PROFILE_PX, 1.05, 6, mirrored=way) for way in (False, True))
 # The first look by which depth confirms a face ends the search: most faces are found by the first,
 # the others see those that it misses (turned, tipped, lit from the side).
-_LADDER = (_FIRST, _SECOND, *_ROLLED, *_PROFILES, Look(_ALT2, _FINE, 1.07))
-# With the contrast evened out, for faces in the dark or lit aslant. The profile cascade takes the
-# back of an ear for a face there.
-_EVENED_LADDER = (_FIRST, _SECOND)
+_LAST = Look(_ALT2, _FINE, 1.07)
+_LADDER = (_FIRST, _SECOND, *_ROLLED, *_PROFILES, _LAST)
+# With the contrast evened out, for faces in the dark, before a bright wall or lit aslant. The
+# profile cascade takes the back of an ear for a face there.
+_EVENED_LADDER = (_FIRST, _SECOND, *_ROLLED, _LAST)
 # What stands this much nearer than the face found is searched once more, by so many looks.
-_NEARER_MM = 20.0
+_NEARER_MM = 10.0
 # What is below a face and not so much nearer is its own body.
 _BODY_MM = 100.0
 _NEARER_LOOKS = (_SECOND, *_ROLLED[:2], *_PROFILES)
+_NEARER_EVENED = (_SECOND, *_ROLLED[:2], _LAST)
 # The box found small is sought again at full size, about its own middle, as wide as a face is at
 # its depth: its own width is that of a few coarse steps.
 _REFINED_STEP, _REFINED_NEIGHBORS = 1.08, 2
@@ -103,17 +107,23 @@ def detect_face(
         Where nothing measured lies before the colour camera.
     """
     search = _Search(color, registered, focal_px)
-    for gray, ladder in ((search.gray, _LADDER), (None, _EVENED_LADDER)):
-        searched = search.evened() if gray is None else gray
+    for even, ladder in ((False, _LADDER), (True, _EVENED_LADDER)):
         for look in ladder:
-            found = search.nearest(searched, look, search.regions)
+            found = search.nearest(look, search.regions, even=even)
             if found:
-                nearer = search.nearer_than(found)
-                return search.detection(*(nearer or (searched, look, found)))
-            if look is _FIRST and gray is not None:
+                return search.detection(search.nearer_than(found.face) or found)
+            if look is _FIRST and not even:
                 search.leave_out_flat()
     search.anywhere()
     raise search.failure()
+
+
+class _Found(NamedTuple):
+    """A face, and how it was seen: in which image, by which look."""
+
+    face: FaceCandidate
+    gray: NDArray[np.uint8]
+    look: Look
 
 
 class _Search:
@@ -133,35 +143,38 @@ class _Search:
         self.to_color = color.shape[1] / gray.shape[1]
         self.shape = color.shape[:2]
         self.regions = regions_by_depth(registered, self.shape, focal_px)
+        self._evened: dict[tuple[Box, float, float], NDArray[np.uint8]] = {}
 
     def leave_out_flat(self) -> None:
         """From now on look only where depth bulges."""
         self.regions = without_flat(self.regions, self.registered, self.shape, self.focal_px)
 
-    def evened(self) -> NDArray[np.uint8]:
-        """Give the image with its contrast evened out."""
-        return np.asarray(
-            cv2.createCLAHE(clipLimit=4.0, tileGridSize=(8, 8)).apply(self.gray), np.uint8)
+    def evened(self, region: Region) -> NDArray[np.uint8]:
+        """Give the image with the contrast of a region evened out, by what is at its depth."""
+        key = (region.part, region.near_mm, region.far_mm)
+        if key not in self._evened:
+            part = _scaled(region.part, 1 / self.to_color)
+            self._evened[key] = evened(self.gray, part, self._brightness(region))
+        return self._evened[key]
 
     def nearest(
-        self, gray: NDArray[np.uint8], look: Look, regions: Iterable[Region]
-    ) -> FaceCandidate | None:
+        self, look: Look, regions: Iterable[Region], *, even: bool = False
+    ) -> _Found | None:
         """Give the nearest face of the nearest region that has any."""
         for region in regions:
             small, large = FACE_WIDTH_MM
             ordinary = self.focal_px * _ORDINARY_MM / np.sqrt(region.near_mm * region.far_mm)
             sizes = (self.focal_px * small / region.far_mm, self.focal_px * large / region.near_mm)
             middles = Middles(region.middles, self.gray.shape[1] / CELLS)
+            gray = self.evened(region) if even else self.gray
             weighed = self._look(gray, region.part, look, ordinary, sizes, middles)
             self.seen += weighed
             faces = [c for c in weighed if c.verdict == "face"]
             if faces:
-                return min(faces, key=_depth)
+                return _Found(min(faces, key=_depth), gray, look)
         return None
 
-    def nearer_than(
-        self, found: FaceCandidate
-    ) -> tuple[NDArray[np.uint8], Look, FaceCandidate] | None:
+    def nearer_than(self, found: FaceCandidate) -> _Found | None:
         """Look again, in other ways, at what stands before a face and is not its own body."""
         nearer = regions_by_depth(self.registered, self.shape, self.focal_px,
                                   _depth(found) - _NEARER_MM)
@@ -173,16 +186,16 @@ class _Search:
                 region.middles[bottom:, max(round(x - w / 2), 0):round(x + 1.5 * w)] = False
         if nearer:
             nearer = without_flat(nearer, self.registered, self.shape, self.focal_px)
-        for look in _NEARER_LOOKS if nearer else ():
-            missed = self.nearest(self.gray, look, nearer)
-            if missed and _depth(missed) < _depth(found):
-                return self.gray, look, missed
+        for even, looks in ((False, _NEARER_LOOKS), (True, _NEARER_EVENED)):
+            for look in looks if nearer else ():
+                missed = self.nearest(look, nearer, even=even)
+                if missed and _depth(missed.face) < _depth(found):
+                    return missed
         return None
 
-    def detection(
-        self, gray: NDArray[np.uint8], look: Look, found: FaceCandidate
-    ) -> Detection:
+    def detection(self, seen: _Found) -> Detection:
         """Give the result, with the box sought again with less rounding."""
+        found, gray, look = seen
         wider = _PROFILE_WIDER if look.cascade == _PROFILE else 1.0
         small, large = (wider * self.focal_px * mm / _depth(found) for mm in _REFINED_MM)
         x, y, w, h = found.box
@@ -222,6 +235,16 @@ class _Search:
             return FaceWithoutDepthError(
                 f"face seen at {self.seen[0].box}, but no depth was measured on it")
         return NoFaceError(f"no face found: {_why_not(measured[-1])}")
+
+    def _brightness(self, region: Region) -> NDArray[np.uint8]:
+        """How bright what was measured in a region is."""
+        registered = self.registered
+        there = (registered.visible & (registered.color_depth >= region.near_mm)
+                 & (registered.color_depth < region.far_mm))
+        u, v = (registered.pixels[there] / np.float32(self.to_color)).astype(np.int32).T
+        x, y, w, h = _scaled(region.part, 1 / self.to_color)
+        inside = (u >= x) & (u < x + w) & (v >= y) & (v < y + h)
+        return np.asarray(self.gray[v[inside], u[inside]], np.uint8)
 
     def _look(
         self, gray: NDArray[np.uint8], part: Box, look: Look, ordinary: float,

@@ -10,7 +10,7 @@ from capture.frame import DepthToColor
 from recon.detect import FACE_WIDTH_MM, detect_face
 from recon.errors import FaceWithoutDepthError, NoDepthError, NoFaceError
 from recon.registration import register
-from tests.simulator import Person, Scene, simulate
+from tests.simulator import Light, Person, Scene, simulate
 from tests.unit.frames import calibration
 
 
@@ -140,7 +140,11 @@ def test_the_middle_stays_when_the_images_are_turned(shot):
 @pytest.mark.parametrize(("nearer", "farther"), [
     ({"distance_mm": 700, "roll": 33}, {"distance_mm": 1150, "offset_mm": (230, -30)}),
     ({"distance_mm": 750, "yaw": -60}, {"distance_mm": 1150, "offset_mm": (230, -30)}),
-    ({"distance_mm": 820, "roll": -33}, {"distance_mm": 860, "offset_mm": (110, -10)})])
+    ({"distance_mm": 820, "roll": -33}, {"distance_mm": 860, "offset_mm": (110, -10)}),
+    ({"distance_mm": 715, "roll": -18, "skin_gain": (0.03,) * 3},
+     {"distance_mm": 730, "offset_mm": (110, -10)}),
+    ({"distance_mm": 715, "roll": 18, "skin_gain": (0.02,) * 3},
+     {"distance_mm": 1000, "offset_mm": (110, -10)})])
 def test_a_nearer_face_wins_though_the_first_look_sees_only_the_farther(nearer, farther):
     one = Person(offset_mm=(-110, 10), **nearer)
     shot, = simulate(Scene((Person(**farther), one)), seed=1)
@@ -200,3 +204,15 @@ def test_a_dark_picture_is_evened_out(shot):
     x, y, w, _ = detected(replace(shot.frame, color=dark)).box
     bright = detected(shot.frame).box
     assert np.hypot(x - bright[0], y - bright[1]) < 0.2 * w
+
+
+def test_a_dark_face_is_found_though_tipped():
+    shot, = simulate(Scene((Person(roll=18, skin_gain=(0.015,) * 3),)), seed=1)
+    assert middle_off(detected(shot.frame), shot) < 0.2
+
+
+def test_a_face_against_the_light_is_found_by_the_contrast_at_its_own_depth():
+    against = Light((0.3, -0.5, 1.0), intensity=1.6, ambient=0.02)
+    shot, = simulate(Scene((Person(roll=-18),), wall_mm=1500, wall_color=(255, 255, 250),
+                           light=against), seed=1)
+    assert middle_off(detected(shot.frame), shot) < 0.2
