@@ -18,10 +18,14 @@ _FRAYED = np.ones((7, 7), np.uint8)
 # Around the face, where its background is looked for.
 _AROUND = np.ones((9, 9), np.uint8)
 # How many pixels wide the windows are in which the face's own colour, and its background's, are
-# looked for. Background farther aside may have another colour.
+# looked for. Background farther aside may have another colour: it is never taken out, but where
+# none is known nearby, as in the projector's shadow, what shows it is not the face's own.
 _INSIDE = 7
 _BESIDE = 25
-_MARGIN_PX = 12
+_FARTHER = 81
+_MARGIN_PX = 16
+# Fewer pixels behind are none: a cut ear's frayed edge, with the wall mixed in.
+_LEAST_BEHIND = 8
 # What lies so far behind the face is background, not hair, neck or a hand.
 _BEHIND_MM = 25.0
 # Two colours nearer than this, of 255, are not told apart.
@@ -43,7 +47,7 @@ def seed_colors(
 
     Where the colour camera does not see it, its neighbours' mean. Along the outline, what of the
     colour behind is in it is taken out, and where that is much, the neighbours' mean again. Where
-    nothing is measured behind and beside it, no outline is trusted.
+    little is measured behind and beside it, no outline is trusted.
 
     Parameters
     ----------
@@ -67,8 +71,9 @@ def seed_colors(
     own = inner.copy()
     edge = seen & ~deep
     take_out(colors, own, edge, box_sums(colors, deep, edge, _INSIDE // 2),
-             box_sums(colors, behind, edge, _BESIDE // 2), _ALIKE, _SHARE, _ASIDE, _ASIDE_LEAST,
-             _CONTRAST)
+             box_sums(colors, behind, edge, _BESIDE // 2),
+             box_sums(colors, behind, edge, _FARTHER // 2), _ALIKE, _SHARE, _ASIDE, _ASIDE_LEAST,
+             _CONTRAST, _LEAST_BEHIND)
     average_missing(colors, own, face & ~own)
     return at_pixels(colors, face)
 
