@@ -70,10 +70,12 @@ _RISE_MM = 28.0
 _BRIDGE_PX = 5
 # And so far where something stands before the face.
 _COVERED_MM = 45.0
-# A frame of glasses is narrower than the first, stands out by the second, is larger than the third.
+# A frame of glasses is narrower than the first, stands out by the second, is larger than the third,
+# and goes on where it stands out by the last.
 _WIRE_MM = 7.0
 _WIRE_STEP_MM = 6.0
 _WIRE_MM2 = 50.0
+_WIRE_FAINT_MM = 4.0
 # What stands before a face is broader than this and casts a shadow as wide as the second.
 _FINGER_MM = 5.0
 _SHADOW_MM = 8.0
@@ -252,7 +254,12 @@ def _frames_of_glasses(
     kernel = np.ones((2 * round(_WIRE_MM * px / 2) + 1,) * 2, np.uint8)
     behind = cv2.dilate(np.where(cluster, z, np.float32(0)), kernel)
     behind = cv2.erode(np.where(behind > 0, behind, np.float32(np.inf)), kernel)
-    return large_parts(cluster & (behind - z > _WIRE_STEP_MM), _WIRE_MM2 * px * px)
+    wires = large_parts(cluster & (behind - z > _WIRE_STEP_MM), _WIRE_MM2 * px * px)
+    if not wires.any():
+        return wires
+    faint = cluster & (behind - z > _WIRE_FAINT_MM)
+    _, parts = cv2.connectedComponents(faint.view(np.uint8), connectivity=8)
+    return np.isin(parts, np.unique(parts[wires]))
 
 
 def _before(

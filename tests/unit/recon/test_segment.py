@@ -120,6 +120,19 @@ def test_neck_and_chest_behind_the_chin_are_cut():
     assert face[FACE & (down < 85)].mean() > 0.99
 
 
+def test_a_frame_of_glasses_goes_to_where_it_hardly_stands_out():
+    x, y = (axis * NEAR for axis in grid())
+    bar = (np.abs(y) < 2.5) & (np.abs(x) < 25)
+    lid = (np.abs(y - 20) < 2.5) & (np.abs(x) < 10)
+    worn = HEAD - np.where(bar, np.where(x < 0, 9, 5), 0) - np.where(lid, 5, 0)
+    face = kept(registration(worn))
+    assert not face[bar & (x < 0)].any()
+    assert face[bar & (x > 2)].mean() < 0.1
+    assert face[lid].all()
+    faint = HEAD - np.where(bar | lid, 5, 0)
+    assert kept(registration(faint))[bar | lid].all()
+
+
 @pytest.mark.parametrize("half_width", [3, 9])
 def test_spurs_are_removed(half_width):
     x, y = (axis * NEAR for axis in grid())
