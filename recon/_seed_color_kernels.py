@@ -46,7 +46,7 @@ def box_sums(
 def take_out(
     colors: NDArray[np.uint8], own: NDArray[np.bool_], edge: NDArray[np.bool_],
     near: NDArray[np.int32], far: NDArray[np.int32], farther: NDArray[np.int32], alike: float,
-    share: float, aside: float, aside_least: float, contrast: float, least: int,
+    share: float, aside: float, aside_least: float, contrast: float, much: float,
 ) -> None:
     """Take what of the colour behind is in the edge's colours out of them.
 
@@ -54,16 +54,15 @@ def take_out(
     `aside` of the line and than `aside_least`: then s is 0. With s below `share` it becomes the
     face's own, and s (far - near) is taken out of it. One that was its own already keeps its
     colour, and with a larger s it stays its own only where near and far differ by less than
-    `contrast`. Where nothing is near, or too little far, a pixel stays as it is.
+    `contrast`. Where nothing is near, or nothing far, a pixel stays as it is.
 
     What lies aside of that line, or has none, is not the face's own either where it lies on the
-    line to `farther`, at `share` or more.
+    line to `farther`, at `much` or more.
 
     colors : (H, W, 3); own, edge : (H, W)
     near, far, farther : (n, 4), for each pixel of the edge the sums of the colours beside it on the
         face, behind it, and behind and farther aside, and their number: `box_sums`
     alike : two colours nearer than this are not told apart
-    least : fewer colours behind are not trusted
     """
     i = -1
     for row in range(edge.shape[0]):
@@ -72,8 +71,7 @@ def take_out(
                 continue
             i += 1
             color, inner = colors[row, column], own[row, column]
-            part, length, mixed = _mixture(
-                color, near[i], far[i], least, alike, aside, aside_least)
+            part, length, mixed = _mixture(color, near[i], far[i], alike, aside, aside_least)
             if length > 0:
                 own[row, column] = part < np.float32(share) or (
                     inner and length < np.float32(contrast * contrast))
@@ -85,23 +83,22 @@ def take_out(
                         color[c] = np.uint8(
                             min(max(cleared, np.float32(0)), np.float32(255)) + np.float32(0.5))
             if own[row, column] and not mixed:
-                part, length, _ = _mixture(
-                    color, near[i], farther[i], least, alike, aside, aside_least)
+                part, length, _ = _mixture(color, near[i], farther[i], alike, aside, aside_least)
                 own[row, column] = (
-                    part < np.float32(share) or length < np.float32(contrast * contrast))
+                    part < np.float32(much) or length < np.float32(contrast * contrast))
 
 
 @compiled
 def _mixture(
-    color: NDArray[np.uint8], near: NDArray[np.int32], far: NDArray[np.int32], least: int,
-    alike: float, aside: float, aside_least: float,
+    color: NDArray[np.uint8], near: NDArray[np.int32], far: NDArray[np.int32], alike: float,
+    aside: float, aside_least: float,
 ) -> tuple[np.float32, np.float32, bool]:
     """Give the share of far's mean in a colour, how far that is from near's, and whether it fits.
 
     The distance is squared. All are zero where one of the two is not known, the share where the
     colour lies aside of the way from one to the other.
     """
-    if near[3] == 0 or far[3] < least:
+    if near[3] == 0 or far[3] == 0:
         return np.float32(0), np.float32(0), False
     way, off = np.empty(3, np.float32), np.empty(3, np.float32)
     length = along = np.float32(0)

@@ -24,14 +24,14 @@ _INSIDE = 7
 _BESIDE = 25
 _FARTHER = 81
 _MARGIN_PX = 16
-# Fewer pixels behind are none: a cut ear's frayed edge, with the wall mixed in.
-_LEAST_BEHIND = 8
 # What lies so far behind the face is background, not hair, neck or a hand.
 _BEHIND_MM = 25.0
 # Two colours nearer than this, of 255, are not told apart.
 _ALIKE = 10.0
 # With this share of the background, nothing of the face's own is left in a colour.
 _SHARE = 0.35
+# And with this share of a background that is known from farther aside alone.
+_MUCH = 0.5
 # A mixture lies on the way from the face's colour to the background's, within this share of it
 # and so many of 255: hair before a wall does not.
 _ASIDE = 0.5
@@ -47,7 +47,7 @@ def seed_colors(
 
     Where the colour camera does not see it, its neighbours' mean. Along the outline, what of the
     colour behind is in it is taken out, and where that is much, the neighbours' mean again. Where
-    little is measured behind and beside it, no outline is trusted.
+    nothing is measured behind and beside it, no outline is trusted.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def seed_colors(
     take_out(colors, own, edge, box_sums(colors, deep, edge, _INSIDE // 2),
              box_sums(colors, behind, edge, _BESIDE // 2),
              box_sums(colors, behind, edge, _FARTHER // 2), _ALIKE, _SHARE, _ASIDE, _ASIDE_LEAST,
-             _CONTRAST, _LEAST_BEHIND)
+             _CONTRAST, _MUCH)
     average_missing(colors, own, face & ~own)
     return at_pixels(colors, face)
 
