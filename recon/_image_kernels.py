@@ -9,7 +9,10 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["add_between", "collect", "unset"]
+__all__ = ["above", "add_between", "collect", "unset"]
+
+# Indices without a sign spare the compiler's question whether one counts from the end.
+_0, _1, _2, _3 = (np.uint64(k) for k in range(4))
 
 
 @compiled
@@ -21,38 +24,75 @@ def add_between(
 
     rows, columns : (m,), (k,), places in `coarse`, inside it, rising
     """
-    count = len(columns)
-    left, part = np.empty(count, np.uint32), np.empty(count, np.float32)
-    for j in range(count):
-        left[j] = min(int(columns[j]), coarse.shape[1] - 2)
-        part[j] = columns[j] - np.float32(left[j])
-    upper, lower = np.empty(count, np.float32), np.empty(count, np.float32)
+    flat, wide = coarse.ravel(), np.uint64(coarse.shape[1])
+    left, part = _places(columns, coarse.shape[1])
+    upper, lower = np.empty(len(columns), np.float32), np.empty(len(columns), np.float32)
     known = -2
     for i in range(len(rows)):
         above = min(int(rows[i]), coarse.shape[0] - 2)
         if above == known + 1:
             upper, lower = lower, upper
         elif above != known:
-            _along(coarse[above], left, part, 1, upper)
+            _along(flat, np.uint64(above) * wide, left, part, _1, upper)
         if above != known:
-            _along(coarse[above + 1], left, part, 1, lower)
+            _along(flat, np.uint64(above + 1) * wide, left, part, _1, lower)
             known = above
         down = rows[i] - np.float32(above)
         own = image[i]
-        for j in range(count):
+        for j in range(len(columns)):
             own[j] += upper[j] + down * (lower[j] - upper[j])
 
 
 @compiled
+def above(
+    coarse: NDArray[np.float32], rows: NDArray[np.float32], columns: NDArray[np.float32],
+    level: float,
+) -> NDArray[np.bool_]:
+    """Say where an image is above a level between its points, (m, k); places of `add_between`."""
+    flat, wide = coarse.ravel(), np.uint64(coarse.shape[1])
+    left, part = _places(columns, coarse.shape[1])
+    upper, lower = np.empty(len(columns), np.float32), np.empty(len(columns), np.float32)
+    out = np.empty((len(rows), len(columns)), np.bool_)
+    least = np.float32(level)
+    known = -2
+    for i in range(len(rows)):
+        first = min(int(rows[i]), coarse.shape[0] - 2)
+        if first == known + 1:
+            upper, lower = lower, upper
+        elif first != known:
+            _along(flat, np.uint64(first) * wide, left, part, _1, upper)
+        if first != known:
+            _along(flat, np.uint64(first + 1) * wide, left, part, _1, lower)
+            known = first
+        down = rows[i] - np.float32(first)
+        own = out[i]
+        for j in range(len(columns)):
+            own[j] = upper[j] + down * (lower[j] - upper[j]) > least
+    return out
+
+
+@compiled
+def _places(
+    columns: NDArray[np.float32], width: int
+) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+    """Give `_along`'s places for columns of an image so wide."""
+    left, part = np.empty(len(columns), np.uint32), np.empty(len(columns), np.float32)
+    for j in range(len(columns)):
+        left[j] = min(int(columns[j]), width - 2)
+        part[j] = columns[j] - np.float32(left[j])
+    return left, part
+
+
+@compiled
 def _along(
-    line: NDArray[np.float32], left: NDArray[np.uint32], part: NDArray[np.float32],
-    channels: int, out: NDArray[np.float32],
+    image: NDArray[np.float32], begin: np.uint64, left: NDArray[np.uint32],
+    part: NDArray[np.float32], channels: np.uint64, out: NDArray[np.float32],
 ) -> None:
-    """Read a row between its points; `left` and `part` of each value."""
-    right = np.uint32(channels)
-    for j in range(len(out)):
-        here = line[left[j]]
-        out[j] = here + part[j] * (line[left[j] + right] - here)
+    """Read a row of a flat image between its points; `left` and `part` of each value."""
+    for j in range(np.uint64(len(out))):
+        at = begin + left[j]
+        here = image[at]
+        out[j] = here + part[j] * (image[at + channels] - here)
 
 
 @compiled
@@ -73,9 +113,9 @@ def collect(
     support: NDArray[np.bool_],
     xs: NDArray[np.float64],
     ys: NDArray[np.float64],
-    heights: NDArray[np.float32],
-    slopes_x: NDArray[np.float32],
-    slopes_y: NDArray[np.float32],
+    sheet: NDArray[np.float32],
+    sheet_rows: NDArray[np.float32],
+    sheet_columns: NDArray[np.float32],
     colors: NDArray[np.uint8],
     every: int,
     sigma: NDArray[np.float32],
@@ -84,88 +124,141 @@ def collect(
            NDArray[np.int32]]:
     """Gather the grid's supported points, row by row: points, normals, colours, sigma, cells.
 
-    colors, sigma : at every so many points each way, at each so many, bilinear between; both have
-        one more row and column than cover the grid
+    sheet : (3, rows, columns), heights, and slopes along x and y, on a grid of its own, bilinear
+        between
+    sheet_rows, sheet_columns : (m,), (k,), where the points are on that grid, inside it, rising
+    colors : at every so many points each way, bilinear between
+    sigma : at each so many points of the sheet, bilinear between
+        Both have one more row and column than cover their grid.
     """
     rows, columns = support.shape
     n = np.count_nonzero(support)
     points, normals = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
     rgb, cells = np.empty((n, 3), np.uint8), np.empty((n, 2), np.int32)
     error = np.empty(n, np.float32)
-    x, known = xs.astype(np.float32), colors.astype(np.float32)
+    # Flat, with indices that have no sign: a slice for each row takes longer than its numbers.
+    flat_points, flat_normals = points.ravel(), normals.ravel()
+    flat_rgb, flat_cells = rgb.ravel(), cells.ravel()
+    flat_sheet, flat_sigma, flat_support = sheet.ravel(), sigma.ravel(), support.ravel()
+    x, known = xs.astype(np.float32), colors.astype(np.float32).ravel()
     color_left, color_part = _steps(every, 3, columns)
-    sigma_left, sigma_part = _steps(each, 1, columns)
-    color_above, color_below = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
-    sigma_above, sigma_below = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    whole, lengths = np.empty(3 * columns, np.uint8), np.empty(columns, np.float32)
-    i = 0
+    left, part = _places(sheet_columns, sheet.shape[2])
+    sigma_left, sigma_part = _places(sheet_columns / np.float32(each), sigma.shape[1])
+    # What is known of the row above and of the row below.
+    c0, c1 = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
+    z0, z1 = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    x0, x1 = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    y0, y1 = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    s0, s1 = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    z, off = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    dx, dy = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    lengths, whole = np.empty(columns, np.float32), np.empty(3 * columns, np.uint8)
+    wide, plane = np.uint64(sheet.shape[2]), np.uint64(sheet.shape[1] * sheet.shape[2])
+    color_wide, sigma_wide = np.uint64(3 * colors.shape[1]), np.uint64(sigma.shape[1])
+    upper_row, upper_node = -2, -2
+    wide, plane = np.uint64(sheet.shape[2]), np.uint64(sheet.shape[1] * sheet.shape[2])
+    color_wide = np.uint64(colors.shape[1] * 3)
+    sigma_wide=np.uint64(sigma.shape[1])
+    i = _0
     for row in range(rows):
-        above = row // every
         if row % every == 0:
-            color_above, color_below = color_below, color_above
+            c0, c1 = c1, c0
             if row == 0:
-                _along(known[0].ravel(), color_left, color_part, 3, color_above)
-            _along(known[above + 1].ravel(), color_left, color_part, 3, color_below)
-        if row % each == 0:
-            sigma_above, sigma_below = sigma_below, sigma_above
-            if row == 0:
-                _along(sigma[0], sigma_left, sigma_part, 1, sigma_above)
-            _along(sigma[row // each + 1], sigma_left, sigma_part, 1, sigma_below)
-        on = support[row]
-        first, end = 0, columns
-        while first < columns and not on[first]:
-            first += 1
-        while end > first and not on[end - 1]:
-            end -= 1
+                _along(known, _0, color_left, color_part, _3, c0)
+            _along(known, np.uint64(row // every + 1) * color_wide, color_left, color_part, _3, c1)
+        upper = min(int(sheet_rows[row]), sheet.shape[1] - 2)
+        if upper != upper_row:
+            at = np.uint64(upper) * wide
+            if upper == upper_row + 1:
+                z0, z1, x0, x1, y0, y1 = z1, z0, x1, x0, y1, y0
+            else:
+                _along(flat_sheet, at, left, part, _1, z0)
+                _along(flat_sheet, at + plane, left, part, _1, x0)
+                _along(flat_sheet, at + plane + plane, left, part, _1, y0)
+            at += wide
+            _along(flat_sheet, at, left, part, _1, z1)
+            _along(flat_sheet, at + plane, left, part, _1, x1)
+            _along(flat_sheet, at + plane + plane, left, part, _1, y1)
+            upper_row = upper
+        node = int(sheet_rows[row] / np.float32(each))
+        if node != upper_node:
+            at = np.uint64(node) * sigma_wide
+            _along(flat_sigma, at, sigma_left, sigma_part, _1, s0)
+            _along(flat_sigma, at + sigma_wide, sigma_left, sigma_part, _1, s1)
+            upper_node = node
+        line = np.uint64(row) * np.uint64(columns)
+        first, end = _0, np.uint64(columns)
+        while first < end and not flat_support[line + first]:
+            first += _1
+        while end > first and not flat_support[line + end - _1]:
+            end -= _1
         down = np.float32(row % every) / np.float32(every)
-        upper, lower = color_above[3 * first:3 * end], color_below[3 * first:3 * end]
-        between = whole[3 * first:3 * end]
-        for j in range(len(between)):
-            between[j] = np.uint8(np.int32(
-                upper[j] + down * (lower[j] - upper[j]) + np.float32(0.5)))
-        down = np.float32(row % each) / np.float32(each)
+        for j in range(_3 * first, _3 * end):
+            whole[j] = np.uint8(np.int32(c0[j] + down * (c1[j] - c0[j]) + np.float32(0.5)))
+        down = sheet_rows[row] - np.float32(upper)
+        _mix(z0, z1, down, first, end, z)
+        _mix(x0, x1, down, first, end, dx)
+        _mix(y0, y1, down, first, end, dy)
+        down = sheet_rows[row] / np.float32(each) - np.float32(node)
+        _mix(s0, s1, down, first, end, off)
+        for j in range(first, end):
+            lengths[j] = np.float32(1) / np.sqrt(dx[j] * dx[j] + dy[j] * dy[j] + np.float32(1))
         y = np.float32(ys[row])
-        # Slices, since an index that might be negative keeps a loop from being vectorised.
         while first < end:
             stop = first
-            while stop < end and on[stop]:
-                stop += 1
+            while stop < end and flat_support[line + stop]:
+                stop += _1
             count = stop - first
-            flat = points[i:i + count].ravel()
-            across, z = x[first:stop], heights[row, first:stop]
+            at = _3 * i
             for j in range(count):
-                flat[3 * j], flat[3 * j + 1], flat[3 * j + 2] = across[j], y, z[j]
-            flat = normals[i:i + count].ravel()
-            dx, dy = slopes_x[row, first:stop], slopes_y[row, first:stop]
+                flat_points[at + _3 * j] = x[first + j]
+                flat_points[at + _3 * j + _1] = y
+                flat_points[at + _3 * j + _2] = z[first + j]
             for j in range(count):
-                lengths[j] = np.float32(1) / np.sqrt(dx[j] * dx[j] + dy[j] * dy[j] + np.float32(1))
+                flat_normals[at + _3 * j] = dx[first + j] * lengths[first + j]
+                flat_normals[at + _3 * j + _1] = dy[first + j] * lengths[first + j]
+                flat_normals[at + _3 * j + _2] = -lengths[first + j]
+            seen = _3 * first
+            for j in range(_3 * count):
+                flat_rgb[at + j] = whole[seen + j]
             for j in range(count):
-                flat[3 * j], flat[3 * j + 1] = dx[j] * lengths[j], dy[j] * lengths[j]
-                flat[3 * j + 2] = -lengths[j]
-            taken, seen = rgb[i:i + count].ravel(), whole[3 * first:3 * stop]
-            for j in range(3 * count):
-                taken[j] = seen[j]
-            off, upper, lower = (
-                error[i:i + count], sigma_above[first:stop], sigma_below[first:stop])
+                error[i + j] = off[first + j]
+            at = _2 * i
             for j in range(count):
-                off[j] = upper[j] + down * (lower[j] - upper[j])
-            place = cells[i:i + count].ravel()
-            for j in range(count):
-                place[2 * j], place[2 * j + 1] = row, first + j
+                flat_cells[at + _2 * j] = row
+                flat_cells[at + _2 * j + _1] = first + j
             i += count
             first = stop
-            while first < end and not on[first]:
-                first += 1
+            while first < end and not flat_support[line + first]:
+                first += _1
     return points, normals, rgb, error, cells
 
 
 @compiled
-def unset(image: NDArray[np.uint8], cells: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Give the indices of the cells where an image is zero."""
+def _mix(
+    upper: NDArray[np.float32], lower: NDArray[np.float32], down: np.float32, first: np.uint64,
+    end: np.uint64, out: NDArray[np.float32],
+) -> None:
+    """Read from row to row, from one column to before another."""
+    for j in range(first, end):
+        out[j] = upper[j] + down * (lower[j] - upper[j])
+
+
+@compiled
+def unset(
+    image: NDArray[np.uint8], rows: NDArray[np.float32], columns: NDArray[np.float32],
+    cells: NDArray[np.int32],
+) -> NDArray[np.int64]:
+    """Give the indices of the cells at whose places an image, to the nearest pixel, is zero.
+
+    rows, columns : (m,), (k,), where in the image the cells' rows and columns are, inside it
+    """
+    row, column = (rows + np.float32(0.5)).astype(np.uint32), (
+        columns + np.float32(0.5)).astype(np.uint32)
     out = np.empty(len(cells), np.int64)
     count = 0
     for i in range(len(cells)):
         out[count] = i
-        if image[np.uint32(cells[i, 0]), np.uint32(cells[i, 1])] == 0:
+        if image[row[np.uint32(cells[i, 0])], column[np.uint32(cells[i, 1])]] == 0:
             count += 1
     return out[:count].copy()

@@ -17,7 +17,7 @@ from recon.masks import disc
 from recon.rbf import Surface
 from recon.registration import LookUp
 from recon.segment import Seeds
-from recon.support import support_on_grid
+from recon.support import Support
 from recon.uncertainty import sources_of_error, standard_error
 
 __all__ = ["densify"]
@@ -28,13 +28,14 @@ _COLOR_RADIUS = 0.58
 _COLOR_STEP = 0.6
 # In pixels; no blur is less.
 _LEAST_RADIUS = 0.4
-_COARSE = 0.5
 # Farther than this from every seed, over (X, Y), a point is in a hole.
 _HOLE = 1.5
 # Steeper than this, and farther than that from every seed, the fit bridges a step: no sensor reads
 # what it sees at so grazing an angle.
 _STEEP = 4.0
 _UNREAD = 0.7
+# But for specks, of fewer points of the support's grid each way.
+_SPECK = 2
 
 
 def densify(
@@ -56,31 +57,26 @@ def densify(
     share : of the residuals' variance, how much the surface keeps as error: `noise_share`
     look_up : tells the colours of points in holes; None, and their border's colours fill them
     """
-    # Filled holes add to the support: a coarse try tells how much, and the step follows.
-    area = surface.area if isinstance(surface, DetailedSurface) else _supported_area(
-        seeds.points, spacing)
-    step = float(np.sqrt(area / (ratio * len(seeds.points))))
-    xs, ys, support = support_on_grid(seeds.points, spacing, step)
+    supported, sheet = _sheet(seeds.points, surface, spacing)
+    slopes = sheet[1], sheet[2]
+    step = float(np.sqrt(supported.area / (ratio * len(seeds.points))))
+    supported = _unbridged(supported, slopes, seeds.points, spacing)
+    xs, ys, support = supported.on_grid(step)
     origin = float(xs[0]), float(ys[0])
 
-    heights, slopes_x, slopes_y = surface.sampled(xs, ys)
-    bridge = slopes_x * slopes_x + slopes_y * slopes_y > np.float32(_STEEP**2)
-    if bridge.any():
-        bridge &= _near_seeds(seeds, origin, step, support.shape, _UNREAD * spacing) == 0
-        # Not for a speck: a surface riddled with pinholes is worse than a bridge.
-        support &= cv2.morphologyEx(
-            bridge.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) == 0
     sources = sources_of_error(
-        seeds.points, support, heights, (slopes_x, slopes_y), origin, step, spacing)
+        seeds.points, supported.inside, sheet[0], slopes, origin, supported.step, spacing)
     error = standard_error(sources, share, detailed=isinstance(surface, DetailedSurface))
     sigma = np.asarray(cv2.copyMakeBorder(error, 0, 1, 0, 1, cv2.BORDER_REPLICATE), np.float32)
     # Colours have no detail finer than the seeds: every so many points are enough.
     every = max(1, round(_COLOR_STEP * spacing / step))
     colors = _colors(seeds, origin, every * step, spacing, _coarser(support, every))
+    columns, rows = supported.places(xs, ys)
     points, normals, colors, sigma, cells = collect(
-        support, xs, ys, heights, slopes_x, slopes_y, colors, every, sigma, sources.every)
+        support, xs, ys, sheet, rows, columns, colors, every, sigma, sources.every)
     if look_up is not None:
-        hole = unset(_near_seeds(seeds, origin, step, support.shape, _HOLE * spacing), cells)
+        near = _near_seeds(seeds.points, supported, _HOLE * spacing)
+        hole = unset(near, rows, columns, cells)
         if len(hole):
             own, seen = look_up(points[hole])
             colors[hole[seen]] = own[seen]
@@ -95,18 +91,39 @@ def densify(
     )
 
 
-def _supported_area(points: NDArray[np.float32], spacing: float) -> float:
-    step = _COARSE * spacing
-    _, _, support = support_on_grid(points, spacing, step)
-    return float(np.count_nonzero(support) * step**2)
+def _sheet(
+    points: NDArray[np.float32], surface: Surface | DetailedSurface, spacing: float
+) -> tuple[Support, NDArray[np.float32]]:
+    """Give the support, and height and slopes on its grid, (3, rows, columns)."""
+    if isinstance(surface, DetailedSurface):
+        return surface.support, surface.sheet
+    supported = Support.of(points, spacing)
+    return supported, np.stack(surface.sampled(supported.xs, supported.ys))
+
+
+def _unbridged(
+    supported: Support, slopes: tuple[NDArray[np.float32], NDArray[np.float32]],
+    points: NDArray[np.float32], spacing: float,
+) -> Support:
+    """Leave out where the fit bridges a step that nothing was read of."""
+    along, down = slopes
+    bridge = along * along + down * down > np.float32(_STEEP**2)
+    if not bridge.any():
+        return supported
+    bridge &= _near_seeds(points, supported, _UNREAD * spacing) == 0
+    # A surface riddled with pinholes is worse than a bridge.
+    kernel = np.ones((_SPECK, _SPECK), np.uint8)
+    opened = cv2.dilate(cv2.erode(bridge.view(np.uint8), kernel), kernel, anchor=(0, 0))
+    return supported.without(np.asarray(opened > 0))
 
 
 def _near_seeds(
-    seeds: Seeds, origin: tuple[float, float], step: float, shape: tuple[int, ...], radius: float
+    points: NDArray[np.float32], supported: Support, radius: float
 ) -> NDArray[np.uint8]:
-    """Which grid points have a seed within a radius, mm, to half a step; 0 or 1."""
-    seeded = mark(seeds.points, origin, step, shape[0], shape[1])
-    return np.asarray(cv2.dilate(seeded, disc(radius / step)), np.uint8)
+    """Which points of the support's grid have a seed within a radius, mm; 0 or 1."""
+    seeded = mark(points, (supported.xs[0], supported.ys[0]), supported.step,
+                  len(supported.ys), len(supported.xs))
+    return np.asarray(cv2.dilate(seeded, disc(radius / supported.step)), np.uint8)
 
 
 def _colors(

@@ -22,15 +22,13 @@ from recon.rbf import Surface
 from recon.registration import LookUp
 from recon.rim import BROADER, Rim, broad_average, halved
 from recon.shading import shading_detail
-from recon.support import support_on_grid
+from recon.support import Support
 from recon.symmetry import helped_by_mirror
 
 __all__ = ["DetailedSurface", "add_detail"]
 
 Image = NDArray[np.float32]
 
-# Points of the detail's grid for each spacing.
-_FINENESS = 2
 # Below this share of the usual weight lies a hole, or the rim.
 _FULL = 0.4
 # There a wider average is taken, and again of what it leaves: like a fit, that carries the slope
@@ -53,32 +51,22 @@ _FADING_RIM = 1.5
 
 @dataclass(frozen=True, eq=False)
 class DetailedSurface:
-    """A fit and what is added to it: z = base + detail.
+    """A fit with what was added to it, between the points of a grid.
 
     Attributes
     ----------
-    base : the fit, mm, depth camera frame
-    detail : (3, rows, columns) float32: height to add, mm, and the slopes of the sum along x and
-        y, on a grid that begins at `origin`
-    origin : (x, y) of that grid's first point, mm
-    step : distance of its points, mm
+    sheet : (3, rows, columns) float32: height, mm, and slopes along x and y
+    support : whose grid this is, and where the seeds support the surface
     noise : standard deviation of the seeds about the surface, mm
-    area : of the places that the seeds support, mm^2
     """
 
-    base: Surface
-    detail: Image
-    origin: tuple[float, float]
-    step: float
+    sheet: Image
+    support: Support
     noise: float
-    area: float
 
-    def on_grid(self, xs: NDArray[np.float64], ys: NDArray[np.float64]) -> NDArray[np.float64]:
+    def on_grid(self, xs: NDArray[np.float64], ys: NDArray[np.float64]) -> Image:
         """Evaluate on an axis-aligned grid: (k,), (m,) mm -> (m, k) mm."""
-        found = self.base.on_grid(xs, ys)
-        added = np.zeros(found.shape, np.float32)
-        add_between(added, self.detail[0], self._places(ys, 1), self._places(xs, 0))
-        return found + added
+        return self.sampled(xs, ys)[0]
 
     def sampled(
         self, xs: NDArray[np.float64], ys: NDArray[np.float64]
@@ -87,17 +75,11 @@ class DetailedSurface:
 
         As `Surface.sampled`: (k,), (m,) mm -> (m, k) each.
         """
-        heights = self.base.heights(xs, ys)
-        found = heights, np.zeros_like(heights), np.zeros_like(heights)
-        rows, columns = self._places(ys, 1), self._places(xs, 0)
-        for one, added in zip(found, self.detail, strict=True):
-            add_between(one, added, rows, columns)
-        return found
-
-    def _places(self, values: NDArray[np.float64], axis: int) -> Image:
-        """Where on the detail's grid, in its points, kept inside it."""
-        places = (values - self.origin[axis]) / self.step
-        return np.clip(places, 0, self.detail.shape[2 - axis] - 1).astype(np.float32)
+        columns, rows = self.support.places(xs, ys)
+        found = np.zeros((3, len(rows), len(columns)), np.float32)
+        for one, known in zip(found, self.sheet, strict=True):
+            add_between(one, known, rows, columns)
+        return found[0], found[1], found[2]
 
 
 def add_detail(
@@ -115,14 +97,14 @@ def add_detail(
     symmetry : let each side of the face be helped by the other's mirror image
     look_up : tells points' colours, of whose shading more detail is taken; None: of depth alone
     """
-    step = spacing / _FINENESS
-    xs, ys, support = support_on_grid(points, spacing, step)
+    supported = Support.of(points, spacing)
+    xs, ys, step, support = supported.xs, supported.ys, supported.step, supported.inside
     columns, rows = (((points[:, axis] - low) / step).astype(np.float32)
                      for axis, low in ((0, xs[0]), (1, ys[0])))
     grid = _Seeded(columns, rows, support.shape)
     heights = base.heights(xs, ys)
     rest = points[:, 2] - grid.at_seeds(heights)
-    usual = np.float32(_FINENESS**-2)
+    usual = np.float32((step / spacing) ** 2)
     weight = grid.spread(None, radius / step)
     detail = grid.spread(rest, radius / step) / (weight + usual * np.float32(_FADING))
     seeded = np.minimum(weight / (usual * np.float32(_FULL)), 1)
@@ -139,7 +121,7 @@ def add_detail(
     detail += _doubled(rim.nearness, detail) * (_doubled(broad, detail) - detail)
 
     # How much of it is more than noise varies slowly: every second point is enough.
-    some = np.s_[::_FINENESS, ::_FINENESS]
+    some = np.s_[::2, ::2]
     shown = support[some].astype(np.float32)
     field = _field(heights[some], shown, detail[some], seeded[some], spacing)
     gain, noise = _gain(field[..., 3], field[..., 2], rim.nearness < _AT_RIM, spacing)
@@ -153,15 +135,14 @@ def add_detail(
 
     if look_up is not None:
         surface = heights[some] + detail[some]
-        places = xs[::_FINENESS], ys[::_FINENESS]
+        places = xs[::2], ys[::2]
         detail += _between(shading_detail(surface, shown * rim.within, _slopes(surface, spacing),
                                           places, look_up), detail.shape)
     detail += _doubled(rim.frayed_depth(_slopes(halved(heights), 2 * step), spacing), detail)
     heights += detail
     return DetailedSurface(
-        base, np.stack([detail, *_slopes(heights, step)]).astype(np.float32, copy=False),
-        origin, step, noise=float((rest - grid.at_seeds(detail)).std()),
-        area=float(np.count_nonzero(support) * step**2))
+        np.stack([heights, *_slopes(heights, step)]), supported,
+        noise=float((rest - grid.at_seeds(detail)).std()))
 
 
 class _Seeded:
@@ -255,6 +236,6 @@ def _gain(
 def _between(coarse: Image, shape: tuple[int, ...]) -> Image:
     """Interpolate an image of every second point."""
     image = np.zeros(shape, np.float32)
-    rows, columns = ((np.arange(side) / _FINENESS).astype(np.float32) for side in shape)
+    rows, columns = ((np.arange(side) / 2).astype(np.float32) for side in shape)
     add_between(image, coarse, rows, columns)
     return image

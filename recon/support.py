@@ -1,17 +1,22 @@
 """Where the seeds support a surface: over them and the holes they enclose, not past their rim."""
 
 import math
+from dataclasses import dataclass, replace
+from typing import Self
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from recon._image_kernels import above
 from recon._scatter_kernels import bounds, mark
 from recon.local_means import blurred
 from recon.masks import disc, fill_holes
 
-__all__ = ["support_on_grid"]
+__all__ = ["Support"]
 
+# Points of its grid for each spacing.
+_FINENESS = 2
 # In units of the mean spacing. Gaps narrower than twice the closing are none; the support ends at
 # the rim, counted outward from the outermost seeds.
 _CLOSING = 1.2
@@ -26,34 +31,92 @@ _GROWTH = 1.0
 _EVEN_PX = 3
 
 
-def support_on_grid(
-    points: NDArray[np.float32], spacing: float, step: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Give the grid points over the seeds, with enclosed holes but nothing past the rim.
+@dataclass(frozen=True, eq=False)
+class Support:
+    """The places over the seeds, with enclosed holes but nothing past the rim.
 
-    Parameters
+    Attributes
     ----------
-    points : (n, 3) float32, mm
-    spacing : mean spacing of the seeds, mm
-    step : distance of grid points, mm
-
-    Returns
-    -------
-    xs, ys : (columns,), (rows,) float64, mm
-    support : (rows, columns) bool
+    xs, ys : (columns,), (rows,) float64, mm, a grid of two points for each spacing
+    step : distance of its points, mm
+    margin : (rows, columns) float32, above 0 where supported, between the points above `level`
+    level : a disc of so few pixels reaches farther than its radius
     """
-    reach = (_CLOSING + _GROWTH) * spacing
-    left, right, top, bottom = bounds(points)
-    xs, ys = (_axis(low - reach, high + reach, step)
-              for low, high in ((left, right), (top, bottom)))
-    seeded = mark(points, (xs[0], ys[0]), step, len(ys), len(xs))
-    closed = fill_holes(
-        np.asarray(cv2.dilate(seeded, disc(_CLOSING * spacing / step)), np.uint8))
-    even = min(_EVEN * spacing / step, _EVEN_PART * math.sqrt(np.count_nonzero(closed)))
-    # Of a Gaussian that far inside a straight edge, so much is inside.
-    inside = 0.5 + 0.5 * math.erf((_CLOSING - _RIM) * spacing / step / (even * math.sqrt(2)))
-    most = cv2.dilate(closed, disc(_GROWTH * spacing / step))
-    return xs, ys, (most > 0) & (_broadly_blurred(closed, even) > inside)
+
+    xs: NDArray[np.float64]
+    ys: NDArray[np.float64]
+    step: float
+    margin: NDArray[np.float32]
+    level: float
+
+    @classmethod
+    def of(cls, points: NDArray[np.float32], spacing: float) -> Self:
+        """Find where seeds support a surface.
+
+        Parameters
+        ----------
+        points : (n, 3) float32, mm
+        spacing : mean spacing of the seeds, mm
+        """
+        step = spacing / _FINENESS
+        reach = (_CLOSING + _GROWTH) * spacing
+        left, right, top, bottom = bounds(points)
+        xs, ys = (_axis(low - reach, high + reach, step)
+                  for low, high in ((left, right), (top, bottom)))
+        seeded = mark(points, (xs[0], ys[0]), step, len(ys), len(xs))
+        around = disc(_CLOSING * _FINENESS)
+        closed = fill_holes(np.asarray(cv2.dilate(seeded, around), np.uint8))
+        even = min(_EVEN * _FINENESS, _EVEN_PART * math.sqrt(np.count_nonzero(closed)))
+        # Of a Gaussian that far inside a straight edge, so much is inside.
+        least, pixels = (0.5 + 0.5 * math.erf((closing - _RIM * _FINENESS) / (even * math.sqrt(2)))
+                         for closing in (_CLOSING * _FINENESS,
+                                         math.sqrt(np.count_nonzero(around) / math.pi)))
+        margin = _broadly_blurred(closed, even) - np.float32(least)
+        most = cv2.dilate(closed, disc(_GROWTH * _FINENESS))
+        return cls(xs, ys, step, margin, pixels - least).without(most == 0)
+
+    @property
+    def inside(self) -> NDArray[np.bool_]:
+        """Which of the grid's points are supported, (rows, columns)."""
+        return self.margin > 0
+
+    @property
+    def area(self) -> float:
+        """Of the supported places, mm^2."""
+        return float(np.count_nonzero(self.inside) * self.step**2)
+
+    def without(self, places: NDArray[np.bool_]) -> Self:
+        """Give the same without some of the grid's points, up to half of the way to the next."""
+        level = np.float32(self.level)
+        less = np.minimum(level - np.abs(self.margin - level), np.float32(0))
+        return replace(self, margin=np.where(places, less, self.margin))
+
+    def places(
+        self, xs: NDArray[np.float64], ys: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Give where on the grid columns and rows are, (k,), (m,) mm, in its points, inside it."""
+        columns, rows = (
+            np.clip((values - own[0]) / self.step, 0, len(own) - 1).astype(np.float32)
+            for values, own in ((xs, self.xs), (ys, self.ys)))
+        return columns, rows
+
+    def on_grid(
+        self, step: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+        """Tell it on another grid over the same places.
+
+        Parameters
+        ----------
+        step : distance of grid points, mm
+
+        Returns
+        -------
+        xs, ys : (columns,), (rows,) float64, mm
+        support : (rows, columns) bool
+        """
+        xs, ys = (_axis(own[0], own[-1], step) for own in (self.xs, self.ys))
+        columns, rows = self.places(xs, ys)
+        return xs, ys, above(self.margin, rows, columns, self.level)
 
 
 def _broadly_blurred(image: NDArray[np.uint8], sigma: float) -> NDArray[np.float32]:

@@ -96,7 +96,7 @@ def test_inside_a_hole_repeated_wide_averages_are_better_than_the_near_one(monke
 
 def test_the_same_seeds_give_the_same_bytes(noisy):
     again = surfaces(1.2)[1]
-    np.testing.assert_array_equal(noisy[1].detail, again.detail)
+    np.testing.assert_array_equal(noisy[1].sheet, again.sheet)
     assert noisy[1].noise == again.noise
 
 
@@ -105,7 +105,7 @@ def test_far_from_all_seeds_the_detail_stays_finite():
     points[:, 2] = truth(*points[:, :2].T)
     broad = fit_surface(points, 14 * SPACING, 20)
     detailed = add_detail(broad, points, SPACING, 1.6 * SPACING)
-    assert np.isfinite(detailed.detail).all()
+    assert np.isfinite(detailed.sheet).all()
     middle = np.hypot(X, Y) < 20
     np.testing.assert_allclose(
         detailed.on_grid(XS, YS)[middle], broad.on_grid(XS, YS)[middle], atol=0.02)

@@ -7,13 +7,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from recon.support import support_on_grid
+from recon._image_kernels import above
+from recon.support import Support
 from tests.unit.recon.shapes import disc_seeds
 
 
 def supported(points, spacing, step=None):
     """The grid's points with support, (k, 2), those without, and their distance to a seed."""
-    xs, ys, support = support_on_grid(points, spacing, step or spacing / np.sqrt(10))
+    xs, ys, support = Support.of(points, spacing).on_grid(step or spacing / np.sqrt(10))
     grid = np.stack(np.meshgrid(xs, ys), axis=-1)
     return grid[support], grid[~support]
 
@@ -55,7 +56,7 @@ def test_two_parts_are_not_joined():
 
 def roundness(points):
     """Perimeter squared over area, 1 for a circle."""
-    support = support_on_grid(points, 1.0, 0.3)[2].astype(np.uint8)
+    support = Support.of(points, 1.0).on_grid(0.3)[2].astype(np.uint8)
     outlines, _ = cv2.findContours(support, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     perimeter = sum(cv2.arcLength(outline, True) for outline in outlines)
     return perimeter**2 / (4 * np.pi * support.sum())
@@ -96,9 +97,34 @@ def test_few_seeds_still_have_support(sides):
 
 def test_the_grid_is_regular_and_its_border_empty():
     points = disc_seeds(1.5, 20)
-    xs, ys, support = support_on_grid(points, 1.5, 0.5)
+    xs, ys, support = Support.of(points, 1.5).on_grid(0.5)
     np.testing.assert_allclose(np.diff(xs), 0.5)
     np.testing.assert_allclose(np.diff(ys), 0.5)
     assert support.shape == (len(ys), len(xs))
     assert not support[[0, -1]].any()
     assert not support[:, [0, -1]].any()
+
+
+def test_both_grids_agree_and_the_area_is_that_of_the_disc():
+    support = Support.of(disc_seeds(1.3, 40), 1.3)
+    _, _, inside = support.on_grid(0.4)
+    area = inside.sum() * 0.4**2
+    assert support.area == pytest.approx(area, rel=0.02)
+    assert area == pytest.approx(np.pi * 40**2, rel=0.05)
+    columns, rows = support.places(support.xs, support.ys)
+    np.testing.assert_array_equal(
+        support.inside, above(support.margin, rows, columns, 0.0))
+
+
+def test_what_is_left_out_ends_half_way_to_the_next_point():
+    support = Support.of(disc_seeds(1.0, 20), 1.0)
+    left_out = np.zeros(support.inside.shape, bool)
+    middle = np.argmin(np.abs(support.ys)), np.argmin(np.abs(support.xs))
+    left_out[middle[0] - 2:middle[0] + 3, middle[1] - 2:middle[1] + 3] = True
+    without = support.without(left_out)
+    np.testing.assert_array_equal(without.inside, support.inside & ~left_out)
+    step = 0.02
+    _, _, inside = without.on_grid(step)
+    _, _, before = support.on_grid(step)
+    gone = np.argwhere(before & ~inside) * step
+    np.testing.assert_allclose(np.ptp(gone, axis=0), 5 * support.step, atol=0.1)

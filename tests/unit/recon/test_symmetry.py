@@ -159,6 +159,6 @@ def test_without_noise_nothing_changes():
 
 def test_the_same_seeds_give_the_same_bytes(half):
     points, broad = half
-    one, other = (add_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=True).detail
+    one, other = (add_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=True).sheet
                   for _ in range(2))
     np.testing.assert_array_equal(one, other)
