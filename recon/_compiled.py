@@ -7,9 +7,17 @@ where neither can be written, it is compiled at each start.
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from numba import njit
+import numpy as np
+from numba import njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numba.np.numpy_support import carray
+from numpy.typing import NDArray
 
-__all__ = ["compiled"]
+__all__ = ["AT_HAND", "compiled", "floats_at_hand", "inlined"]
+
+AT_HAND = 8
+"""Numbers in `floats_at_hand`."""
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -20,3 +28,29 @@ def compiled(function: _F) -> _F:
         return cast("_F", njit(cache=True, fastmath=True)(function))
     except RuntimeError:  # numba found no folder for its cache
         return cast("_F", njit(fastmath=True)(function))
+
+
+def inlined(function: _F) -> _F:
+    """Compile a function as a part of each that calls it."""
+    return cast("_F", njit(fastmath=True, inline="always")(function))
+
+
+@intrinsic
+def _room(_: Any) -> tuple[Any, Any]:
+    """Point to room for `AT_HAND` float32 on the stack."""
+    def code(context: Any, builder: Any, _signature: Any, _args: Any) -> Any:
+        return cgutils.alloca_once(  # type: ignore[no-untyped-call]
+            builder, context.get_value_type(types.float32),
+            size=context.get_constant(types.intp, AT_HAND))
+
+    return types.CPointer(types.float32)(), code  # type: ignore[no-untyped-call]
+
+
+@inlined
+def floats_at_hand() -> NDArray[np.float32]:
+    """Give (`AT_HAND`,) float32 on the stack, for compiled functions alone.
+
+    Of these the compiler knows that no other array shares their memory: what is read elsewhere
+    while they are written need not be read anew, and a loop is vectorised without questions.
+    """
+    return carray(_room(), (AT_HAND,))  # type: ignore[call-arg]

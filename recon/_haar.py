@@ -22,6 +22,7 @@ __all__ = ["Cascade", "load_cascade", "passing_boxes"]
 _ROUNDING = 1e-5
 # Windows up to twice the cascade's own are tried at every second pixel.
 _COARSE_BELOW = 2.0
+_MOST_NODES = 2
 
 
 class Cascade(NamedTuple):
@@ -49,17 +50,16 @@ def load_cascade(name: str) -> Cascade:
     rectangles = [[_numbers(one) for one in _part(feature, "rects")]
                   for feature in _part(root, "features")]
     nodes: list[NDArray[np.float64]] = []
-    leaves: list[float] = []
+    outcomes: list[list[float]] = []
     stages, least = [0], []
     for stage in _part(root, "stages"):
         weak = _part(stage, "weakClassifiers")
         for tree in weak:
             # left, right, feature, threshold; a way that is not positive is minus a leaf.
             rows = _numbers(_part(tree, "internalNodes")).reshape(-1, 4)
-            ways = rows[:, :2]
-            rows[:, :2] = np.where(ways > 0, ways + len(nodes), ways - 1 - len(leaves))
+            outcomes.append(_outcomes(rows[:, :2].astype(int).tolist(),
+                                      _numbers(_part(tree, "leafValues")).tolist()))
             nodes += list(rows)
-            leaves += list(_numbers(_part(tree, "leafValues")))
         stages.append(stages[-1] + len(weak))
         least.append(float(_numbers(_part(stage, "stageThreshold"))[0]) - _ROUNDING)
     table = np.array(nodes)
@@ -71,7 +71,7 @@ def load_cascade(name: str) -> Cascade:
     return Cascade(
         int(_numbers(_part(root, "width"))[0]),
         Trees(weights.astype(np.float32), table[:, 3].astype(np.float32),
-              np.ascontiguousarray(table[:, :2], np.int32), np.array(leaves, np.float32),
+              np.array(outcomes, np.float32),
               np.array(stages, np.uint32), np.array(least, np.float32)),
         corners.astype(np.int32))
 
@@ -99,7 +99,8 @@ def passing_boxes(
     """
     height, width = gray.shape
     found = []
-    corners = flat_corners(cascade.corners, width + 1)
+    stride = width + 1 + (width + 1) % 2
+    corners = [flat_corners(cascade.corners, stride, step) for step in (1, 2)]
     factor = 1.0
     while (side := round(cascade.window * factor)) <= min(largest, height, width):
         if side >= smallest:
@@ -110,13 +111,20 @@ def passing_boxes(
             # half of what a pixel has become wider.
             scaled = to_cells @ np.array(
                 [[factor, 0, (factor - 1) / 2], [0, factor, (factor - 1) / 2], [0, 0, 1]])
-            windows = passing_windows(
-                small, cascade.trees, corners, width + 1, cascade.window,
-                1 if factor >= _COARSE_BELOW else 2, scaled, wanted)
+            step = 1 if factor >= _COARSE_BELOW else 2
+            windows = passing_windows(small, cascade.trees, corners[step - 1], stride,
+                                      cascade.window, step, scaled, wanted)
             found += [(round(x * factor), round(y * factor), side, side)
                       for x, y in windows.tolist()]
         factor *= scale_step
     return found
+
+
+def _outcomes(ways: list[list[int]], leaves: list[float]) -> list[float]:
+    """Give `Trees.outcomes` of a tree of one node or two."""
+    if len(ways) > _MOST_NODES:
+        raise RuntimeError(f"a cascade's tree has {len(ways)} nodes, at most {_MOST_NODES} can be")
+    return [leaves[-(way if way <= 0 else then)] for way in ways[0] for then in ways[-1]]
 
 
 def _part(element: ElementTree.Element, name: str) -> ElementTree.Element:

@@ -156,9 +156,6 @@ def collect(
     wide, plane = np.uint64(sheet.shape[2]), np.uint64(sheet.shape[1] * sheet.shape[2])
     color_wide, sigma_wide = np.uint64(3 * colors.shape[1]), np.uint64(sigma.shape[1])
     upper_row, upper_node = -2, -2
-    wide, plane = np.uint64(sheet.shape[2]), np.uint64(sheet.shape[1] * sheet.shape[2])
-    color_wide = np.uint64(colors.shape[1] * 3)
-    sigma_wide=np.uint64(sigma.shape[1])
     i = _0
     for row in range(rows):
         if row % every == 0:
