@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["depths_in_box", "fill_layers", "nearest_in_cells"]
+__all__ = ["depths_in_box", "fill_layers", "middle_depths", "nearest_in_cells"]
 
 
 @compiled
@@ -68,4 +68,16 @@ def depths_in_box(
             if abs(u) < 1 and abs(v) < 1:
                 found[count, 0], found[count, 1], found[count, 2] = u, v, color_depth[i, j]
                 count += 1
+    return found[:count]
+
+
+@compiled
+def middle_depths(depths: NDArray[np.float64], middle: float) -> NDArray[np.float64]:
+    """Give the z of (n, 3) u, v and z with both u and v nearer to 0 than `middle`."""
+    found = np.empty(len(depths))
+    count = 0
+    for i in range(len(depths)):
+        found[count] = depths[i, 2]
+        if abs(depths[i, 0]) < middle and abs(depths[i, 1]) < middle:
+            count += 1
     return found[:count]

@@ -100,7 +100,7 @@ def passing_boxes(
     height, width = gray.shape
     found = []
     stride = width + 1 + (width + 1) % 2
-    corners = [flat_corners(cascade.corners, stride, step) for step in (1, 2)]
+    corners: dict[int, NDArray[np.uint64]] = {}
     factor = 1.0
     while (side := round(cascade.window * factor)) <= min(largest, height, width):
         if side >= smallest:
@@ -112,7 +112,9 @@ def passing_boxes(
             scaled = to_cells @ np.array(
                 [[factor, 0, (factor - 1) / 2], [0, factor, (factor - 1) / 2], [0, 0, 1]])
             step = 1 if factor >= _COARSE_BELOW else 2
-            windows = passing_windows(small, cascade.trees, corners[step - 1], stride,
+            if step not in corners:
+                corners[step] = flat_corners(cascade.corners, stride, step)
+            windows = passing_windows(small, cascade.trees, corners[step], stride,
                                       cascade.window, step, scaled, wanted)
             found += [(round(x * factor), round(y * factor), side, side)
                       for x, y in windows.tolist()]

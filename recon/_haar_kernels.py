@@ -47,13 +47,16 @@ class Trees(NamedTuple):
 def flat_corners(
     corners: NDArray[np.int32], stride: int, step: int
 ) -> NDArray[np.uint64]:
-    """Turn (nodes, 12, 2) x and y into offsets in rows of so many, of columns sorted as below."""
+    """Turn (nodes, 12, 2) x and y into offsets in rows of so many, of columns sorted as below.
+
+    step : 1 or 2
+    """
     flat = np.empty(corners.shape[:2], np.uint64)
-    part = stride // step
+    part, odd = stride // step, step - 1
     for node in range(corners.shape[0]):
         for k in range(corners.shape[1]):
             x = corners[node, k, 0]
-            flat[node, k] = x // step + part * (x % step) + stride * corners[node, k, 1]
+            flat[node, k] = (x >> odd) + part * (x & odd) + stride * corners[node, k, 1]
     return flat
 
 
@@ -68,7 +71,7 @@ def passing_windows(
     corners : (nodes, 12), of each node's rectangles, offsets in rows of `stride`, more than W and a
         multiple of `step`: in them every `step`-th column of the integral image, then the next ones
     window : its side, pixels
-    step : from one window to the next, pixels
+    step : from one window to the next, 1 or 2 pixels
     to_cells : (2, 3), from the middle of a window to column and row of `wanted`
     wanted : where the middle of a window may be
     """

@@ -2,7 +2,8 @@
 
 A plane is a unit normal and an offset: n . p = offset. `field` is (rows, columns, k) float32, its
 first plane the height, mm, the second the share of a point's normal that looks along z, the third
-its weight; places in it are grid points from `origin`, mm, `step` apart.
+its weight; places in it are grid points from `origin`, (x, y) mm, `step` apart. Where `origin` has
+a z, heights count from -z.
 """
 
 import math
@@ -41,7 +42,7 @@ def mirror_costs(
                 if 0 <= row < rows and 0 <= column < columns:
                     near = field[int(row + 0.5), int(column + 0.5)]
                     if near[2] > 0:
-                        away = (near[0] - (z - twice * nz)) * near[1]
+                        away = (near[0] + origin[2] - (z - twice * nz)) * near[1]
                         cost = min(away * away, most)
                 total += cost
             costs[a, b] = total / len(points)
@@ -95,7 +96,7 @@ def refine_plane(
             dy = (lower - upper) / step
             # The field's normal is (-dx, -dy, 1) facing.
             facing = 1 / math.sqrt(1 + dx * dx + dy * dy)
-            rest = (upper + down * (lower - upper) - (z - 2 * away * nz)) * facing
+            rest = (upper + down * (lower - upper) + origin[2] - (z - 2 * away * nz)) * facing
             looks = facing * (nz - dx * nx - dy * ny)
             J[0] = 2 * ((ax * x + ay * y + az * z) * looks
                         + away * facing * (az - dx * ax - dy * ay))

@@ -17,6 +17,7 @@ __all__ = ["CELLS", "Region", "regions_by_depth", "without_flat"]
 # A face farther away has under 2,000 depth pixels and noise of over 5 mm: no face worth having.
 _NEAREST_MM, _FARTHEST_MM = 300.0, 2000.0
 _LAYERS = 7
+_EDGES = np.geomspace(_NEAREST_MM, _FARTHEST_MM, _LAYERS + 1)
 CELLS = 80
 """Cells of the colour image, so many across, in which depth is looked at."""
 
@@ -65,8 +66,7 @@ def regions_by_depth(
     """
     if not (registered.color_depth > 0).any():
         raise NoDepthError("no depth lies before the colour camera: is the calibration right?")
-    edges = np.geomspace(_NEAREST_MM, _FARTHEST_MM, _LAYERS + 1)
-    edges = np.append(edges[edges < nearer_than_mm], min(nearer_than_mm, _FARTHEST_MM))
+    edges = np.append(_EDGES[nearer_than_mm > _EDGES], min(nearer_than_mm, _FARTHEST_MM))
     cell = shape[1] / CELLS
     filled = np.zeros((len(edges) - 1, int(np.ceil(shape[0] / cell)), CELLS), np.uint8)
     fill_layers(registered.pixels, registered.color_depth, registered.visible, edges, cell, filled)

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._cascades import Look, Middles, look_for_faces
-from recon._detect_kernels import depths_in_box
+from recon._detect_kernels import depths_in_box, middle_depths
 from recon._evened import evened
+from recon._percentile import percentile
 from recon._regions import CELLS, Region, regions_by_depth, without_flat
 from recon._relief import bulge_mm
 from recon.errors import FaceWithoutDepthError, NoFaceError
@@ -263,10 +264,10 @@ class _Search:
         registered = self.registered
         depths = depths_in_box(registered.pixels, registered.color_depth, registered.visible,
                                float(x), float(y), float(w), float(h))
-        z = depths[(np.abs(depths[:, :2]) < _MIDDLE).all(axis=1), 2]
+        z = middle_depths(depths, _MIDDLE)
         if len(z) < _LEAST_MIDDLE_SHARE * w * h * (_MIDDLE / registered.pitch)**2:
             return FaceCandidate(box=box, depth_mm=None, width_mm=None, verdict="no depth")
-        depth = float(np.median(z))
+        depth = percentile(z, 50)
         width = w * depth / self.focal_px
         verdict = "face"
         if not FACE_WIDTH_MM[0] <= width <= FACE_WIDTH_MM[1]:

@@ -6,6 +6,7 @@ Gauss and Newton from the best few end it. Large distances count little (Geman a
 weights), so that a swollen cheek does not draw the plane.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,8 +77,7 @@ def find_plane(
         return None
     middle = points.mean(axis=0)
     points -= middle
-    field = field[..., :3] - np.array([middle[2], 0, 0], np.float32)
-    start = np.asarray(origin) - middle[:2]
+    start = np.array([*origin, 0.0]) - middle
     some = points[::round((_SPARSE_MM / _DENSE_MM) ** 2)]
     level = _most_curved(some)
     normals = np.cos(_TURNS)[:, None] * level + np.sin(_TURNS)[:, None] * (0.0, 0.0, 1.0)
@@ -114,6 +114,7 @@ def _most_curved(points: Floats) -> Floats:
     """The direction across the view in which (n, 3) points about their middle curve away most."""
     x, y, z = points.T
     terms = np.stack([np.ones_like(x), x, y, x * x / 2, x * y, y * y / 2])
-    *_, xx, xy, yy = np.linalg.solve(terms @ terms.T, terms @ z)
-    _, axes = np.linalg.eigh([[xx, xy], [xy, yy]])
-    return np.array([*axes[:, 1], 0.0])
+    *_, xx, xy, yy = np.linalg.solve(terms @ terms.T, terms @ z).tolist()
+    # The second axis of a symmetric matrix of two rows.
+    turn = math.atan2(2 * xy, xx - yy) / 2
+    return np.array([math.cos(turn), math.sin(turn), 0.0])
