@@ -7,6 +7,7 @@ from recon._compiled import compiled
 
 __all__ = ["BILINEAR_VARIANCE", "bounds", "mark", "read_between", "share_out"]
 
+_1 = np.uint64(1)
 BILINEAR_VARIANCE = 1 / 6
 """What bilinear weights blur by on average, squared pixels."""
 
@@ -43,22 +44,27 @@ def mark(
 @compiled
 def share_out(
     columns: NDArray[np.float32], rows: NDArray[np.float32], values: NDArray[np.float32],
-    image: NDArray[np.float32],
+    counts: NDArray[np.float32], sums: NDArray[np.float32],
 ) -> None:
-    """Add each value to the four pixels around its place, by bilinear weights.
+    """Add 1, and each value, to the four pixels around its place, by bilinear weights.
 
-    columns, rows : (n,), places inside `image`, not on its last row or column
+    columns, rows : (n,), places inside the images, not on their last row or column
     """
+    flat, same, width = sums.ravel(), counts.ravel(), np.uint64(sums.shape[1])
     for i in range(len(values)):
         # Unsigned: a number that might be negative costs a question at each look.
-        left, above = np.uint32(columns[i]), np.uint32(rows[i])
-        right_part, lower_part = columns[i] - np.float32(left), rows[i] - np.float32(above)
-        lower = values[i] * lower_part
-        upper = values[i] - lower
-        image[above, left] += upper - upper * right_part
-        image[above, left + 1] += upper * right_part
-        image[above + 1, left] += lower - lower * right_part
-        image[above + 1, left + 1] += lower * right_part
+        left, above = np.uint64(columns[i]), np.uint64(rows[i])
+        right_part, low = columns[i] - np.float32(left), rows[i] - np.float32(above)
+        value, at = values[i], above * width + left
+        below, right = at + width, right_part * low
+        same[at] += 1 - low - right_part + right
+        same[at + _1] += right_part - right
+        same[below] += low - right
+        same[below + _1] += right
+        flat[at] += value * (1 - low - right_part + right)
+        flat[at + _1] += value * (right_part - right)
+        flat[below] += value * (low - right)
+        flat[below + _1] += value * right
 
 
 @compiled

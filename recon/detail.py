@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from recon._image_kernels import add_between
 from recon._percentile import percentile
 from recon._scatter_kernels import BILINEAR_VARIANCE, read_between, share_out
+from recon._sheet_kernels import face_field, slopes
 from recon.local_means import blurred, enlarged, local_means
 from recon.mirror_plane import find_plane
 from recon.rbf import Surface
@@ -105,8 +106,8 @@ def add_detail(
     heights = base.heights(xs, ys)
     rest = points[:, 2] - grid.at_seeds(heights)
     usual = np.float32((step / spacing) ** 2)
-    weight = grid.spread(None, radius / step)
-    detail = grid.spread(rest, radius / step) / (weight + usual * np.float32(_FADING))
+    weight, detail = (blurred(one, _unshared(radius / step)) for one in grid.sums(rest))
+    detail /= weight + usual * np.float32(_FADING)
     seeded = np.minimum(weight / (usual * np.float32(_FULL)), 1)
     missing = 1 - seeded
     missing *= missing * (3 - 2 * missing)
@@ -116,33 +117,42 @@ def add_detail(
     rim = Rim.of(support, step / spacing)
     # So broad an average needs no more than every fourth point.
     cells = half.halved()
-    broad = broad_average(cells.sums(None), cells.sums(rest), BROADER * radius / (4 * step),
-                          16 * float(usual), rim, 2)
+    broad = broad_average(
+        *cells.sums(rest), BROADER * radius / (4 * step), 16 * float(usual), rim, 2)
     detail += _doubled(rim.nearness, detail) * (_doubled(broad, detail) - detail)
 
     # How much of it is more than noise varies slowly: every second point is enough.
     some = np.s_[::2, ::2]
     shown = support[some].astype(np.float32)
-    field = _field(heights[some], shown, detail[some], seeded[some], spacing)
-    gain, noise = _gain(field[..., 3], field[..., 2], rim.nearness < _AT_RIM, spacing)
+    inner = np.clip(2 * blurred(shown, _FADING_RIM) - 1, 0, 1) * shown
+    field = face_field(heights, detail, seeded, inner, spacing)
+    gain, noise = _gain(field[..., 3], inner, rim.nearness < _AT_RIM, spacing)
     origin = float(xs[0]), float(ys[0])
     plane = find_plane(field, origin, spacing) if symmetry else None
     kept = gain * detail[some]
-    detail *= _between(gain, detail.shape)
+    between = [(np.arange(side) / 2).astype(np.float32) for side in detail.shape]
+    share = np.zeros_like(detail)
+    add_between(share, gain, *between)
+    detail *= share
     if plane is not None:
-        detail += _between(helped_by_mirror(field, kept, plane, noise, _WINDOW_MM, origin, spacing),
-                           detail.shape)
+        helped = helped_by_mirror(field, kept, plane, noise, _WINDOW_MM, origin, spacing)
+        add_between(detail, helped, *between)
 
     if look_up is not None:
         surface = heights[some] + detail[some]
-        places = xs[::2], ys[::2]
-        detail += _between(shading_detail(surface, shown * rim.within, _slopes(surface, spacing),
-                                          places, look_up), detail.shape)
-    detail += _doubled(rim.frayed_depth(_slopes(halved(heights), 2 * step), spacing), detail)
-    heights += detail
-    return DetailedSurface(
-        np.stack([heights, *_slopes(heights, step)]), supported,
-        noise=float((rest - grid.at_seeds(detail)).std()))
+        across, down = np.empty_like(surface), np.empty_like(surface)
+        slopes(surface, spacing, across, down)
+        shaded = shading_detail(
+            surface, shown * rim.within, (across, down), (xs[::2], ys[::2]), look_up)
+        add_between(detail, shaded, *between)
+    smaller = halved(heights)
+    across, down = np.empty_like(smaller), np.empty_like(smaller)
+    slopes(smaller, 2 * step, across, down)
+    detail += _doubled(rim.frayed_depth((across, down), spacing), detail)
+    sheet = np.empty((3, *detail.shape), np.float32)
+    np.add(heights, detail, out=sheet[0])
+    slopes(sheet[0], step, sheet[1], sheet[2])
+    return DetailedSurface(sheet, supported, noise=float((rest - grid.at_seeds(detail)).std()))
 
 
 class _Seeded:
@@ -164,29 +174,20 @@ class _Seeded:
         columns, rows = (half * (one - half) for one in (self.columns, self.rows))
         return _Seeded(columns, rows, ((self.shape[0] + 1) // 2, (self.shape[1] + 1) // 2))
 
-    def sums(self, values: Image | None) -> Image:
-        """Sum the seeds' values, or the seeds, each shared among the four pixels around it."""
-        sums = np.zeros(self.shape, np.float32)
-        given = np.ones_like(self.columns) if values is None else values
-        share_out(self.columns, self.rows, given, sums)
-        return sums
-
-    def spread(self, values: Image | None, sigma: float) -> Image:
-        """Sum the seeds' values, or the seeds, weighted by a Gaussian."""
-        # Sharing a value among four pixels blurs by as much already.
-        return blurred(self.sums(values), math.sqrt(sigma * sigma - BILINEAR_VARIANCE))
+    def sums(self, values: Image) -> tuple[Image, Image]:
+        """Sum the seeds, and their values, each shared among the four pixels around it."""
+        counts, sums = np.zeros(self.shape, np.float32), np.zeros(self.shape, np.float32)
+        share_out(self.columns, self.rows, values, counts, sums)
+        return counts, sums
 
     def at_seeds(self, image: Image) -> Image:
         """Interpolate an image, (n,)."""
         return read_between(image, self.columns, self.rows)
 
 
-def _slopes(heights: Image, step: float) -> tuple[Image, Image]:
-    """Give dz/dx and dz/dy of points at a distance, mm."""
-    across, down = (
-        np.asarray(cv2.Sobel(heights, cv2.CV_32F, right, 1 - right, ksize=1, scale=0.5 / step,
-                             borderType=cv2.BORDER_REPLICATE), np.float32) for right in (1, 0))
-    return across, down
+def _unshared(sigma: float) -> float:
+    """The radius of a blur, less what sharing a value among four pixels has blurred already."""
+    return math.sqrt(sigma * sigma - BILINEAR_VARIANCE)
 
 
 def _doubled(image: Image, like: Image) -> Image:
@@ -197,23 +198,13 @@ def _doubled(image: Image, like: Image) -> Image:
 
 def _extended(grid: _Seeded, rest: Image, sigma: float, usual: np.float32) -> Image:
     """Average what the seeds show, then what that leaves of them, and so on."""
-    weight = grid.spread(None, sigma) + usual * np.float32(_FADING_WIDE)
-    total = np.zeros(grid.shape, np.float32)
-    for _ in range(_PASSES):
-        more = grid.spread(rest, sigma) / weight
-        rest = rest - grid.at_seeds(more)
-        total += more
+    sigma = _unshared(sigma)
+    seeds, sums = grid.sums(rest)
+    weight = blurred(seeds, sigma) + usual * np.float32(_FADING_WIDE)
+    total = blurred(sums, sigma) / weight
+    for _ in range(_PASSES - 1):
+        total += blurred(sums - seeds * total, sigma) / weight
     return total
-
-
-def _field(
-    heights: Image, shown: Image, detail: Image, seeded: Image, step: float
-) -> Image:
-    """What `helped_by_mirror` asks for, (rows, columns, 5)."""
-    across, down = _slopes(heights, step)
-    facing = 1 / np.sqrt(across * across + down * down + 1)
-    inner = np.clip(2 * blurred(shown, _FADING_RIM) - 1, 0, 1) * shown
-    return np.asarray(cv2.merge([heights, facing, inner, detail * facing, seeded]), np.float32)
 
 
 def _gain(
@@ -231,11 +222,3 @@ def _gain(
     noise = percentile(seen, _NOISE_PERCENTILE) if seen.size else 0.0
     gain = 1 - np.float32(noise) / np.maximum(local, np.float32(max(noise, 1e-12)))
     return np.asarray(gain, np.float32), noise
-
-
-def _between(coarse: Image, shape: tuple[int, ...]) -> Image:
-    """Interpolate an image of every second point."""
-    image = np.zeros(shape, np.float32)
-    rows, columns = ((np.arange(side) / 2).astype(np.float32) for side in shape)
-    add_between(image, coarse, rows, columns)
-    return image

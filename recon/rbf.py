@@ -212,8 +212,10 @@ def _fit(
     relative : smoothing over the largest W_i
     """
     q = next(step for least, step in _NODE_STEPS if relative >= least)
-    # How many steps exp(-2 q^2 r^2), and its square root, are not negligible.
-    near, far = (int(np.ceil(np.sqrt(-np.log(_NEGLIGIBLE) / k) / q)) for k in (2, 1))
+    # How many steps exp(-4 q^2 r^2), of two seeds' Gaussians at a node, and its fourth root are not
+    # negligible; nodes begin half a step farther.
+    near, far = (int(np.ceil(np.sqrt(-np.log(_NEGLIGIBLE) / k) / q - begin))
+                 for k, begin in ((4, 0.5), (1, 0)))
     nodes_x, nodes_y = (_nodes(low, high, q * r0, near) for low, high in extent)
     root = float(2 * q / np.sqrt(np.pi))  # sqrt(c0)
     sums, right = _node_sums(trend, charges, nodes_x, nodes_y, r0)

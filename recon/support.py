@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from recon._image_kernels import above
 from recon._scatter_kernels import bounds, mark
+from recon._sheet_kernels import left_out
 from recon.local_means import blurred
 from recon.masks import disc, fill_holes
 
@@ -87,9 +88,7 @@ class Support:
 
     def without(self, places: NDArray[np.bool_]) -> Self:
         """Give the same without some of the grid's points, up to half of the way to the next."""
-        level = np.float32(self.level)
-        less = np.minimum(level - np.abs(self.margin - level), np.float32(0))
-        return replace(self, margin=np.where(places, less, self.margin))
+        return replace(self, margin=left_out(self.margin, places, self.level))
 
     def places(
         self, xs: NDArray[np.float64], ys: NDArray[np.float64]

@@ -27,12 +27,13 @@ def test_what_is_shared_out_keeps_its_sum_and_its_middle():
     rng = np.random.default_rng(1)
     columns, rows = rng.uniform(0, 5.9, (2, 30)).astype(np.float32)
     values = rng.normal(size=30).astype(np.float32)
-    image = np.zeros((7, 7), np.float32)
-    share_out(columns, rows, values, image)
+    counts, sums = np.zeros((2, 7, 7), np.float32)
+    share_out(columns, rows, values, counts, sums)
     i, j = np.mgrid[:7, :7]
-    for found, expected in ((image, values), (i * image, rows * values), (j * image,
-                                                                         columns * values)):
-        np.testing.assert_allclose(found.sum(), expected.sum(), atol=1e-4)
+    for image, shared in ((sums, values), (counts, np.ones(30))):
+        for found, expected in ((image, shared), (i * image, rows * shared),
+                                (j * image, columns * shared)):
+            np.testing.assert_allclose(found.sum(), expected.sum(), atol=1e-4)
 
 
 def test_between_pixels_a_ramp_goes_on():

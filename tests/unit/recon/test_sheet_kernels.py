@@ -1,0 +1,46 @@
+"""Slopes on a grid against NumPy."""
+
+import numpy as np
+import pytest
+
+from recon._sheet_kernels import face_field, left_out, slopes
+
+
+def numpys(heights, step):
+    """Central differences; at the edge half of the difference to the one neighbour."""
+    padded = np.pad(heights.astype(np.float64), 1, mode="edge")
+    return ((padded[1:-1, 2:] - padded[1:-1, :-2]) / (2 * step),
+            (padded[2:, 1:-1] - padded[:-2, 1:-1]) / (2 * step))
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (3, 7), (40, 33)])
+def test_slopes_are_differences_of_the_neighbours(shape):
+    heights = np.random.default_rng(0).normal(700, 5, shape).astype(np.float32)
+    found = np.empty((2, *shape), np.float32)
+    slopes(heights, 0.6, found[0], found[1])
+    np.testing.assert_allclose(found, numpys(heights, 0.6), atol=2e-4)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (2, 5), (20, 17)])
+def test_the_field_holds_every_second_point(shape):
+    rng = np.random.default_rng(1)
+    heights, detail, seeded = rng.normal(
+        size=(3, 2 * shape[0], 2 * shape[1])).astype(np.float32)
+    inner = rng.random(shape).astype(np.float32)
+    field = face_field(heights, detail, seeded, inner, 1.2)
+    across, down = numpys(heights[::2, ::2], 1.2)
+    facing = 1 / np.sqrt(1 + across**2 + down**2)
+    expected = np.stack(
+        [heights[::2, ::2], facing, inner, detail[::2, ::2] * facing, seeded[::2, ::2]], axis=-1)
+    np.testing.assert_allclose(field, expected, atol=1e-5)
+
+
+def test_what_is_left_out_is_below_both_levels():
+    rng = np.random.default_rng(2)
+    margin = rng.normal(size=(9, 13)).astype(np.float32)
+    places = rng.random((9, 13)) < 0.5
+    found = left_out(margin, places, 0.3)
+    np.testing.assert_array_equal(found[~places], margin[~places])
+    level = np.float32(0.3)
+    np.testing.assert_allclose(
+        found[places], np.minimum(level - np.abs(margin[places] - level), 0), atol=1e-6)
