@@ -6,7 +6,7 @@ from service.kept import KeptFrame
 
 __all__ = ["FreshFrames"]
 
-_BYTES = 32 * 2**20
+_BYTES = 64 * 2**20
 """Of all images together; what comes when there is no room is read from its file."""
 
 
