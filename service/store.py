@@ -152,7 +152,7 @@ class FolderStore:
                 capture_id, CaptureState.REMOVED)
             self._found = asked, None if row is None else Stored(
                 CaptureState(row["state"]), row["settings_hash"], row["frame_sha256"],
-                row["attempts"], row["pressed_by"])
+                row["attempts"], row["accepted_at"], row["pressed_by"])
         return self._found[1]
 
     def unfinished(self) -> list[str]:
@@ -198,13 +198,11 @@ class FolderStore:
         message = result.message
         if not isinstance(message, Result):
             raise TypeError(f"a Result finishes a capture, found {message.kind}")
-        row = self._database.one(
-            "SELECT accepted_at FROM captures WHERE capture_id = ? AND state = ?",
-            message.capture_id, CaptureState.ACCEPTED)
-        if row is None:
+        stored = self.find(message.capture_id)
+        if stored is None or stored.state is not CaptureState.ACCEPTED:
             raise StoreError(f"capture {message.capture_id} waits for no face")
         about = FaceAbout(
-            accepted_at=row["accepted_at"], finished_at=stamp(self._account.wall()),
+            accepted_at=stored.accepted_at, finished_at=stamp(self._account.wall()),
             clock=self._account.save())
         return Draft(message.capture_id,
                      self._layout.face(message.capture_id, message.settings_hash), about, result)

@@ -24,6 +24,7 @@ class Stored:
     frame_sha256: str
     """Checksum of the frame's file: names what a result must have been made of."""
     attempts: int
+    accepted_at: str
     pressed_by: str = ""
     """Fingerprint of the key that pressed; empty where none was needed."""
 
