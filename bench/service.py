@@ -40,8 +40,9 @@ def _print_overhead(laps: Laps, source: Path, runs: int) -> None:
     rows = {"`reconstruct`": bare, **{name: medians[name] for name in hub},
             "both": sum(medians[name] for name in hub),
             "sensor: encode the frame": medians["sensor: encode frame"],
-            "worker: decode the job, encode the result":
-                medians["worker: decode job"] + medians["worker: encode result"]}
+            "worker: decode the job, pack and encode the result":
+                medians["worker: decode job"] + medians["worker: pack result"],
+            "client: decode and unpack the face": medians["client: unpack face"]}
     for name, ms in rows.items():
         print(f"| {name} | {ms:.1f} | {100 * ms / bare:.0f} % |")
     print("\nOf that, on the same bytes alone:\n")

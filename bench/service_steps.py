@@ -9,15 +9,17 @@ from typing import TypeVar
 
 from capture import RgbdFrame
 from recon import reconstruct
+from recon.face import Face
 from recon.settings import Settings
 from service import messages
 from service.hub import Hub
 from service.outputs import Output
 from service.payload import FaceHeader, FrameHeader
+from service.published import outcome_of
 from service.settings import ServiceSettings
 from service.spool import write_atomically
 from service.store import FolderStore
-from service.wire import Packet, decode_from_hub, decode_to_hub, encode
+from service.wire import Buffer, Packet, decode_from_hub, decode_to_hub, encode
 
 __all__ = ["Laps", "one_capture_each"]
 
@@ -79,16 +81,20 @@ def _capture(laps: Laps, hub: Hub, frame: RgbdFrame, capture_id: str, run: int) 
         raise TypeError(f"a job was expected, found {job.kind}")
     face = laps.time("reconstruct", lambda: reconstruct(
         job.frame.join(packet.arrays), job.settings))
-    found, clouds = FaceHeader.of(face)
-    result = messages.Result(
-        capture_id=capture_id, settings_hash=job.settings_hash, frame_sha256=job.frame_sha256,
-        face=found)
-    parts = laps.time("worker: encode result", lambda: encode(Packet(result, clouds)))
+    parts = laps.time("worker: pack result", lambda: _result(capture_id, job, face))
     outputs, sent = laps.time("result to publication", lambda: _say(hub, _WORKER, parts))
     laps.face_bytes, laps.points = sum(map(len, parts)), len(face.dense)
     kinds = [output.packet.message.kind for output in outputs]
     if kinds != ["face_done"]:
         raise RuntimeError(f"a face was to be published, found {kinds}")
+    laps.time("client: unpack face", lambda: outcome_of(decode_from_hub(sent[0])))
+
+
+def _result(capture_id: str, job: messages.Job, face: Face) -> list[Buffer]:
+    header, clouds = FaceHeader.of(face)
+    return encode(Packet(messages.Result(
+        capture_id=capture_id, settings_hash=job.settings_hash, frame_sha256=job.frame_sha256,
+        face=header), clouds))
 
 
 def _steps(laps: Laps, folder: Path, frame: RgbdFrame) -> None:
