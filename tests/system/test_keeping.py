@@ -63,6 +63,7 @@ def files(data):
             for path in (data / folder).iterdir()]
 
 
+@pytest.mark.timeout(300)  # a dozen commands one after the other
 def test_an_operator_s_day(tmp_path):
     once = {"DENSEFACE_ATTEMPTS": "1"}
     with service(RECORDINGS / "frontal_700.oni", tmp_path / "data", environment=once) as up, \
