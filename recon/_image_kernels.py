@@ -24,7 +24,7 @@ def add_between(
 
     rows, columns : (m,), (k,), places in `coarse`, inside it, rising
     """
-    flat, wide = coarse.ravel(), np.uint64(coarse.shape[1])
+    flat, wide, count = coarse.ravel(), np.uint64(coarse.shape[1]), np.uint64(len(columns))
     left, part = _places(columns, coarse.shape[1])
     upper, lower = np.empty(len(columns), np.float32), np.empty(len(columns), np.float32)
     known = -2
@@ -33,9 +33,9 @@ def add_between(
         if above == known + 1:
             upper, lower = lower, upper
         elif above != known:
-            _along(flat, np.uint64(above) * wide, left, part, _1, upper)
+            _along(flat, np.uint64(above) * wide, left, part, _1, _0, count, upper)
         if above != known:
-            _along(flat, np.uint64(above + 1) * wide, left, part, _1, lower)
+            _along(flat, np.uint64(above + 1) * wide, left, part, _1, _0, count, lower)
             known = above
         down = rows[i] - np.float32(above)
         own = image[i]
@@ -49,7 +49,7 @@ def above(
     level: float,
 ) -> NDArray[np.bool_]:
     """Say where an image is above a level between its points, (m, k); places of `add_between`."""
-    flat, wide = coarse.ravel(), np.uint64(coarse.shape[1])
+    flat, wide, count = coarse.ravel(), np.uint64(coarse.shape[1]), np.uint64(len(columns))
     left, part = _places(columns, coarse.shape[1])
     upper, lower = np.empty(len(columns), np.float32), np.empty(len(columns), np.float32)
     out = np.empty((len(rows), len(columns)), np.bool_)
@@ -60,9 +60,9 @@ def above(
         if first == known + 1:
             upper, lower = lower, upper
         elif first != known:
-            _along(flat, np.uint64(first) * wide, left, part, _1, upper)
+            _along(flat, np.uint64(first) * wide, left, part, _1, _0, count, upper)
         if first != known:
-            _along(flat, np.uint64(first + 1) * wide, left, part, _1, lower)
+            _along(flat, np.uint64(first + 1) * wide, left, part, _1, _0, count, lower)
             known = first
         down = rows[i] - np.float32(first)
         own = out[i]
@@ -86,10 +86,14 @@ def _places(
 @compiled
 def _along(
     image: NDArray[np.float32], begin: np.uint64, left: NDArray[np.uint32],
-    part: NDArray[np.float32], channels: np.uint64, out: NDArray[np.float32],
+    part: NDArray[np.float32], channels: np.uint64, first: np.uint64, end: np.uint64,
+    out: NDArray[np.float32],
 ) -> None:
-    """Read a row of a flat image between its points; `left` and `part` of each value."""
-    for j in range(np.uint64(len(out))):
+    """Read a row of a flat image between its points; `left` and `part` of each value.
+
+    first, end : the first value that is wanted, and the first behind those
+    """
+    for j in range(first, end):
         at = begin + left[j]
         here = image[at]
         out[j] = here + part[j] * (image[at + channels] - here)
@@ -156,39 +160,42 @@ def collect(
     wide, plane = np.uint64(sheet.shape[2]), np.uint64(sheet.shape[1] * sheet.shape[2])
     color_wide, sigma_wide = np.uint64(3 * colors.shape[1]), np.uint64(sigma.shape[1])
     upper_row, upper_node = -2, -2
+    firsts, ends = _extents(support)
     i = _0
     for row in range(rows):
         if row % every == 0:
             c0, c1 = c1, c0
+            first, end = _widest(firsts, ends, row, min(row + 2 * every, rows))
             if row == 0:
-                _along(known, _0, color_left, color_part, _3, c0)
-            _along(known, np.uint64(row // every + 1) * color_wide, color_left, color_part, _3, c1)
+                _along(known, _0, color_left, color_part, _3, _3 * first, _3 * end, c0)
+            _along(known, np.uint64(row // every + 1) * color_wide, color_left, color_part, _3,
+                   _3 * first, _3 * end, c1)
         upper = min(int(sheet_rows[row]), sheet.shape[1] - 2)
         if upper != upper_row:
-            at = np.uint64(upper) * wide
+            at, behind = np.uint64(upper) * wide, row + 1
+            while behind < rows and sheet_rows[behind] < np.float32(upper + 2):
+                behind += 1
+            first, end = _widest(firsts, ends, row, behind)
             if upper == upper_row + 1:
                 z0, z1, x0, x1, y0, y1 = z1, z0, x1, x0, y1, y0
             else:
-                _along(flat_sheet, at, left, part, _1, z0)
-                _along(flat_sheet, at + plane, left, part, _1, x0)
-                _along(flat_sheet, at + plane + plane, left, part, _1, y0)
+                _along(flat_sheet, at, left, part, _1, first, end, z0)
+                _along(flat_sheet, at + plane, left, part, _1, first, end, x0)
+                _along(flat_sheet, at + plane + plane, left, part, _1, first, end, y0)
             at += wide
-            _along(flat_sheet, at, left, part, _1, z1)
-            _along(flat_sheet, at + plane, left, part, _1, x1)
-            _along(flat_sheet, at + plane + plane, left, part, _1, y1)
+            _along(flat_sheet, at, left, part, _1, first, end, z1)
+            _along(flat_sheet, at + plane, left, part, _1, first, end, x1)
+            _along(flat_sheet, at + plane + plane, left, part, _1, first, end, y1)
             upper_row = upper
         node = int(sheet_rows[row] / np.float32(each))
         if node != upper_node:
             at = np.uint64(node) * sigma_wide
-            _along(flat_sigma, at, sigma_left, sigma_part, _1, s0)
-            _along(flat_sigma, at + sigma_wide, sigma_left, sigma_part, _1, s1)
+            _along(flat_sigma, at, sigma_left, sigma_part, _1, _0, np.uint64(columns), s0)
+            _along(flat_sigma, at + sigma_wide, sigma_left, sigma_part, _1, _0,
+                   np.uint64(columns), s1)
             upper_node = node
         line = np.uint64(row) * np.uint64(columns)
-        first, end = _0, np.uint64(columns)
-        while first < end and not flat_support[line + first]:
-            first += _1
-        while end > first and not flat_support[line + end - _1]:
-            end -= _1
+        first, end = firsts[row], ends[row]
         down = np.float32(row % every) / np.float32(every)
         for j in range(_3 * first, _3 * end):
             whole[j] = np.uint8(np.int32(c0[j] + down * (c1[j] - c0[j]) + np.float32(0.5)))
@@ -229,6 +236,37 @@ def collect(
             while first < end and not flat_support[line + first]:
                 first += _1
     return points, normals, rgb, error, cells
+
+
+@compiled
+def _extents(support: NDArray[np.bool_]) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+    """Give each row's first supported column, and the first behind all of them; 0 where none."""
+    rows, columns = support.shape
+    flat = support.ravel()
+    firsts, ends = np.zeros(rows, np.uint64), np.zeros(rows, np.uint64)
+    for row in range(rows):
+        line = np.uint64(row) * np.uint64(columns)
+        first, end = _0, np.uint64(columns)
+        while first < end and not flat[line + first]:
+            first += _1
+        while end > first and not flat[line + end - _1]:
+            end -= _1
+        if end > first:
+            firsts[row], ends[row] = first, end
+    return firsts, ends
+
+
+@compiled
+def _widest(
+    firsts: NDArray[np.uint64], ends: NDArray[np.uint64], begin: int, behind: int
+) -> tuple[np.uint64, np.uint64]:
+    """Give the first column of some rows, and the first behind all of theirs."""
+    first, end = firsts[begin], ends[begin]
+    for row in range(begin + 1, behind):
+        if ends[row] > 0:
+            first = min(first, firsts[row]) if end > 0 else firsts[row]
+            end = max(end, ends[row])
+    return first, end
 
 
 @compiled

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["BILINEAR_VARIANCE", "bounds", "mark", "read_between", "share_out"]
+__all__ = ["BILINEAR_VARIANCE", "bounds", "mark", "places", "read_between", "share_out"]
 
 _1 = np.uint64(1)
 BILINEAR_VARIANCE = 1 / 6
@@ -39,6 +39,21 @@ def mark(
         column = np.uint32((points[i, 0] - origin[0]) * per_step + 0.5)
         image[row, column] = 1
     return image
+
+
+@compiled
+def places(
+    points: NDArray[np.float32], origin: tuple[float, float], step: float
+) -> NDArray[np.float32]:
+    """Give (row, column) of each point, (n, 3), between pixels: (n, 2); none before the first.
+
+    origin, step : where the first pixel's middle is, (x, y), and the distance of pixels, mm
+    """
+    out = np.empty((len(points), 2), np.float32)
+    for i in range(len(points)):
+        out[i, 0] = max((points[i, 1] - origin[1]) / step, 0.0)
+        out[i, 1] = max((points[i, 0] - origin[0]) / step, 0.0)
+    return out
 
 
 @compiled

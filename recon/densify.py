@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._image_kernels import collect, unset
-from recon._scatter_kernels import BILINEAR_VARIANCE, mark
+from recon._scatter_kernels import BILINEAR_VARIANCE, mark, places
 from recon.colors import average_neighbors
 from recon.detail import DetailedSurface
 from recon.face import DenseCloud
@@ -131,12 +131,11 @@ def _colors(
     wanted: NDArray[np.bool_],
 ) -> NDArray[np.uint8]:
     """The seeds' mean colour on a grid of its own, (rows, columns, 3)."""
-    # In double precision: no place may come out before the first.
-    places = ((seeds.points[:, 1::-1] - origin[::-1]) / step).astype(np.float32)
     # Sharing a colour among four pixels, and reading between four, blurs by as much.
     radius = np.sqrt(max((_COLOR_RADIUS * spacing / step) ** 2 - 2 * BILINEAR_VARIANCE,
                          _LEAST_RADIUS**2))
-    return average_neighbors(seeds.colors, places, wanted, float(radius), spacing / step)
+    return average_neighbors(seeds.colors, places(seeds.points, origin, step), wanted,
+                             float(radius), spacing / step)
 
 
 def _coarser(support: NDArray[np.bool_], every: int) -> NDArray[np.bool_]:

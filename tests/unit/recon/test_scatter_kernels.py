@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from recon._scatter_kernels import bounds, mark, read_between, share_out
+from recon._scatter_kernels import bounds, mark, places, read_between, share_out
 
 
 def test_bounds_are_the_least_and_the_largest():
@@ -21,6 +21,11 @@ def test_the_pixel_nearest_to_a_point_is_marked():
     columns, rows = np.rint((points[:, :2] - (10, -20)) / 2).astype(int).T
     expected[rows, columns] = 1
     np.testing.assert_array_equal(image, expected)
+
+
+def test_places_count_pixels_and_begin_at_the_first():
+    points = np.array([[10, -20, 700], [11, -17, 700], [9.999, -20.001, 0]], np.float32)
+    np.testing.assert_allclose(places(points, (10.0, -20.0), 2.0), [[0, 0], [1.5, 0.5], [0, 0]])
 
 
 def test_what_is_shared_out_keeps_its_sum_and_its_middle():
