@@ -155,7 +155,7 @@ def mirror_image(
     field: NDArray[np.float32], added: NDArray[np.float32], origin: NDArray[np.float64],
     step: float, normal: NDArray[np.float64], offset: float, farthest: float, steepest: float,
 ) -> NDArray[np.float32]:
-    """What a field shows at each of its points' mirror images, (rows, columns, k) float32.
+    """What a field shows at each of its points' mirror images, (k, rows, columns) float32.
 
     `added` to the heights, (rows, columns) mm, is the surface whose points are mirrored. The
     first plane of the result is how far along the point's own normal the mirrored heights are
@@ -164,33 +164,38 @@ def mirror_image(
     Zero where there is nothing.
     """
     rows, columns, kinds = field.shape
-    out = np.zeros(field.shape, np.float32)
+    out = np.zeros((kinds, rows, columns), np.float32)
     read = np.empty(kinds, np.float32)
+    flat, per_step = field.ravel(), 1 / step
+    to_right, to_lower = np.uint64(kinds), np.uint64(columns * kinds)
     for i in range(rows):
+        y = origin[1] + step * i
         for j in range(columns):
             if field[i, j, 2] <= 0:
                 continue
-            x, y = origin[0] + step * j, origin[1] + step * i
-            z = field[i, j, 0] + added[i, j]
+            x, z = origin[0] + step * j, np.float64(field[i, j, 0] + added[i, j])
             twice = 2 * (normal[0] * x + normal[1] * y + normal[2] * z - offset)
-            column = (x - twice * normal[0] - origin[0]) / step
-            row = (y - twice * normal[1] - origin[1]) / step
+            column = j - twice * normal[0] * per_step
+            row = i - twice * normal[1] * per_step
             if not (0 <= row < rows - 1 and 0 <= column < columns - 1):
                 continue
-            r, c = int(row), int(column)
+            r, c = np.uint64(row), np.uint64(column)
             down, right = np.float32(row - r), np.float32(column - c)
-            for k in range(kinds):
-                upper = field[r, c, k] + right * (field[r, c + 1, k] - field[r, c, k])
-                lower = field[r + 1, c, k] + right * (field[r + 1, c + 1, k] - field[r + 1, c, k])
+            at = r * to_lower + c * to_right
+            for k in range(to_right):
+                here = at + k
+                upper = flat[here] + right * (flat[here + to_right] - flat[here])
+                here += to_lower
+                lower = flat[here] + right * (flat[here + to_right] - flat[here])
                 read[k] = upper + down * (lower - upper)
-            away = (read[0] - (z - twice * normal[2])) * read[1]
+            away = (read[0] - np.float32(z - twice * normal[2])) * read[1]
             gap = away + added[i, j] * field[i, j, 1]
             near = min(max(2 - 2 * abs(gap) / farthest, 0.0), 1.0)
             faced = min(max(read[1] / steepest - 1, 0.0), 1.0)
             weight = read[2] * near * faced
             if weight > 0:
                 for k in range(kinds):
-                    out[i, j, k] = read[k]
-                out[i, j, 0] = gap
-                out[i, j, 2] = weight
+                    out[k, i, j] = read[k]
+                out[0, i, j] = gap
+                out[2, i, j] = weight
     return out

@@ -64,8 +64,8 @@ def helped_by_mirror(
     """
     image = mirror_image(field, kept, np.asarray(origin), step, plane.normal, plane.offset,
                          _FARTHEST_MM, _STEEPEST)
-    gap, weight, mirrored = (image[..., k] for k in (0, 2, 3))
-    own, facing = field[..., 3], field[..., 1]
+    gap, weight, mirrored = (image[k] for k in (0, 2, 3))
+    facing, own, seeded = (np.ascontiguousarray(field[..., k]) for k in (1, 3, 4))
     v = np.float32(max(noise, 1e-12))
     energy, common = local_means(
         weight, window / (2 * step), own * own + mirrored * mirrored, own * mirrored)
@@ -83,7 +83,7 @@ def helped_by_mirror(
     found = first * own + second * mirrored - enlarged(same, own.shape) * kept * facing
 
     here, there = (v * np.float32(_BROAD) / np.maximum(seeds, np.float32(_LEAST))
-                   for seeds in (field[..., 4], image[..., 4]))
+                   for seeds in (seeded, image[4]))
     differs, = local_means(weight, _GAP_MM / (2 * step), gap * gap)
     found += here / np.maximum(here + there, enlarged(differs, own.shape)) * gap
     return np.asarray(weight * found / facing, np.float32)
