@@ -134,17 +134,17 @@ def add_detail(
     share = np.zeros_like(detail)
     add_between(share, gain, *between)
     detail *= share
+    more = np.zeros_like(shown)
     if plane is not None:
-        helped = helped_by_mirror(field, kept, plane, noise, _WINDOW_MM, origin, spacing)
-        add_between(detail, helped, *between)
-
+        more = helped_by_mirror(field, kept, plane, noise, _WINDOW_MM, origin, spacing)
     if look_up is not None:
-        surface = heights[some] + detail[some]
+        surface = heights[some] + detail[some] + more
         across, down = np.empty_like(surface), np.empty_like(surface)
         slopes(surface, spacing, across, down)
-        shaded = shading_detail(
+        more += shading_detail(
             surface, shown * rim.within, (across, down), (xs[::2], ys[::2]), look_up)
-        add_between(detail, shaded, *between)
+    add_between(detail, more, *between)
+
     smaller = halved(heights)
     across, down = np.empty_like(smaller), np.empty_like(smaller)
     slopes(smaller, 2 * step, across, down)

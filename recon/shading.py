@@ -39,7 +39,7 @@ _FULL = 252
 # A colour image's noise is averaged over so many places (standard deviation).
 _AVERAGED = 0.8
 # Every so many places each way are enough to find the light.
-_SPARSE = 3
+_SPARSE = 4
 _LEAST_PLACES = 50
 # What is this share of the median brightness or less is hair, at first; what is off the light by
 # this share counts a quarter.
