@@ -159,9 +159,9 @@ def mirror_image(
 
     `added` to the heights, (rows, columns) mm, is the surface whose points are mirrored. The
     first plane of the result is how far along the point's own normal the mirrored heights are
-    from the heights, mm; the third the weight of the image, fading to 0 at distances of
-    `farthest` and where the surface there looks aside by `steepest`; all others are looked up.
-    Zero where there is nothing.
+    from the heights, mm; the second how far the mirrored surface is from the surface; the third
+    the weight of the image, fading to 0 at distances of `farthest` and where the surface there
+    looks aside by `steepest`; all others are looked up. Zero where there is nothing.
     """
     rows, columns, kinds = field.shape
     out = np.zeros((kinds, rows, columns), np.float32)
@@ -196,6 +196,10 @@ def mirror_image(
             if weight > 0:
                 for k in range(kinds):
                     out[k, i, j] = read[k]
+                r1, c1 = r + np.uint64(1), c + np.uint64(1)
+                upper = added[r, c] + right * (added[r, c1] - added[r, c])
+                lower = added[r1, c] + right * (added[r1, c1] - added[r1, c])
                 out[0, i, j] = gap
+                out[1, i, j] = away + (upper + down * (lower - upper)) * read[1]
                 out[2, i, j] = weight
     return out

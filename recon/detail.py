@@ -17,6 +17,7 @@ from recon._image_kernels import add_between
 from recon._percentile import percentile
 from recon._scatter_kernels import BILINEAR_VARIANCE, read_between, share_out
 from recon._sheet_kernels import face_field, slopes
+from recon.holes import fill_holes
 from recon.local_means import blurred, enlarged, local_means
 from recon.mirror_plane import find_plane
 from recon.rbf import Surface
@@ -30,15 +31,10 @@ __all__ = ["DetailedSurface", "add_detail"]
 
 Image = NDArray[np.float32]
 
-# Below this share of the usual weight lies a hole, or the rim.
+# Below this share of the usual weight lies a hole, or the rim: a broad average is taken there.
 _FULL = 0.4
-# There a wider average is taken, and again of what it leaves: like a fit, that carries the slope
-# of farther seeds on into the hole. Radius in units of the narrow one's.
-_WIDER = 1.6
-_PASSES = 4
 # An average fades where the seeds within reach weigh less than this share of what is usual.
 _FADING = 0.005
-_FADING_WIDE = 0.05
 # Over what radius detail counts as local (standard deviation).
 _WINDOW_MM = 11.0
 # The smoothest part of a face shows what noise alone adds to the detail, away from the rim, where
@@ -111,22 +107,23 @@ def add_detail(
     seeded = np.minimum(weight / (usual * np.float32(_FULL)), 1)
     missing = 1 - seeded
     missing *= missing * (3 - 2 * missing)
-    half = grid.halved()
-    wide = _extended(half, rest, _WIDER * radius / (2 * step), 4 * usual)
-    detail += missing * (_doubled(wide, detail) - detail)
     rim = Rim.of(support, step / spacing)
     # So broad an average needs no more than every fourth point.
-    cells = half.halved()
-    broad = broad_average(
-        *cells.sums(rest), BROADER * radius / (4 * step), 16 * float(usual), rim, 2)
-    detail += _doubled(rim.nearness, detail) * (_doubled(broad, detail) - detail)
+    cells = grid.halved().halved()
+    counts, sums = cells.sums(rest)
+    broad = broad_average(counts, sums, BROADER * radius / (4 * step), 16 * float(usual), rim, 2)
+    detail += (np.maximum(_doubled(rim.nearness, detail), missing)
+               * (_doubled(broad, detail) - detail))
+    filled, hole = fill_holes(counts, sums, missing, rim, heights, detail, spacing)
+    detail *= 1 - hole
 
     # How much of it is more than noise varies slowly: every second point is enough.
     some = np.s_[::2, ::2]
     shown = support[some].astype(np.float32)
     inner = np.clip(2 * blurred(shown, _FADING_RIM) - 1, 0, 1) * shown
     field = face_field(heights, detail, seeded, inner, spacing)
-    gain, noise = _gain(field[..., 3], inner, rim.nearness < _AT_RIM, spacing)
+    gain, noise = _gain(
+        field[..., 3], inner * (1 - hole[some]), rim.nearness < _AT_RIM, spacing)
     origin = float(xs[0]), float(ys[0])
     plane = find_plane(field, origin, spacing) if symmetry else None
     kept = gain * detail[some]
@@ -136,9 +133,10 @@ def add_detail(
     detail *= share
     more = np.zeros_like(shown)
     if plane is not None:
-        more = helped_by_mirror(field, kept, plane, noise, _WINDOW_MM, origin, spacing)
+        more = helped_by_mirror(field, kept, filled[some], hole[some], plane, noise, _WINDOW_MM,
+                                origin, spacing)
     if look_up is not None:
-        surface = heights[some] + detail[some] + more
+        surface = heights[some] + detail[some] + filled[some] + more
         across, down = np.empty_like(surface), np.empty_like(surface)
         slopes(surface, spacing, across, down)
         more += shading_detail(
@@ -149,6 +147,7 @@ def add_detail(
     across, down = np.empty_like(smaller), np.empty_like(smaller)
     slopes(smaller, 2 * step, across, down)
     detail += _doubled(rim.frayed_depth((across, down), spacing), detail)
+    detail += filled
     sheet = np.empty((3, *detail.shape), np.float32)
     np.add(heights, detail, out=sheet[0])
     slopes(sheet[0], step, sheet[1], sheet[2])
@@ -196,15 +195,6 @@ def _doubled(image: Image, like: Image) -> Image:
     return np.asarray(finer, np.float32)[:like.shape[0], :like.shape[1]]
 
 
-def _extended(grid: _Seeded, rest: Image, sigma: float, usual: np.float32) -> Image:
-    """Average what the seeds show, then what that leaves of them, and so on."""
-    sigma = _unshared(sigma)
-    seeds, sums = grid.sums(rest)
-    weight = blurred(seeds, sigma) + usual * np.float32(_FADING_WIDE)
-    total = blurred(sums, sigma) / weight
-    for _ in range(_PASSES - 1):
-        total += blurred(sums - seeds * total, sigma) / weight
-    return total
 
 
 def _gain(

@@ -7,6 +7,9 @@ c1 d + c2 d',  c1 = (P (P + v) - C^2) / D,  c2 = C v / D,  D = (P + v)^2 - C^2,
 Lee's gain P / (P + v) where C = 0. The broad fit, which is all signal, moves toward its mirror
 image by v1 / (v1 + v2) of the gap between them, and by less where the gap is larger than noise
 alone makes it. What one side alone has (a swelling, a scar) so stays there, and off the other.
+
+In a hole there is no detail to be told from noise: what fills it is compared as a whole with the
+whole surface of the other side, and how far the sides differ is asked of the hole's surroundings.
 """
 
 import math
@@ -16,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._mirror_kernels import mirror_image
-from recon.local_means import enlarged, local_means, shrunk
+from recon.local_means import blurred, enlarged, local_means, shrunk
 from recon.mirror_plane import MirrorPlane
 
 __all__ = ["helped_by_mirror"]
@@ -34,6 +37,10 @@ _BROAD = 0.25
 # In a hole a fit is worth this share of one between seeds; with less of it, the mirror image fills
 # the hole even where the sides differ.
 _LEAST = 0.2
+# Deeper, farther than so many points from its border, its variance grows to so much more than
+# that of the detail's noise.
+_DEEP = 4.0
+_GUESS = 50.0
 # Where the detail of the sides, averaged over the first radius, differs by more than noise, the
 # mirror image is left out as far as the second around.
 _DIFFERENT_MM = 4.0
@@ -42,8 +49,8 @@ _DIFFERENT = 1.3
 
 
 def helped_by_mirror(
-    field: Image, kept: Image, plane: MirrorPlane, noise: float, window: float,
-    origin: tuple[float, float], step: float,
+    field: Image, kept: Image, filled: Image, hole: Image, plane: MirrorPlane, noise: float,
+    window: float, origin: tuple[float, float], step: float,
 ) -> Image:
     """Find what the mirror image adds to a face.
 
@@ -52,6 +59,8 @@ def helped_by_mirror(
     field : (rows, columns, 5) float32: the broad fit's height, mm; share of its normal along z;
         weight as a mirror image, 0-1; detail, mm along the normal; weight of the seeds, 0-1
     kept : (rows, columns) float32, the part of the detail that Lee's gain keeps, mm along z
+    filled : (rows, columns) float32, what is added to the broad fit in holes, mm along z
+    hole : (rows, columns) float32, 0-1, how much of a place is filled
     plane : to mirror in
     noise : variance of the noise in the detail, mm^2
     window : over which detail counts as local (standard deviation), mm
@@ -62,30 +71,39 @@ def helped_by_mirror(
     -------
     (rows, columns) float32, mm along z
     """
-    image = mirror_image(field, kept, np.asarray(origin), step, plane.normal, plane.offset,
-                         _FARTHEST_MM, _STEEPEST)
-    gap, weight, mirrored = (image[k] for k in (0, 2, 3))
+    image = mirror_image(field, kept + filled, np.asarray(origin), step, plane.normal,
+                         plane.offset, _FARTHEST_MM, _STEEPEST)
+    gap, whole, weight, mirrored = (image[k] for k in range(4))
     facing, own, seeded = (np.ascontiguousarray(field[..., k]) for k in (1, 3, 4))
     v = np.float32(max(noise, 1e-12))
+    measured = weight * (1 - hole)
+    both = measured * image[4]
     energy, common = local_means(
-        weight, window / (2 * step), own * own + mirrored * mirrored, own * mirrored)
+        both, window / (2 * step), own * own + mirrored * mirrored, own * mirrored)
     signal = np.maximum(energy / 2 - v, 0)
     common = np.clip(common, -signal, signal)
     # (P + v)^2 - C^2 and P (P + v) - C^2, so that nothing cancels where C = P.
     alone = signal - common
     scale = (alone + v) * (signal + common + v)
-    difference, = local_means(weight, _DIFFERENT_MM / (2 * step), own - mirrored)
-    same = _same(difference, shrunk(weight) > 0, v, step)
+    difference, = local_means(both, _DIFFERENT_MM / (2 * step), own - mirrored)
+    same = _same(difference, shrunk(both) > 0, v, step)
     first, second = (
         enlarged(np.asarray(same * part / scale, np.float32), own.shape)
         for part in (alone * (signal + common) + signal * v, common * v))
     # What Lee's gain keeps is there already.
     found = first * own + second * mirrored - enlarged(same, own.shape) * kept * facing
+    found *= 1 - hole
 
     here, there = (v * np.float32(_BROAD) / np.maximum(seeds, np.float32(_LEAST))
                    for seeds in (seeded, image[4]))
-    differs, = local_means(weight, _GAP_MM / (2 * step), gap * gap)
-    found += here / np.maximum(here + there, enlarged(differs, own.shape)) * gap
+    # Deep in a hole what fills it is more and more of a guess.
+    deep = blurred(hole, _DEEP)
+    deep *= deep * deep
+    guess = v * np.float32(_GUESS) * hole * deep * deep
+    differs, = local_means(measured, _GAP_MM / (2 * step), gap * gap)
+    share = np.maximum(here + there, enlarged(differs, own.shape)) + guess
+    share = (here + guess) / share
+    found += share * (gap + hole * (whole - gap))
     return np.asarray(weight * found / facing, np.float32)
 
 
