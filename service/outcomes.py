@@ -12,6 +12,8 @@ from service.wire import Packet
 __all__ = ["Outcomes"]
 
 _MAX_WAITERS = 1000
+_MAX_WAITERS_OF_ONE = 100
+"""So that nobody takes all the places."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,10 @@ class Outcomes:
             for peer, request, _ in self._take_waiters([capture_id]):
                 yield _answer(peer, request, packet)
 
+    def _has_place(self, peer: bytes) -> bool:
+        own = sum(one == peer for one, _ in self._waiters)
+        return len(self._waiters) < _MAX_WAITERS and own < _MAX_WAITERS_OF_ONE
+
     def removed(self, capture_ids: Collection[str]) -> Iterator[Output]:
         """Answer those who wait for captures that are gone."""
         for peer, request, capture_id in self._take_waiters(capture_ids):
@@ -68,7 +74,7 @@ class Outcomes:
             yield send(peer, messages.CaptureUnknown(request=request, capture_id=capture_id))
         elif (peer, request) in self._waiters:
             return  # a repeat: its wait does not begin anew
-        elif message.wait_s > 0 and len(self._waiters) < _MAX_WAITERS:
+        elif message.wait_s > 0 and self._has_place(peer):
             self._waiters[peer, request] = _Waiter(capture_id, now + message.wait_s)
         else:
             yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))

@@ -419,6 +419,16 @@ def test_a_client_may_wait_for_several_captures(bench):
         ("face_done", 6)]
 
 
+def test_nobody_takes_all_the_places_of_those_who_wait(bench):
+    bench.accepted("a")
+    answered = {
+        client: [bool(bench.say(client, messages.GetFace(
+            request=request, capture_id="a", wait_s=9))) for request in range(200)]
+        for client in (CLIENT, b"other")}
+    assert answered[CLIENT] == [False] * 100 + [True] * 100
+    assert answered[b"other"] == answered[CLIENT]
+
+
 def test_outcomes_can_be_asked_for_in_order(bench):
     bench.accepted("a", "b")
     bench.worker()
