@@ -27,6 +27,7 @@ from bench.peer_methods import inpaint_points, rbf_points
 from recon import Preset, Settings, pipeline, reconstruct, warm
 from recon.pipeline import surface_of
 from recon.rbf import MIN_SEEDS, fit_surface
+from recon.registration import look_up, register
 
 __all__: list[str] = []
 
@@ -86,12 +87,15 @@ def _fit_times(case: Case, pcl: Pcl | None) -> None:
     """One fit and its evaluation, and the whole of ours, against others, by turns."""
     xs, ys = _grid(case)
     seeds, spacing = case.seeds, case.spacing
+    looked_up = partial(look_up, case.frame,
+                        register(case.frame, case.face.report.settings.depth_offset_mm))
     calls: dict[str, Callable[[], float]] = {
         **{f"ours, `{preset.value}`: its fit {_of_fit(preset)} and evaluation": partial(
             milliseconds, partial(_fitted, seeds, spacing, preset, xs, ys))
            for preset in (Preset.BEST, Preset.FAITHFUL)},
         "ours, `best`: fit, detail, evaluation with slopes": lambda: milliseconds(
-            lambda: surface_of(seeds.astype(np.float32), spacing, Settings()).sampled(xs, ys)),
+            lambda: surface_of(
+                seeds.astype(np.float32), spacing, Settings(), looked_up).sampled(xs, ys)),
         **{f"ours, `{preset.value}`, all after segmentation: spacing, fit, normals, colours, sigma":
            partial(milliseconds, after_segmentation(case, with_preset(preset)))
            for preset in (Preset.BEST, Preset.FAITHFUL)},
