@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["connect", "cut_depth", "cut_under", "large_parts", "long_axis", "nearest_to",
-           "row_medians", "within", "within_reach"]
+__all__ = ["connect", "cut_beside", "cut_depth", "cut_under", "large_parts", "long_axis",
+           "nearest_to", "row_medians", "within", "within_reach"]
 
 _EMPTY, _HIDDEN, _WANTED, _FOUND, _BLOCKED = 0, 1, 2, 3, 4
 
@@ -299,3 +299,32 @@ def cut_under(
                     face[row, column] = False
                 depth, away = here, 0
             last[column], gap[column], passed[column] = depth, away, behind
+
+
+@compiled
+def cut_beside(
+    face: NDArray[np.bool_], z: NDArray[np.float32], start_row: int, start_column: int,
+    beyond: int, rise: float,
+) -> None:
+    """Drop from `face` what comes nearer again, on straight ways to the sides of a place.
+
+    Ways lead to the left and right, at most as far up or down; farther aside than `beyond` columns
+    a way ends where it has been deeper by more than `rise`.
+    """
+    rows, columns = face.shape
+    for side in (-1, 1):
+        deepest, passed = np.zeros(rows, np.float32), np.zeros(rows, np.bool_)
+        column, away = start_column + side, 1
+        while 0 <= column < columns:
+            deepest_before, passed_before = deepest.copy(), passed.copy()
+            for row in range(max(start_row - away, 0), min(start_row + away + 1, rows)):
+                before = row - int(np.rint((row - start_row) / away))
+                depth, behind = deepest_before[before], passed_before[before]
+                if face[row, column] and away > beyond:
+                    behind = behind or z[row, column] < depth - rise
+                    if behind:
+                        face[row, column] = False
+                    depth = max(depth, z[row, column])
+                deepest[row], passed[row] = depth, behind
+            column += side
+            away += 1

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from recon._percentile import percentile
 from recon._segment_kernels import (
     connect,
+    cut_beside,
     cut_depth,
     cut_under,
     large_parts,
@@ -51,6 +52,10 @@ _FRONT_PART = 0.3
 _CHIN_DROP_MM = 30.0
 _CHIN_GAP_MM = 10.0
 _CHIN = 0.3
+# Farther aside than the first, in widths of the box, a face only recedes: what has come nearer by
+# the second is another head, whose ear touches.
+_SIDE = 0.35
+_SIDE_RISE_MM = 12.0
 # Of a face's front so much is longer than broad, and shows how the head is tipped.
 _OVAL_MM = 30.0
 # The part in which the slant of a lifted face is measured, and the most of it, mm a pixel.
@@ -215,8 +220,9 @@ def keep_face(
     inner = within(face, registered.pixels, middle, _FRONT_PART * width)
     inner = inner if inner.any() else face
     front = percentile(z[inner], 2)
-    axis = long_axis(face & (upright < percentile(upright[inner], 2) + np.float32(_OVAL_MM)))
     box_mm = width * front / focal_px
+    cut_beside(face, z, *start, round(_SIDE * box_mm * px), _SIDE_RISE_MM)
+    axis = long_axis(face & (upright < percentile(upright[inner], 2) + np.float32(_OVAL_MM)))
     cut_under(face, z, *start, round(_CHIN * box_mm * px), _CHIN_DROP_MM,
               max(round(_CHIN_GAP_MM * px), _BRIDGE_PX))
     cut_depth(face, z, registered.pixels, front, middle, axis, width * _BELOW,

@@ -3,6 +3,7 @@ import pytest
 
 from recon._segment_kernels import (
     connect,
+    cut_beside,
     cut_depth,
     cut_under,
     long_axis,
@@ -151,3 +152,25 @@ def test_beyond_a_step_nothing_comes_back():
     cut_under(face, z, 0, 0, 5, 30.0, 4)
     assert face[:12].all()
     assert not face[12:].any()
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_what_comes_nearer_again_beside_a_face_is_cut_on_straight_ways_alone(mirrored):
+    row, column = np.mgrid[:21, :41]
+    aside = column - 10
+    z = np.interp(aside, [0, 8, 14, 30], [700, 740, 760, 700]).astype(np.float32)
+    face = np.ones(z.shape, bool)
+    start = 40 - 10 if mirrored else 10
+    z, face = (np.ascontiguousarray(one[:, ::-1]) if mirrored else one for one in (z, face))
+    cut_beside(face, z, 10, start, 8, 12.0)
+    cut = ~(face[:, ::-1] if mirrored else face)
+    np.testing.assert_array_equal(cut, (aside > 17) & (np.abs(row - 10) <= aside))
+
+
+def test_nearer_than_that_a_face_may_rise_again_and_elsewhere_it_may_a_little():
+    z = np.full((1, 30), 700, np.float32)
+    z[0, 3:6] = 740                                    # beside a nose
+    z[0, 20:] = 690
+    face = np.ones(z.shape, bool)
+    cut_beside(face, z, 0, 0, 8, 12.0)
+    assert face.all()
