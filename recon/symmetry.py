@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._mirror_kernels import mirror_image
-from recon.local_means import blurred, enlarged, local_means, shrunk
+from recon.local_means import enlarged, local_means, shrunk
 from recon.mirror_plane import MirrorPlane
 
 __all__ = ["helped_by_mirror"]
@@ -30,17 +30,15 @@ Image = NDArray[np.float32]
 # more than the second (cosine) says nothing.
 _FARTHEST_MM = 12.0
 _STEEPEST = 0.15
-# Gaps of the broad fits are told from noise over this radius (standard deviation).
+# Gaps of the broad fits are told from noise over this radius (standard deviation); for a hole, of
+# whose border they tell, over the second.
 _GAP_MM = 6.0
+_AROUND_HOLE_MM = 16.0
 # Variance of the broad fit over that of the detail's noise.
 _BROAD = 0.25
 # In a hole a fit is worth this share of one between seeds; with less of it, the mirror image fills
 # the hole even where the sides differ.
 _LEAST = 0.2
-# Deeper, farther than so many points from its border, its variance grows to so much more than
-# that of the detail's noise.
-_DEEP = 4.0
-_GUESS = 50.0
 # Where the detail of the sides, averaged over the first radius, differs by more than noise, the
 # mirror image is left out as far as the second around.
 _DIFFERENT_MM = 4.0
@@ -96,14 +94,11 @@ def helped_by_mirror(
 
     here, there = (v * np.float32(_BROAD) / np.maximum(seeds, np.float32(_LEAST))
                    for seeds in (seeded, image[4]))
-    # Deep in a hole what fills it is more and more of a guess.
-    deep = blurred(hole, _DEEP)
-    deep *= deep * deep
-    guess = v * np.float32(_GUESS) * hole * deep * deep
-    differs, = local_means(measured, _GAP_MM / (2 * step), gap * gap)
-    share = np.maximum(here + there, enlarged(differs, own.shape)) + guess
-    share = (here + guess) / share
-    found += share * (gap + hole * (whole - gap))
+    differs, around = (
+        enlarged(local_means(measured, radius / (2 * step), gap * gap)[0], own.shape)
+        for radius in (_GAP_MM, _AROUND_HOLE_MM))
+    differs += hole * (around - differs)
+    found += here / np.maximum(here + there, differs) * (gap + hole * (whole - gap))
     return np.asarray(weight * found / facing, np.float32)
 
 
