@@ -239,8 +239,8 @@ def _upright(z: NDArray[np.float32], middle: NDArray[np.bool_]) -> NDArray[np.fl
     # Of the rows' medians, the median slope between their upper and their lower half: a hand
     # before the chin does not tilt it.
     half = len(rows) // 2
-    slant = np.median((medians[half:2 * half] - medians[:half])
-                      / (rows[half:2 * half] - rows[:half]))
+    slant = percentile(
+        (medians[half:2 * half] - medians[:half]) / (rows[half:2 * half] - rows[:half]), 50)
     tilt = (np.arange(len(z)) - rows[0]) * min(max(slant, -_MOST_SLANT), _MOST_SLANT)
     return np.where(z > 0, z - tilt[:, None].astype(np.float32), np.float32(0))
 

@@ -6,7 +6,7 @@ from functools import cache, partial
 import numpy as np
 
 from capture.frame import Calibration, CameraModel, RgbdFrame
-from recon._detect_kernels import depths_in_box
+from recon._detect_kernels import depths_in_box, middle_depths
 from recon._relief import bulge_mm
 from recon.densify import densify
 from recon.detail import add_detail
@@ -41,8 +41,10 @@ def warm() -> None:
     with suppress(NoFaceError):  # not even OpenCV sees one
         detect_face(frame.color, registered, _FOCAL_PX)
     left, top, width, height = map(float, _BOX)
-    bulge_mm(depths_in_box(registered.pixels, registered.color_depth, registered.visible,
-                           left, top, width, height), _NEAREST_MM)
+    depths = depths_in_box(registered.pixels, registered.color_depth, registered.visible,
+                           left, top, width, height)
+    middle_depths(depths, 0.5)
+    bulge_mm(depths, _NEAREST_MM)
     seeds = segment_face(registered, _BOX, _FOCAL_PX)
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     fit = fit_surface(seeds.points, settings.r0_factor * spacing, settings.smoothing)
