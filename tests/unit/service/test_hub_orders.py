@@ -326,7 +326,8 @@ class AnyOrder(RuleBasedStateMachine):
         self.tick()
         self.accepted.discard(capture_id)
         self.taken.discard(capture_id)
-        assert not list((self.folder / "data").rglob(f"*{capture_id}.*f*"))
+        assert not [path for path in (self.folder / "data").rglob("*.f*")
+                    if capture_id in path.name.split(".")]
 
     @rule()
     def purge_all(self):

@@ -41,7 +41,8 @@ def bench(tmp_path, clock):
 def files(tmp_path):
     """Names the files of a capture, wherever they are."""
     return lambda capture_id: sorted(
-        path.name for path in (tmp_path / "data").rglob(f"*{capture_id}.*"))
+        path.name for path in (tmp_path / "data").rglob("*")
+        if capture_id in path.name.split("."))
 
 
 def ask(bench, message):
