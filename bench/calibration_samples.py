@@ -1,15 +1,19 @@
 """Errors of dense points on simulated frames, and what their `sigma` is made of."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
+from unittest import mock
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 
 from bench.cases import Case, with_preset
 from capture import RgbdFrame
-from recon import Preset, ReconstructionError, reconstruct
+from recon import Preset, ReconstructionError, densify, reconstruct
 from recon.face import Face
 from recon.uncertainty import Sources, sources_of_error
 from tests.simulator import KINECT_CALIBRATED, Person, Scene, Truth, head_names, simulate
@@ -76,10 +80,27 @@ def frames(heads: tuple[str, ...], count: int, seed: int) -> Iterator[tuple[Rgbd
         yield shot.frame, shot.truth
 
 
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """Sources with the place of their first node, (x, y), and the distance of nodes, mm."""
+
+    sources: Sources
+    origin: tuple[float, float]
+    step: float
+
+    def at(self, points: NDArray[np.float32]) -> Floats:
+        """Interpolate them at points, (n, 3) to (n, 4)."""
+        x, y = ((points[:, axis] - self.origin[axis]) / self.step for axis in (0, 1))
+        return np.column_stack([map_coordinates(
+            plane.astype(np.float64), (y, x), order=1, mode="nearest") for plane in (
+                self.sources.noise, self.sources.hole, self.sources.slope, self.sources.rim)])
+
+
 def sample(frame: RgbdFrame, truth: Truth, preset: Preset, *, distance: bool) -> Samples | None:
     """Reconstruct a frame and draw some of its points; None where it gives no face."""
     try:
-        case = Case("", frame, truth, reconstruct(frame, with_preset(preset)))
+        with _sources_kept() as kept:
+            case = Case("", frame, truth, reconstruct(frame, with_preset(preset)))
     except ReconstructionError:
         return None
     dense = case.face.dense
@@ -90,36 +111,33 @@ def sample(frame: RgbdFrame, truth: Truth, preset: Preset, *, distance: bool) ->
     chosen[drawn[case.hole[drawn]][:_HOLE_POINTS]] = True
     error = truth.depth_error(dense.points)
     chosen &= np.isfinite(error)
-    cells = dense.cells[chosen]
-    sources = _sources(case.face)
+    points = dense.points[chosen]
     return Samples(
         error=error[chosen],
-        distance=(truth.surface_distance(dense.points[chosen]) if distance
-                  else np.full(len(cells), np.nan)),
+        distance=(truth.surface_distance(points) if distance
+                  else np.full(len(points), np.nan)),
         sigma=dense.sigma[chosen].astype(np.float64),
-        z=dense.points[chosen, 2].astype(np.float64),
-        sources=np.column_stack([sources.at(plane, cells) for plane in (
-            sources.noise, sources.hole, sources.slope, sources.rim)]).astype(np.float64),
+        z=points[:, 2].astype(np.float64),
+        sources=kept[0].at(points),
         hole=case.hole[chosen],
         rim=_rim(case.face)[chosen],
         everywhere=everywhere[chosen],
     )
 
 
-def _sources(face: Face) -> Sources:
-    """Find what went into a face's sigma from the face alone."""
-    dense = face.dense
-    at = dense.cells[:, 0], dense.cells[:, 1]
-    support = np.zeros(dense.grid_shape, bool)
-    support[at] = True
-    planes = np.zeros((3, *dense.grid_shape), np.float32)
-    normals = dense.normals
-    for plane, values in zip(planes, (dense.points[:, 2], -normals[:, 0] / normals[:, 2],
-                                      -normals[:, 1] / normals[:, 2]), strict=True):
-        plane[at] = values
-    x, y = dense.points[0, :2] - dense.grid_step_mm * dense.cells[0, ::-1]
-    return sources_of_error(face.initial.points, support, planes[0], (planes[1], planes[2]),
-                            (float(x), float(y)), dense.grid_step_mm, face.report.mean_spacing_mm)
+@contextmanager
+def _sources_kept() -> Iterator[list[_Kept]]:
+    """Keep what `reconstruct` makes sigma of; it is not in the face."""
+    kept: list[_Kept] = []
+
+    def keep(*arguments: Any) -> Sources:
+        found = sources_of_error(*arguments)
+        *_, origin, step, _ = arguments
+        kept.append(_Kept(found, origin, step * found.every))
+        return found
+
+    with mock.patch.object(densify, "sources_of_error", keep):
+        yield kept
 
 
 def _rim(face: Face) -> NDArray[np.bool_]:

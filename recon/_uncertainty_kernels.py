@@ -1,11 +1,11 @@
-"""The loops of the standard error, compiled."""
+"""The loop of the standard error, compiled."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["coarsen", "interpolate"]
+__all__ = ["coarsen"]
 
 
 @compiled
@@ -46,30 +46,4 @@ def coarsen(
             j = min((column + every // 2) // every, out.shape[1] - 1)
             out[i, j, 2] += 1
             out[i, j, 3] += rest * rest
-    return out
-
-
-@compiled
-def interpolate(
-    plane: NDArray[np.float32], every: int, cells: NDArray[np.int32]
-) -> NDArray[np.float32]:
-    """Give a coarse plane's values at cells of the fine grid, linear between its nodes.
-
-    plane : (rows / every, columns / every), rounded up
-    cells : (n, 2), row and column; gives (n,)
-    """
-    rows, columns = plane.shape
-    flat = plane.ravel()
-    out = np.empty(len(cells), np.float32)
-    steps = np.float32(1) / np.float32(every)
-    for k in range(len(cells)):
-        y, x = np.float32(cells[k, 0]) * steps, np.float32(cells[k, 1]) * steps
-        i, j = np.uint32(y), np.uint32(x)
-        down, across = y - np.float32(i), x - np.float32(j)
-        here = i * columns + j
-        right = np.uint32(1) if j + 1 < columns else np.uint32(0)
-        below = here + (columns if i + 1 < rows else 0)
-        upper = flat[here] + across * (flat[here + right] - flat[here])
-        lower = flat[below] + across * (flat[below + right] - flat[below])
-        out[k] = upper + down * (lower - upper)
     return out

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._color_kernels import blur
-from recon._uncertainty_kernels import coarsen, interpolate
+from recon._uncertainty_kernels import coarsen
 from recon.masks import gaussian
 from recon.settings import Settings
 
@@ -50,7 +50,7 @@ _LEAST_MM = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Sources:
-    """The parts of sigma^2 before their coefficients, on every so many points of the dense grid.
+    """The parts of sigma^2 before their coefficients, on every so many points of a grid.
 
     Attributes
     ----------
@@ -63,10 +63,6 @@ class Sources:
     slope: NDArray[np.float32]
     rim: NDArray[np.float32]
     every: int
-
-    def at(self, plane: NDArray[np.float32], cells: NDArray[np.int32]) -> NDArray[np.float32]:
-        """Interpolate a plane on these nodes at cells of the dense grid, (n, 2) to (n,)."""
-        return interpolate(plane, self.every, cells)
 
 
 def noise_share(settings: Settings) -> float:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from recon._uncertainty_kernels import coarsen, interpolate
+from recon._uncertainty_kernels import coarsen
 from recon.densify import densify
 from recon.rbf import fit_surface
 from recon.settings import Preset, Settings
@@ -157,18 +157,3 @@ def test_residuals_follow_the_slope_between_grid_points():
     planes = coarsen(points, np.ones((4, 4), bool), heights, slope, 0 * slope, (0.0, 0.0), 1.0, 1)
     assert planes[2, 1, 2] == 1
     assert planes[..., 3].max() < 1e-6
-
-
-@pytest.mark.parametrize("every", [1, 3, 4])
-def test_interpolation_keeps_what_is_linear(every):
-    rows, columns = 31, 22
-    i, j = np.mgrid[:-(-rows // every), :-(-columns // every)].astype(np.float32)
-    plane = 2 + every * (0.3 * i - 0.1 * j)
-    last = (np.array(plane.shape) - 1) * every
-    row, column = np.mgrid[:last[0] + 1, :last[1] + 1]
-    cells = np.column_stack([row.ravel(), column.ravel()]).astype(np.int32)
-    np.testing.assert_allclose(interpolate(plane, every, cells),
-                               2 + 0.3 * cells[:, 0] - 0.1 * cells[:, 1], atol=1e-4)
-    # Beyond the last node, its value.
-    corner = np.array([[rows - 1, columns - 1]], np.int32)
-    assert interpolate(plane, every, corner)[0] == pytest.approx(plane[-1, -1], abs=0.2 * every)
