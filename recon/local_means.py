@@ -4,7 +4,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["blurred", "enlarged", "local_means", "shrunk"]
+from recon._local_mean_kernels import divided, halved_products
+
+__all__ = ["blurred", "enlarged", "local_means"]
 
 Image = NDArray[np.float32]
 
@@ -13,12 +15,6 @@ def blurred(image: Image, sigma: float) -> Image:
     """Filter by a Gaussian of that standard deviation, pixels; zero outside."""
     return np.asarray(
         cv2.GaussianBlur(image, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT), np.float32)
-
-
-def shrunk(image: Image) -> Image:
-    """Average each four pixels, of (rows, columns) or more of them one behind the other."""
-    rows, columns = (-(-side // 2) for side in image.shape[:2])
-    return np.asarray(cv2.resize(image, (columns, rows), interpolation=cv2.INTER_AREA), np.float32)
 
 
 def local_means(weight: Image, sigma: float, *values: Image) -> list[Image]:
@@ -30,13 +26,10 @@ def local_means(weight: Image, sigma: float, *values: Image) -> list[Image]:
     sigma : the Gaussian's standard deviation, pixels of the means
     values : (rows, columns) float32
     """
-    planes = shrunk(np.asarray(cv2.merge([weight, *(weight * one for one in values)]), np.float32))
-    share, *sums = cv2.split(blurred(planes, sigma))
-    share = np.maximum(share, np.float32(1e-6))
-    return [np.asarray(one / share, np.float32) for one in sums]
+    return list(divided(blurred(halved_products(weight, values), sigma)))
 
 
 def enlarged(image: Image, shape: tuple[int, ...]) -> Image:
-    """Interpolate a local mean to the shape of what it is of, (rows, columns)."""
-    return np.asarray(
-        cv2.resize(image, (shape[1], shape[0]), interpolation=cv2.INTER_LINEAR), np.float32)
+    """Interpolate a local mean, or several, to the shape of what it is of, (rows, columns)."""
+    finer = cv2.resize(image, None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
+    return np.ascontiguousarray(finer[:shape[0], :shape[1]], np.float32)

@@ -18,8 +18,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from recon._local_mean_kernels import add_mirrored, divided, halved_moments, parts_kept
 from recon._mirror_kernels import mirror_image
-from recon.local_means import enlarged, local_means, shrunk
+from recon.local_means import blurred, enlarged
 from recon.mirror_plane import MirrorPlane
 
 __all__ = ["helped_by_mirror"]
@@ -71,42 +72,24 @@ def helped_by_mirror(
     """
     image = mirror_image(field, kept + filled, np.asarray(origin), step, plane.normal,
                          plane.offset, _FARTHEST_MM, _STEEPEST)
-    gap, whole, weight, mirrored = (image[k] for k in range(4))
-    facing, own, seeded = (np.ascontiguousarray(field[..., k]) for k in (1, 3, 4))
-    v = np.float32(max(noise, 1e-12))
-    measured = weight * (1 - hole)
-    both = measured * image[4]
-    energy, common = local_means(
-        both, window / (2 * step), own * own + mirrored * mirrored, own * mirrored)
-    signal = np.maximum(energy / 2 - v, 0)
-    common = np.clip(common, -signal, signal)
-    # (P + v)^2 - C^2 and P (P + v) - C^2, so that nothing cancels where C = P.
-    alone = signal - common
-    scale = (alone + v) * (signal + common + v)
-    difference, = local_means(both, _DIFFERENT_MM / (2 * step), own - mirrored)
-    same = _same(difference, shrunk(both) > 0, v, step)
-    first, second = (
-        enlarged(np.asarray(same * part / scale, np.float32), own.shape)
-        for part in (alone * (signal + common) + signal * v, common * v))
-    # What Lee's gain keeps is there already.
-    found = first * own + second * mirrored - enlarged(same, own.shape) * kept * facing
-    found *= 1 - hole
-
-    here, there = (v * np.float32(_BROAD) / np.maximum(seeds, np.float32(_LEAST))
-                   for seeds in (seeded, image[4]))
-    differs, around = (
-        enlarged(local_means(measured, radius / (2 * step), gap * gap)[0], own.shape)
-        for radius in (_GAP_MM, _AROUND_HOLE_MM))
-    differs += hole * (around - differs)
-    found += here / np.maximum(here + there, differs) * (gap + hole * (whole - gap))
-    return np.asarray(weight * found / facing, np.float32)
+    v = max(noise, 1e-12)
+    moments, differences, gaps = halved_moments(field, image, hole)
+    difference, = divided(blurred(differences, _DIFFERENT_MM / (2 * step)))
+    same = _same(difference, differences[..., 0] > 0, v, step)
+    parts = parts_kept(blurred(moments, window / (2 * step)), same, v)
+    differs = enlarged(divided(blurred(gaps, _GAP_MM / (2 * step)))[0], hole.shape)
+    if hole.any():
+        around, = divided(blurred(gaps, _AROUND_HOLE_MM / (2 * step)))
+        differs += hole * (enlarged(around, hole.shape) - differs)
+    return add_mirrored(field, image, kept, hole, enlarged(parts, hole.shape), differs,
+                        _BROAD * v, _LEAST)
 
 
 def _same(
-    difference: Image, shown: NDArray[np.bool_], noise: np.float32, step: float
+    difference: Image, shown: NDArray[np.bool_], noise: float, step: float
 ) -> Image:
     """How far the detail of both sides is alike but for noise, 0-1."""
-    excess = difference * difference * shown * (np.float32(_DIFFERENT / 2) / noise)
+    excess = difference * difference * shown * np.float32(_DIFFERENT / 2 / noise)
     reach = _AROUND_MM / (2 * step)
     side = 2 * math.ceil(reach) + 1
     around = cv2.dilate(excess, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
