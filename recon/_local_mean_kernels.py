@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["add_mirrored", "divided", "halved_moments", "halved_products", "parts_kept"]
+__all__ = ["add_mirrored", "divided", "halved_moments", "halved_peaks", "halved_products",
+           "parts_kept"]
 
 Image = NDArray[np.float32]
 
@@ -50,18 +51,18 @@ def divided(planes: Image) -> Image:
 
 @compiled
 def halved_moments(field: Image, image: Image, hole: Image) -> tuple[Image, Image, Image]:
-    """Sum over each four pixels what `helped_by_mirror` averages.
+    """Give what `helped_by_mirror` averages, the first and the last as sums over each four pixels.
 
     field : (rows, columns, 5) and image : (5, rows, columns), as there; hole : (rows, columns)
 
-    Gives, (rows, columns, k) each, half of the rows and columns, rounded up: the weight of what
-    both sides measured, and times that d^2 + d'^2 and d d'; the same weight, and times that d - d';
-    the weight of what this side measured, and times that the squared gap.
+    Gives the weight of what both sides measured, and times that d^2 + d'^2 and d d', half of the
+    rows and columns, rounded up, and 3; the same weight, and times that d - d', (rows, columns, 2);
+    the weight of what this side measured, and times that the squared gap, of half the size, and 2.
     """
     rows, columns = hole.shape
     half = (rows + 1) // 2, (columns + 1) // 2
     moments = np.zeros((*half, 3), np.float32)
-    differences, gaps = np.zeros((*half, 2), np.float32), np.zeros((*half, 2), np.float32)
+    differences, gaps = np.zeros((rows, columns, 2), np.float32), np.zeros((*half, 2), np.float32)
     for i in range(rows):
         for j in range(columns):
             measured = image[2, i, j] * (1 - hole[i, j])
@@ -73,11 +74,29 @@ def halved_moments(field: Image, image: Image, hole: Image) -> tuple[Image, Imag
             moments[row, column, 0] += both
             moments[row, column, 1] += both * (own * own + other * other)
             moments[row, column, 2] += both * (own * other)
-            differences[row, column, 0] += both
-            differences[row, column, 1] += both * (own - other)
+            differences[i, j, 0] = both
+            differences[i, j, 1] = both * (own - other)
             gaps[row, column, 0] += measured
             gaps[row, column, 1] += measured * (gap * gap)
     return moments, differences, gaps
+
+
+@compiled
+def halved_peaks(differences: Image, blurred: Image, scale: float) -> Image:
+    """Give the largest square of a mean difference among each four pixels, times a factor.
+
+    differences : (rows, columns, 2), weight, and times that the difference, as of `halved_moments`;
+        blurred : the same; only where the weight is not zero a difference counts
+    """
+    rows, columns = differences.shape[:2]
+    out = np.zeros(((rows + 1) // 2, (columns + 1) // 2), np.float32)
+    factor = np.float32(scale)
+    for i in range(rows):
+        for j in range(columns):
+            if differences[i, j, 0] > 0:
+                mean = blurred[i, j, 1] / max(blurred[i, j, 0], _LEAST_SHARE)
+                out[i >> 1, j >> 1] = max(out[i >> 1, j >> 1], factor * mean * mean)
+    return out
 
 
 @compiled

@@ -18,7 +18,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._local_mean_kernels import add_mirrored, divided, halved_moments, parts_kept
+from recon._local_mean_kernels import (
+    add_mirrored,
+    divided,
+    halved_moments,
+    halved_peaks,
+    parts_kept,
+)
 from recon._mirror_kernels import mirror_image
 from recon.local_means import blurred, enlarged
 from recon.mirror_plane import MirrorPlane
@@ -44,7 +50,7 @@ _LEAST = 0.2
 # mirror image is left out as far as the second around.
 _DIFFERENT_MM = 4.0
 _AROUND_MM = 12.0
-_DIFFERENT = 1.3
+_DIFFERENT = 1.15
 
 
 def helped_by_mirror(
@@ -74,8 +80,9 @@ def helped_by_mirror(
                          plane.offset, _FARTHEST_MM, _STEEPEST)
     v = max(noise, 1e-12)
     moments, differences, gaps = halved_moments(field, image, hole)
-    difference, = divided(blurred(differences, _DIFFERENT_MM / (2 * step)))
-    same = _same(difference, differences[..., 0] > 0, v, step)
+    # On every second point alone it would depend on which they are how large the largest is.
+    same = _same(halved_peaks(differences, blurred(differences, _DIFFERENT_MM / step),
+                              _DIFFERENT / 2 / v), step)
     parts = parts_kept(blurred(moments, window / (2 * step)), same, v)
     differs = enlarged(divided(blurred(gaps, _GAP_MM / (2 * step)))[0], hole.shape)
     if hole.any():
@@ -85,11 +92,8 @@ def helped_by_mirror(
                         _BROAD * v, _LEAST)
 
 
-def _same(
-    difference: Image, shown: NDArray[np.bool_], noise: float, step: float
-) -> Image:
-    """How far the detail of both sides is alike but for noise, 0-1."""
-    excess = difference * difference * shown * np.float32(_DIFFERENT / 2 / noise)
+def _same(excess: Image, step: float) -> Image:
+    """How far the detail of both sides is alike but for noise, 0-1; of what it is above noise."""
     reach = _AROUND_MM / (2 * step)
     side = 2 * math.ceil(reach) + 1
     around = cv2.dilate(excess, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))

@@ -7,6 +7,7 @@ from recon._local_mean_kernels import (
     add_mirrored,
     divided,
     halved_moments,
+    halved_peaks,
     halved_products,
     parts_kept,
 )
@@ -54,12 +55,27 @@ def test_moments_are_of_what_was_measured(rng, shape):
     gap, _, weight, other, seeded = image.astype(float)
     own, measured = field[..., 3].astype(float), weight * (1 - hole)
     both = measured * seeded
-    expected = ((both, both * (own**2 + other**2), both * own * other),
-                (both, both * (own - other)), (measured, measured * gap**2))
-    for found, planes in zip(halved_moments(field, image, hole), expected, strict=True):
-        for plane, wanted in enumerate(planes):
-            np.testing.assert_allclose(found[..., plane], 4 * quarters(wanted), rtol=1e-4,
-                                       atol=1e-5)
+    moments, differences, gaps = halved_moments(field, image, hole)
+    for found, wanted in (
+        *zip(np.moveaxis(moments, -1, 0), (both, both * (own**2 + other**2), both * own * other),
+             strict=True),
+        *zip(np.moveaxis(gaps, -1, 0), (measured, measured * gap**2), strict=True),
+    ):
+        np.testing.assert_allclose(found, 4 * quarters(wanted), rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(differences, np.stack([both, both * (own - other)], axis=-1),
+                               rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_peaks_are_the_largest_of_each_four_that_count(rng, shape):
+    differences, blurred = (rng.random((*shape, 2)).astype(np.float32) for _ in range(2))
+    differences[:4, :6, 0] = differences[::2, ::3, 0] = 0
+    squared = np.where(differences[..., 0] > 0, (blurred[..., 1] / blurred[..., 0])**2, 0)
+    found = halved_peaks(differences, blurred, 0.7)
+    whole = np.pad(squared, [(0, side % 2) for side in shape])
+    expected = whole.reshape(found.shape[0], 2, found.shape[1], 2).max(axis=(1, 3))
+    np.testing.assert_allclose(found, 0.7 * expected, rtol=1e-4)
+    assert not found[:2, :3].any()
 
 
 def test_the_parts_kept_are_of_least_squared_error(rng):
