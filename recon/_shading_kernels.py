@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["along_light", "brightness_of", "from_along_light", "lit_places", "shade_residuals",
-           "weighted_points"]
+__all__ = ["along_light", "brightness_of", "descend", "from_along_light", "only_seen",
+           "shade_residuals", "weigh", "weighted_points"]
 
 Image = NDArray[np.float32]
 
@@ -56,33 +56,14 @@ def brightness_of(
 
 
 @compiled
-def lit_places(
-    brightness: Image, weight: Image, across: Image, down: Image, every: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give what the light is a sum of, (n, 9), and the brightness, (n,).
-
-    Of every so many places each way whose weight is above a half: the real spherical harmonics up
-    to order two of the unit normal, without their constants.
-
-    across, down : (rows, columns), dz/dx and dz/dy
-    """
-    rows, columns = weight.shape
-    most = (rows // every + 1) * (columns // every + 1)
-    basis, seen = np.empty((most, 9)), np.empty(most)
-    count = 0
-    for i in range(0, rows, every):
-        for j in range(0, columns, every):
-            if weight[i, j] <= 0.5:
-                continue
-            p, q = across[i, j], down[i, j]
-            z = 1 / np.sqrt(1 + p * p + q * q)
-            x, y = p * z, q * z
-            row = basis[count]
-            row[0], row[1], row[2], row[3] = 1, x, y, z
-            row[4], row[5], row[6], row[7], row[8] = x * x, x * y, y * y, x * z, y * z
-            seen[count] = brightness[i, j]
-            count += 1
-    return basis[:count], seen[:count]
+def only_seen(brightness: Image, weight: Image) -> Image:
+    """Give (rows, columns, 2): 1, and the brightness, where the weight is not zero; else 0."""
+    out = np.zeros((*weight.shape, 2), np.float32)
+    for i in range(weight.shape[0]):
+        for j in range(weight.shape[1]):
+            if weight[i, j] > 0:
+                out[i, j, 0], out[i, j, 1] = 1, brightness[i, j]
+    return out
 
 
 @compiled
@@ -123,6 +104,33 @@ def shade_residuals(
 
 
 @compiled
+def weigh(
+    residuals: Image, right: Image, lower: Image, weight: Image, energy: Image, colored: float,
+    told: float, step: float,
+) -> None:
+    """Multiply by the root of what a place tells, and make slopes' factors those of differences.
+
+    Parameters
+    ----------
+    residuals : (rows, columns), changed
+    right, lower : how they change with dz/dx and dz/dy, changed to those with differences of the
+        heights on both sides
+    weight, energy : (rows, columns), how much a place counts, and the residuals' mean square around
+    colored : root of the mean square from which on skin is of many colours
+    told : how much a place of even skin tells; step : distance of places, mm
+    """
+    per_energy, even = np.float32(1 / colored**2), np.float32(told)
+    half = np.float32(1 / (2 * step))
+    for i in range(residuals.shape[0]):
+        for j in range(residuals.shape[1]):
+            root = np.sqrt(
+                even * weight[i, j] / max(per_energy * energy[i, j], np.float32(1)))
+            residuals[i, j] *= root
+            right[i, j] *= half * root
+            lower[i, j] *= half * root
+
+
+@compiled
 def along_light(heights: Image, right: Image, lower: Image, out: Image) -> None:
     """Write a height's differences along x and y, weighted by `right` and `lower`, and summed.
 
@@ -144,3 +152,50 @@ def from_along_light(values: Image, right: Image, lower: Image, out: Image) -> N
             out[i, j] = (right[i, j - 1] * values[i, j - 1] - right[i, j + 1] * values[i, j + 1]
                          + lower[i - 1, j] * values[i - 1, j]
                          - lower[i + 1, j] * values[i + 1, j])
+
+
+@compiled
+def descend(
+    rest: Image, smooth: Image, variance: float, right: Image, lower: Image, way: Image,
+    smooth_way: Image, heights: Image, last: float,
+) -> float:
+    """Go a step of conjugate gradients; all are (rows, columns).
+
+    Parameters
+    ----------
+    rest : what is left of the right side, changed
+    smooth : the same, blurred; times the variance it is times the preconditioner
+    right, lower : as of `along_light`
+    way : where to, changed; smooth_way : the same times the preconditioner, kept beside it
+    heights : the solution so far, changed
+    last : what the step before gave; any number at first, with ways of zero
+
+    Gives the residuals' norm before the step; where it is not above 0, there is no more to find.
+    """
+    rows, columns = rest.shape
+    factor, now = np.float32(variance), np.float32(0)
+    for i in range(rows):
+        for j in range(columns):
+            now += rest[i, j] * smooth[i, j]
+    now *= factor
+    if now <= 0:
+        return 0.0
+    share = now / np.float32(last)
+    for i in range(rows):
+        for j in range(columns):
+            way[i, j] = share * way[i, j] + rest[i, j]
+            smooth_way[i, j] = share * smooth_way[i, j] + factor * smooth[i, j]
+    along, image = np.zeros((rows, columns), np.float32), np.zeros((rows, columns), np.float32)
+    along_light(smooth_way, right, lower, along)
+    from_along_light(along, right, lower, image)
+    norm = np.float32(0)
+    for i in range(rows):
+        for j in range(columns):
+            image[i, j] += way[i, j]
+            norm += smooth_way[i, j] * image[i, j]
+    length = now / norm
+    for i in range(rows):
+        for j in range(columns):
+            heights[i, j] += length * smooth_way[i, j]
+            rest[i, j] -= length * image[i, j]
+    return float(now)

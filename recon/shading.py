@@ -10,17 +10,18 @@ brows, lips, moustaches, shadows' edges.
 
 import math
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._percentile import percentile
+from recon._light_kernels import find_light, lit_places
+from recon._local_mean_kernels import divided
 from recon._shading_kernels import (
-    along_light,
     brightness_of,
+    descend,
     from_along_light,
-    lit_places,
+    only_seen,
     shade_residuals,
+    weigh,
     weighted_points,
 )
 from recon.local_means import blurred, enlarged, local_means
@@ -40,13 +41,6 @@ _FULL = 252
 _AVERAGED = 0.8
 # Every so many places each way are enough to find the light.
 _SPARSE = 4
-_LEAST_PLACES = 50
-# What is this share of the median brightness or less is hair, at first; what is off the light by
-# this share counts a quarter.
-_DARK = 0.3
-_OFF = 0.2
-_REFITS = 2
-_RIDGE = 1e-4
 # No shade is taken for darker than this share of the median.
 _LEAST = 0.08
 # Beyond this logarithm nothing is skin.
@@ -112,78 +106,31 @@ def shape_from_shading(
     (rows, columns) float32, mm along z; zero where there is too little to find the light
     """
     across, down = slopes
-    seen = (weight > 0).astype(np.float32)
-    both = np.asarray(cv2.merge([seen, brightness * seen]), np.float32)
-    share, total = cv2.split(blurred(both, _AVERAGED))
-    brightness = np.asarray(total / np.maximum(share, np.float32(1e-3)), np.float32)
-    light, least = _light(*lit_places(brightness, weight, across, down, _SPARSE))
-    if light is None:
+    brightness, = divided(blurred(only_seen(brightness, weight), _AVERAGED))
+    light, median = find_light(*lit_places(brightness, weight, across, down, _SPARSE))
+    if median <= 0:
         return np.zeros(weight.shape, np.float32)
     residuals, right, lower = (np.empty(weight.shape, np.float32) for _ in range(3))
-    shade_residuals(brightness, across, down, light, least, residuals, right, lower)
-    skin = seen * (np.abs(residuals) < np.float32(_NOT_SKIN))
+    shade_residuals(brightness, across, down, light, _LEAST * median, residuals, right, lower)
+    skin = ((weight > 0) & (np.abs(residuals) < np.float32(_NOT_SKIN))).astype(np.float32)
     slow, = local_means(skin, _SLOW_MM / (2 * step), residuals)
     residuals -= enlarged(slow, residuals.shape)
     energy, = local_means(skin, _AROUND_MM / (2 * step), residuals * residuals)
-    told = enlarged(energy, residuals.shape) * np.float32(1 / _COLORED**2)
-    root = np.sqrt(weight * skin * np.float32(_TOLD * step**2) / np.maximum(told, 1))
-    residuals *= root
-    root *= np.float32(1 / (2 * step))
-    right *= root
-    lower *= root
+    weigh(residuals, right, lower, weight * skin, enlarged(energy, residuals.shape), _COLORED,
+          _TOLD * step**2, step)
     return _solved(residuals, right, lower, step)
-
-
-def _light(
-    basis: NDArray[np.float64], seen: NDArray[np.float64]
-) -> tuple[Image | None, float]:
-    """Fit the light to the brightness; None where there is too little of it.
-
-    Besides, the least that is taken for light.
-    """
-    median = percentile(seen, 50) if len(seen) >= _LEAST_PLACES else 0.0
-    if median <= 0:
-        return None, 0.0
-    light = _fitted(basis, seen, (seen > _DARK * median).astype(np.float64))
-    for _ in range(_REFITS):
-        off = (seen - basis @ light) * (1 / (_OFF * median))
-        light = _fitted(basis, seen, 1 / (1 + off * off) ** 2)
-    return light.astype(np.float32), _LEAST * median
-
-
-def _fitted(
-    basis: NDArray[np.float64], seen: NDArray[np.float64], weights: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    weighted = (basis * weights[:, None]).T
-    ridge = _RIDGE * len(seen) * np.eye(basis.shape[1])
-    return np.asarray(np.linalg.solve(weighted @ basis + ridge, weighted @ seen), np.float64)
 
 
 def _solved(values: Image, right: Image, lower: Image, step: float) -> Image:
     """Solve by conjugate gradients, with the covariance as preconditioner: few steps are enough."""
     radius = math.sqrt(2) * _RADIUS_MM / step
-    variance = np.float32(_ERROR_MM**2 * 2 * math.pi * radius**2)
-    along, image = np.zeros_like(values), np.zeros_like(values)
-    rest = np.zeros_like(values)
+    variance = _ERROR_MM**2 * 2 * math.pi * radius**2
+    rest, heights, way, smooth_way = (np.zeros_like(values) for _ in range(4))
     from_along_light(values, right, lower, rest)
-    heights, way, smooth_way = (np.zeros_like(values) for _ in range(3))
-    last = np.float32(1)
+    last = 1.0
     for _ in range(_STEPS):
-        # What `way` is times the covariance is kept beside it.
-        smooth = variance * blurred(rest, radius)
-        now = np.vdot(rest, smooth)
-        if now <= 0:
+        last = descend(
+            rest, blurred(rest, radius), variance, right, lower, way, smooth_way, heights, last)
+        if last <= 0:
             break
-        way *= now / last
-        way += rest
-        smooth_way *= now / last
-        smooth_way += smooth
-        last = now
-        along_light(smooth_way, right, lower, along)
-        from_along_light(along, right, lower, image)
-        image += way
-        length = now / np.vdot(smooth_way, image)
-        heights += length * smooth_way
-        image *= length
-        rest -= image
     return heights

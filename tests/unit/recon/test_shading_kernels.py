@@ -6,9 +6,11 @@ import pytest
 from recon._shading_kernels import (
     along_light,
     brightness_of,
+    descend,
     from_along_light,
-    lit_places,
+    only_seen,
     shade_residuals,
+    weigh,
     weighted_points,
 )
 
@@ -88,13 +90,46 @@ def test_points_and_brightness_are_of_the_same_places(rng):
     assert not lowered[weight == 0].any()
 
 
-@pytest.mark.parametrize("every", [1, 3])
-def test_the_light_is_told_by_some_places(rng, every):
-    weight = rng.random(SHAPE).astype(np.float32)
-    across, down, brightness = (image(rng) for _ in range(3))
-    found, seen = lit_places(brightness, weight, across, down, every)
-    some = np.s_[::every, ::every]
-    chosen = weight[some] > 0.5
-    np.testing.assert_allclose(found, basis(across[some], down[some])[chosen], rtol=1e-4,
-                               atol=1e-6)
-    np.testing.assert_array_equal(seen, brightness[some][chosen].astype(np.float64))
+def test_only_what_is_seen_has_a_brightness(rng):
+    brightness, weight = image(rng), np.maximum(image(rng), 0)
+    found = only_seen(brightness, weight)
+    np.testing.assert_array_equal(found[..., 0], weight > 0)
+    np.testing.assert_array_equal(found[..., 1], np.where(weight > 0, brightness, 0))
+
+
+def test_what_a_place_tells_goes_down_with_the_colours_around(rng):
+    residuals, right, lower = (image(rng) for _ in range(3))
+    weight, energy = (np.abs(image(rng)) for _ in range(2))
+    energy[:5] *= 1e-3
+    changed = [one.copy() for one in (residuals, right, lower)]
+    weigh(*changed, weight, energy, 0.1, 9.0, 1.5)
+    root = np.sqrt(9 * weight / np.maximum(energy / 0.01, 1))
+    for found, before, factor in zip(changed, (residuals, right, lower), (1, 1 / 3, 1 / 3),
+                                     strict=True):
+        np.testing.assert_allclose(found, before * root * factor, rtol=1e-4, atol=1e-6)
+
+
+def test_conjugate_gradients_end_at_the_solution(rng):
+    """Without a blur the preconditioner is the variance: A^T A x + x / variance = A^T r."""
+    shape, variance = (7, 8), 2.0
+    right, lower, values = (np.float32(0.3) * image(rng)[:7, :8] for _ in range(3))
+    columns = []
+    for k in range(right.size):
+        unit, along, back = np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(
+            shape, np.float32)
+        unit.flat[k] = 1
+        along_light(unit, right, lower, along)
+        from_along_light(along, right, lower, back)
+        columns.append(back.ravel())
+    rest, way, smooth_way, heights = (np.zeros(shape, np.float32) for _ in range(4))
+    from_along_light(values, right, lower, rest)
+    matrix = np.array(columns, float).T + np.eye(right.size) / variance
+    expected = np.linalg.solve(matrix, rest.ravel()).reshape(shape)
+    last, norms = 1.0, []
+    for _ in range(40):
+        last = descend(rest, rest.copy(), variance, right, lower, way, smooth_way, heights, last)
+        norms.append(last)
+        if last < 1e-9 * norms[0]:
+            break
+    np.testing.assert_allclose(heights, expected, atol=1e-4)
+    assert descend(np.zeros_like(rest), rest, 1.0, right, lower, way, smooth_way, heights, 1) == 0
