@@ -25,9 +25,9 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 def compiled(function: _F) -> _F:
     """Compile a function of arrays and numbers when it is first called, without strict IEEE."""
     try:
-        return cast("_F", njit(cache=True, fastmath=True)(function))
+        return cast("_F", njit(cache=True, fastmath=True, error_model="numpy")(function))
     except RuntimeError:  # numba found no folder for its cache
-        return cast("_F", njit(fastmath=True)(function))
+        return cast("_F", njit(fastmath=True, error_model="numpy")(function))
 
 
 def inlined(function: _F) -> _F:

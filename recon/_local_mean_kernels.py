@@ -138,10 +138,12 @@ def add_mirrored(
     broad : variance of the broad fit between seeds; least : no place has less of them
     """
     rows, columns = hole.shape
-    out = np.empty((rows, columns), np.float32)
+    out = np.zeros((rows, columns), np.float32)
     v, fewest = np.float32(broad), np.float32(least)
     for i in range(rows):
         for j in range(columns):
+            if image[2, i, j] == 0:
+                continue
             facing, gap, filled = field[i, j, 1], image[0, i, j], hole[i, j]
             # What Lee's gain keeps is there already.
             found = (parts[i, j, 0] * field[i, j, 3] + parts[i, j, 1] * image[3, i, j]

@@ -85,22 +85,32 @@ def shade_residuals(
     rows, columns = brightness.shape
     one, two, least_shade = np.float32(1), np.float32(2), np.float32(least)
     l0, l1, l2, l3, l4, l5, l6, l7, l8 = light
+    facing, shades = np.empty(columns, np.float32), np.empty(columns, np.float32)
     for i in range(rows):
-        for j in range(columns):
-            p, q, seen = across[i, j], down[i, j], brightness[i, j]
+        # Loops that write one or two rows each: of more, the compiler takes one number at a time.
+        right, lower, seen = across[i], down[i], brightness[i]
+        for j in range(np.uint64(columns)):
+            p, q = right[j], lower[j]
             z = one / np.sqrt(one + p * p + q * q)
             x, y = p * z, q * z
-            shade = max(l0 + l1 * x + l2 * y + l3 * z + l4 * x * x + l5 * x * y + l6 * y * y
-                        + l7 * x * z + l8 * y * z, least_shade)
+            facing[j] = z
+            shades[j] = max(l0 + l1 * x + l2 * y + l3 * z + l4 * x * x + l5 * x * y + l6 * y * y
+                            + l7 * x * z + l8 * y * z, least_shade)
+        out = residuals[i]
+        for j in range(np.uint64(columns)):
+            # The logarithm within 2 % where it counts, in a tenth of its time.
+            out[j] = two * (seen[j] - shades[j]) / (seen[j] + shades[j])
+        out, other = by_across[i], by_down[i]
+        for j in range(np.uint64(columns)):
+            p, q, z = right[j], lower[j], facing[j]
+            x, y = p * z, q * z
             # With x, y and z one after another; z falls as x and y grow.
             by_z = l3 + l7 * x + l8 * y
             by_x = l1 + two * l4 * x + l5 * y + l7 * z - by_z * p
             by_y = l2 + l5 * x + two * l6 * y + l8 * z - by_z * q
-            scale = z * z * z / shade
-            by_across[i, j] = scale * (by_x * (one + q * q) - by_y * p * q)
-            by_down[i, j] = scale * (by_y * (one + p * p) - by_x * p * q)
-            # The logarithm within 2 % where it counts, in a tenth of its time.
-            residuals[i, j] = two * (seen - shade) / (seen + shade)
+            scale = z * z * z / shades[j]
+            out[j] = scale * (by_x * (one + q * q) - by_y * p * q)
+            other[j] = scale * (by_y * (one + p * p) - by_x * p * q)
 
 
 @compiled
