@@ -12,8 +12,48 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._compiled import compiled
+from recon._relief_kernels import solved
 
-__all__ = ["mirror_costs", "mirror_image", "refine_plane"]
+__all__ = ["facing_points", "mirror_costs", "mirror_image", "most_curved", "refine_plane"]
+
+
+@compiled
+def facing_points(
+    field: NDArray[np.float32], origin: NDArray[np.float64], step: float, every: int,
+    facing: float,
+) -> NDArray[np.float64]:
+    """Give every so many of a field's points, (n, 3), that count and look along z by so much."""
+    rows, columns = field.shape[:2]
+    points = np.empty(((rows // every + 1) * (columns // every + 1), 3))
+    count = 0
+    for i in range(0, rows, every):
+        for j in range(0, columns, every):
+            if field[i, j, 2] > 0 and field[i, j, 1] > facing:
+                points[count, 0] = origin[0] + step * j
+                points[count, 1] = origin[1] + step * i
+                points[count, 2] = field[i, j, 0]
+                count += 1
+    return points[:count].copy()
+
+
+@compiled
+def most_curved(points: NDArray[np.float64]) -> float:
+    """Give the direction across the view in which points about their middle curve away most.
+
+    points : (n, 3); gives the angle from x toward y
+    """
+    matrix, right, term = np.zeros((6, 6)), np.zeros(6), np.ones(6)
+    for i in range(len(points)):
+        x, y, z = points[i]
+        term[1], term[2] = x, y
+        term[3], term[4], term[5] = x * x / 2, x * y, y * y / 2
+        for j in range(6):
+            right[j] += term[j] * z
+            for k in range(6):
+                matrix[j, k] += term[j] * term[k]
+    fit = solved(matrix, right)
+    # The second axis of a symmetric matrix of two rows.
+    return math.atan2(2 * fit[4], fit[3] - fit[5]) / 2
 
 
 @compiled

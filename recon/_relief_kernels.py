@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["curved_cells", "fitted_bulge"]
+__all__ = ["curved_cells", "fitted_bulge", "solved"]
 
 # What is this much nearer or farther than the middle is not part of the same head.
 _HEAD_MM = 120.0
@@ -35,7 +35,7 @@ def fitted_bulge(depths: NDArray[np.float64], depth_mm: float) -> tuple[float, b
         if count < _LEAST_DEPTHS or count == last:
             break
         last = count
-        fitted = _solved(matrix, right)
+        fitted = solved(matrix, right)
         best = max(best, fitted[3])
     return best, last > 0
 
@@ -71,7 +71,7 @@ def _normal_equations(
 
 
 @compiled
-def _solved(matrix: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+def solved(matrix: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
     """Solve a positive definite system by elimination; both are written over."""
     size = len(right)
     for k in range(size):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._hole_kernels import lay_in, least_bent
+from recon._segment_kernels import large_parts
 from recon.rim import Rim, halved
 
 __all__ = ["fill_holes"]
@@ -52,22 +53,18 @@ def fill_holes(
     """
     away = halved(rim.away)
     inside = away > 0
-    hole = (halved(halved(missing)) > _MISSING) & (away > _FROM_RIM)
-    parts, boxes = _parts(hole.view(np.uint8))
-    hole &= boxes[parts, cv2.CC_STAT_AREA] >= _LEAST_CELLS
+    hole = large_parts((halved(halved(missing)) > _MISSING) & (away > _FROM_RIM), _LEAST_CELLS)
+    if not hole.any():
+        none = np.zeros_like(missing)
+        return none, none
     side = 2 * _BORDER + 1
     ellipse = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
     wanted = np.asarray(cv2.dilate(hole.view(np.uint8), ellipse) * inside, np.uint8)
     wanted[:3] = wanted[-3:] = 0
     wanted[:, :3] = wanted[:, -3:] = 0
-    parts, boxes = _parts(wanted)
+    _, *found, _ = cv2.connectedComponentsWithStats(wanted)
+    parts, boxes = (np.asarray(one, np.int32) for one in found)
     added = halved(halved(detail))
     least_bent(counts, sums, halved(halved(heights)), added, parts, boxes, inside,
                _SMOOTHING / _CELL**2, _CELL * spacing)
     return lay_in(added, parts, missing)
-
-
-def _parts(image: NDArray[np.uint8]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Number what hangs together; and each number's box and how many pixels it has, (n, 5)."""
-    _, parts, boxes, _ = cv2.connectedComponentsWithStats(image)
-    return np.asarray(parts, np.int32), np.asarray(boxes, np.int32)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recon._mirror_kernels import mirror_costs, refine_plane
+from recon._mirror_kernels import facing_points, mirror_costs, most_curved, refine_plane
 
 __all__ = ["MirrorPlane", "find_plane"]
 
@@ -72,21 +72,23 @@ def find_plane(
     -------
     None where the face shows too little of one of its sides.
     """
-    points = _points(field, origin, step)
+    points = facing_points(
+        field, np.asarray(origin), step, max(1, round(_DENSE_MM / step)), _FACING)
     if len(points) < _LEAST_POINTS:
         return None
     middle = points.mean(axis=0)
     points -= middle
     start = np.array([*origin, 0.0]) - middle
     some = points[::round((_SPARSE_MM / _DENSE_MM) ** 2)]
-    level = _most_curved(some)
+    turn = most_curved(some)
+    level = np.array([math.cos(turn), math.sin(turn), 0.0])
     normals = np.cos(_TURNS)[:, None] * level + np.sin(_TURNS)[:, None] * (0.0, 0.0, 1.0)
     costs = mirror_costs(field, start, step, some, normals, _OFFSETS, _FAR_MM**2,
                          _MISSING * _FAR_MM**2)
     best = np.inf
-    for turn in np.argsort(costs.min(axis=1), kind="stable")[:_STARTS]:
+    for turned in np.argsort(costs.min(axis=1), kind="stable")[:_STARTS]:
         normal, offset, met = refine_plane(
-            field, start, step, some, normals[turn], _OFFSETS[costs[turn].argmin()], _SCALE_MM,
+            field, start, step, some, normals[turned], _OFFSETS[costs[turned].argmin()], _SCALE_MM,
             _FIRST_STEPS, _STILL_MM)
         cost = mirror_costs(field, start, step, some, normal[None], np.array([offset]),
                             _FAR_REFINED_MM**2, _MISSING * _FAR_REFINED_MM**2)[0, 0]
@@ -99,22 +101,3 @@ def find_plane(
     if met < _LEAST_MET * len(points):
         return None
     return MirrorPlane(normal, offset + float(normal @ middle))
-
-
-def _points(field: NDArray[np.float32], origin: tuple[float, float], step: float) -> Floats:
-    """Some of the field's points, (n, 3) mm."""
-    every = max(1, round(_DENSE_MM / step))
-    some = field[::every, ::every]
-    rows, columns = np.nonzero((some[..., 2] > 0) & (some[..., 1] > _FACING))
-    return np.column_stack([origin[0] + every * step * columns, origin[1] + every * step * rows,
-                            some[rows, columns, 0]]).astype(np.float64)
-
-
-def _most_curved(points: Floats) -> Floats:
-    """The direction across the view in which (n, 3) points about their middle curve away most."""
-    x, y, z = points.T
-    terms = np.stack([np.ones_like(x), x, y, x * x / 2, x * y, y * y / 2])
-    *_, xx, xy, yy = np.linalg.solve(terms @ terms.T, terms @ z).tolist()
-    # The second axis of a symmetric matrix of two rows.
-    turn = math.atan2(2 * xy, xx - yy) / 2
-    return np.array([math.cos(turn), math.sin(turn), 0.0])
