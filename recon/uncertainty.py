@@ -33,9 +33,9 @@ __all__ = ["Sources", "average_cutoff", "cutoff", "noise_share", "sources_of_err
 
 # From bench/calibration.py: H, S, E above, E of a fit without detail, which has no broad average at
 # the rim, and those of `noise_share`.
-_HOLE = 0.435
-_SLOPE = 0.074
-_RIM = 1.4
+_HOLE = 0.4
+_SLOPE = 0.075
+_RIM = 1.46
 _RIM_ALONE = 2.4
 _SHARE = 90.0
 _DETAIL_PART = 0.12
