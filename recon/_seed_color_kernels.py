@@ -100,19 +100,18 @@ def _mixture(
     """
     if near[3] == 0 or far[3] == 0:
         return np.float32(0), np.float32(0), False
-    way, off = np.empty(3, np.float32), np.empty(3, np.float32)
-    length = along = np.float32(0)
+    # Sums alone: room for three numbers each would take longer than all of this.
+    length = along = squared = np.float32(0)
+    per_near, per_far = np.float32(1) / np.float32(near[3]), np.float32(1) / np.float32(far[3])
     for c in range(3):
-        mean = np.float32(near[c]) / np.float32(near[3])
-        way[c] = np.float32(far[c]) / np.float32(far[3]) - mean
-        off[c] = np.float32(color[c]) - mean
-        length += way[c] * way[c]
-        along += way[c] * off[c]
-    length = max(length, np.float32(alike * alike))
+        mean = np.float32(near[c]) * per_near
+        way, off = np.float32(far[c]) * per_far - mean, np.float32(color[c]) - mean
+        length += way * way
+        along += way * off
+        squared += off * off
+    apart, length = length, max(length, np.float32(alike * alike))
     part = max(along / length, np.float32(0))
-    away = np.float32(0)
-    for c in range(3):
-        away += (off[c] - part * way[c]) ** 2
+    away = squared - part * (2 * along - part * apart)
     if away > max(np.float32(aside * aside) * length, np.float32(aside_least**2)):
         return np.float32(0), length, False
     return part, length, True

@@ -1,5 +1,6 @@
 """k-means of depths, Eq. (2), solved exactly: along one axis a few sums are enough."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -38,20 +39,11 @@ def split_depths(z: NDArray[np.floating]) -> list[Cluster]:
     -------
     The clusters that are not empty, nearest first.
     """
-    whole = np.rint(z).astype(np.int64)
-    start = int(whole.min())
-    counts = np.bincount(whole - start)
-    depth = np.arange(float(len(counts)))
-    # The sums over the bins before each.
-    sums = np.zeros((3, len(counts) + 1))
-    weighted = counts.astype(np.float64)
-    for power in range(3):
-        np.cumsum(weighted, out=sums[power, 1:])
-        weighted *= depth
-    places = np.arange(_PLACES) * len(counts) // (_PLACES - 1)
+    start, sums = _summed(np.ascontiguousarray(z, np.float32))
+    places = np.arange(_PLACES) * (sums.shape[1] - 1) // (_PLACES - 1)
     cuts = _refined(*_best_cuts(sums, places), sums)
     clusters = []
-    for first, end in zip((0, *cuts), (*cuts, len(counts)), strict=True):
+    for first, end in zip((0, *cuts), (*cuts, sums.shape[1] - 1), strict=True):
         before, up_to = sums[0][first], sums[0][end]
         if up_to > before:
             most = [before + share * (up_to - before) for share in _MOST]
@@ -59,6 +51,31 @@ def split_depths(z: NDArray[np.floating]) -> list[Cluster]:
             at = start + np.searchsorted(sums[0][1:], [before + 0.5, up_to - 0.5, *most])
             clusters.append(Cluster(*at.tolist()))
     return clusters
+
+
+@compiled
+def _summed(z: NDArray[np.float32]) -> tuple[int, NDArray[np.float64]]:
+    """Give the least depth, whole mm, and sums over the bins before each, (3, bins + 1).
+
+    One bin for each millimetre from the least to the largest: of how many depths are in it, and of
+    that times its number, and times its number squared.
+    """
+    half = np.float32(0.5)
+    nearest = farthest = z[0]
+    for one in z:
+        nearest, farthest = min(nearest, one), max(farthest, one)
+    start = math.floor(nearest + half)
+    base = np.float32(start) - half
+    counts = np.zeros(np.int64(np.uint32(farthest - base)) + 1, np.int64)
+    for one in z:
+        counts[np.uint32(one - base)] += 1
+    sums = np.zeros((3, len(counts) + 1))
+    for k in range(len(counts)):
+        count = np.float64(counts[k])
+        for power in range(3):
+            sums[power, k + 1] = sums[power, k] + count
+            count *= k
+    return start, sums
 
 
 @compiled

@@ -24,7 +24,7 @@ def disc(radius: float) -> NDArray[np.uint8]:
 
 
 def gaussian(sigma: float) -> NDArray[np.float32]:
-    """Give the taps of a Gaussian of that standard deviation, pixels, to three times it each way."""
+    """Give the taps of a Gaussian of that standard deviation, pixels, to thrice it each way."""
     size = 2 * max(1, round(3 * sigma)) + 1
     return np.asarray(cv2.getGaussianKernel(size, sigma, cv2.CV_32F), np.float32).ravel()
 

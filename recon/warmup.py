@@ -26,11 +26,14 @@ _WIDTH, _HEIGHT = 160, 120
 _FOCAL_PX = 150.0
 _BOX = (58, 38, 44, 44)
 _NEAREST_MM = 700.0
+_HOLE = np.s_[66:76, 82:92]
 
 
 @cache
 def warm() -> None:
     """Go once through every stage, with a ball for a face, and pack it; does nothing when repeated.
+
+    The ball has a hole, which is filled.
 
     From then on the process keeps memory that a frame frees for the next: `recon.heap`.
     """
@@ -59,5 +62,6 @@ def _ball() -> RgbdFrame:
     v, u = np.mgrid[:_HEIGHT, :_WIDTH]
     lower = ((u - camera.cx) ** 2 + (v - camera.cy) ** 2) / 20
     depth = np.where(lower < 60, _NEAREST_MM + lower, 1500).astype(np.uint16)
+    depth[_HOLE] = 0
     return RgbdFrame(depth, np.full((_HEIGHT, _WIDTH, 3), 128, np.uint8), 0, 0,
                      Calibration(depth=camera, color=camera), registered=True)

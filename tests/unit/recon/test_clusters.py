@@ -39,3 +39,12 @@ def test_three_surfaces_are_told_apart():
 def test_one_depth_is_one_cluster():
     only, = split_depths(np.full(7, 812.0, np.float32))
     assert only == (812, 812, 812, 812)
+
+
+@pytest.mark.parametrize("off", [0.0, 0.25, 0.5, 0.75])
+def test_parts_of_a_millimetre_are_rounded(off):
+    z = np.repeat(np.float32([700, 702, 703]), 5) + np.float32(off)
+    found = split_depths(z)
+    whole = np.floor(z + 0.5).astype(int)
+    assert (found[0].first, found[-1].last) == (whole.min(), whole.max())
+    assert sum(((whole >= one.first) & (whole <= one.last)).sum() for one in found) == len(z)
