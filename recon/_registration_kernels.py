@@ -7,13 +7,15 @@ from recon._compiled import compiled
 
 __all__ = ["EMPTY", "look", "project", "project_points", "see"]
 
+Rays = NDArray[np.float64]
+
 EMPTY = np.float32(1e30)
 """Where nothing is in the z-buffer, mm; no infinity, which compiled code may take for no number."""
 
 
 @compiled
 def project(
-    depth: NDArray[np.uint16], offset_mm: float, rays: NDArray[np.float64],
+    depth: NDArray[np.uint16], offset_mm: float, rays: tuple[Rays, Rays],
     begin: tuple[int, int], step: tuple[int, int], rotation: NDArray[np.float64],
     translation: NDArray[np.float64], camera: NDArray[np.float64], pitch: float,
     points: NDArray[np.float32], pixels: NDArray[np.float32], color_depth: NDArray[np.float32],
@@ -21,7 +23,8 @@ def project(
 ) -> tuple[int, int, int, int]:
     """Back-project each measured depth, move it to the colour camera, and project it there.
 
-    depth : (H, W), the pixels `begin`, `begin + step`, ... of the image that `rays` is of
+    depth : (H, W), the pixels `begin`, `begin + step`, ... of the image that `rays` are of
+    rays : x and y at z = 1 of each pixel
     camera : width, height, fx, fy, cx, cy, k1, k2, p1, p2, k3 of the colour camera
     pitch : side of the z-buffer's cells, pixels
     points, pixels, color_depth : (H, W, 3), (H, W, 2), (H, W), written where there is a depth
@@ -47,7 +50,7 @@ def project(
     for i in range(depth.shape[0]):
         for j in range(columns):
             row, column = begin[0] + i * step[0], begin[1] + j * step[1]
-            across[j], along[j] = rays[row, column, 0], rays[row, column, 1]
+            across[j], along[j] = rays[0][row, column], rays[1][row, column]
         # All of a row at once, measured or not, takes less time than to ask for each.
         line = depth[i]
         for j in range(columns):

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from capture.frame import RgbdFrame
+from capture.frame import CameraModel, RgbdFrame
 from recon._registration_kernels import EMPTY, look, project, project_points, see
 from recon.errors import NoDepthError
 
@@ -95,7 +96,7 @@ def register(
     height, width = frame.color.shape[:2]
     nearest = np.full([int(np.ceil(side / pitch)) + 1 for side in (height, width)], EMPTY)
     top, bottom, left, right = project(
-        depth, depth_offset_mm, frame.depth_camera.rays(), (first_row, first_column),
+        depth, depth_offset_mm, _rays(frame.depth_camera), (first_row, first_column),
         (row_step, column_step), *_pose(frame), pitch, points, pixels, color_depth, nearest)
     # Each point covers about its cell and the next: without this, a far surface would shine
     # through between the samples of a near one.
@@ -143,6 +144,19 @@ def look_up(
     seen = see(pixels, z, registered.nearest, registered.pitch, _HIDDEN_MM, _HIDDEN_SHARE, width,
                height)
     return look(pixels, seen, _read_only(frame.color))[0], seen[0]
+
+
+@lru_cache(maxsize=8)
+def _rays(camera: CameraModel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give x and y at z = 1 of each pixel, read-only.
+
+    Without distortion x is that of the column and y that of the row: megabytes need not be read.
+    """
+    rays = camera.rays()
+    if any(camera.distortion):
+        return rays[..., 0], rays[..., 1]
+    return (np.broadcast_to(rays[0, :, 0].copy(), rays.shape[:2]),
+            np.broadcast_to(rays[:, :1, 1].copy(), rays.shape[:2]))
 
 
 def _pose(
