@@ -57,7 +57,7 @@ def seed_colors(
     """
     if not face.any():
         return at_pixels(registered.colors, face)
-    window = _window(face)
+    window = _window(face, _MARGIN_PX)
     face, solid = face[window], solid[window]
     colors = registered.colors[window].copy()
     seen = registered.visible[window] & face
@@ -74,14 +74,18 @@ def seed_colors(
              box_sums(colors, behind, edge, _BESIDE // 2),
              box_sums(colors, behind, edge, _FARTHER // 2), _ALIKE, _SHARE, _ASIDE, _ASIDE_LEAST,
              _CONTRAST, _MUCH)
+    # What is missing is found in the face alone.
+    close = _window(face, 0)
+    colors, own, face = colors[close].copy(), own[close].copy(), face[close].copy()
     average_missing(colors, own, face & ~own)
     return at_pixels(colors, face)
 
 
-def _window(face: NDArray[np.bool_]) -> tuple[slice, slice]:
+def _window(face: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
+    """The rows and columns of the face, and so many more each way."""
     rows, columns = (np.flatnonzero(face.any(axis=axis)) for axis in (1, 0))
-    return (slice(max(rows[0] - _MARGIN_PX, 0), rows[-1] + _MARGIN_PX + 1),
-            slice(max(columns[0] - _MARGIN_PX, 0), columns[-1] + _MARGIN_PX + 1))
+    return (slice(max(rows[0] - margin, 0), rows[-1] + margin + 1),
+            slice(max(columns[0] - margin, 0), columns[-1] + margin + 1))
 
 
 def _behind(
