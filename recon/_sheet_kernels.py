@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from recon._compiled import compiled
 
-__all__ = ["face_field", "left_out", "slopes"]
+__all__ = ["face_field", "lay_under", "left_out", "shares", "slopes"]
 
 _1 = np.uint64(1)
 
@@ -32,6 +32,46 @@ def slopes(
             out_across[j] = half * (line[j + _1] - line[j - _1])
         out_across[0] = half * (line[1] - line[0])
         out_across[last] = half * (line[last] - line[last - _1])
+
+
+@compiled
+def shares(
+    weight: NDArray[np.float32], sums: NDArray[np.float32], fading: float, full: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Make sums means, which fade where the weight is not much more than `fading`.
+
+    weight, sums : (rows, columns); the last changed
+
+    Gives how much of `full` the weight is, 0-1, and how much is missing of that, smooth between.
+    """
+    seeded, missing = np.empty_like(weight), np.empty_like(weight)
+    least, per_full = np.float32(fading), np.float32(1 / full)
+    one, two, three = np.float32(1), np.float32(2), np.float32(3)
+    for i in range(weight.shape[0]):
+        own, total, known, lacking = weight[i], sums[i], seeded[i], missing[i]
+        for j in range(np.uint64(len(own))):
+            total[j] /= own[j] + least
+        for j in range(np.uint64(len(own))):
+            part = min(own[j] * per_full, one)
+            known[j] = part
+            rest = one - part
+            lacking[j] = rest * (rest * (three - two * rest))
+    return seeded, missing
+
+
+@compiled
+def lay_under(
+    detail: NDArray[np.float32], broad: NDArray[np.float32], nearness: NDArray[np.float32],
+    missing: NDArray[np.float32],
+) -> None:
+    """Move detail toward a broad average, by how near the rim is or how much is missing.
+
+    All are (rows, columns), `detail` is changed.
+    """
+    for i in range(detail.shape[0]):
+        own, other, near, lacking = detail[i], broad[i], nearness[i], missing[i]
+        for j in range(np.uint64(len(own))):
+            own[j] += max(near[j], lacking[j]) * (other[j] - own[j])
 
 
 @compiled

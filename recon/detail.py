@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from recon._image_kernels import add_between
 from recon._percentile import percentile
 from recon._scatter_kernels import BILINEAR_VARIANCE, read_between, share_out
-from recon._sheet_kernels import face_field, slopes
+from recon._sheet_kernels import face_field, lay_under, shares, slopes
 from recon.holes import fill_holes
 from recon.local_means import blurred, enlarged, local_means
 from recon.mirror_plane import find_plane
@@ -103,17 +103,13 @@ def add_detail(
     rest = points[:, 2] - grid.at_seeds(heights)
     usual = np.float32((step / spacing) ** 2)
     weight, detail = (blurred(one, _unshared(radius / step)) for one in grid.sums(rest))
-    detail /= weight + usual * np.float32(_FADING)
-    seeded = np.minimum(weight / (usual * np.float32(_FULL)), 1)
-    missing = 1 - seeded
-    missing *= missing * (3 - 2 * missing)
+    seeded, missing = shares(weight, detail, float(usual) * _FADING, float(usual) * _FULL)
     rim = Rim.of(support, step / spacing)
     # So broad an average needs no more than every fourth point.
     cells = grid.halved().halved()
     counts, sums = cells.sums(rest)
     broad = broad_average(counts, sums, BROADER * radius / (4 * step), 16 * float(usual), rim, 2)
-    detail += (np.maximum(_doubled(rim.nearness, detail), missing)
-               * (_doubled(broad, detail) - detail))
+    lay_under(detail, _doubled(broad, detail), _doubled(rim.nearness, detail), missing)
     filled, hole = fill_holes(counts, sums, missing, rim, heights, detail, spacing)
     detail *= 1 - hole
 
@@ -192,7 +188,7 @@ def _unshared(sigma: float) -> float:
 def _doubled(image: Image, like: Image) -> Image:
     """A halved grid's image between its pixels."""
     finer = cv2.resize(image, None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
-    return np.asarray(finer, np.float32)[:like.shape[0], :like.shape[1]]
+    return np.ascontiguousarray(finer[:like.shape[0], :like.shape[1]], np.float32)
 
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from recon._sheet_kernels import face_field, left_out, slopes
+from recon._sheet_kernels import face_field, lay_under, left_out, shares, slopes
 
 
 def numpys(heights, step):
@@ -44,3 +44,24 @@ def test_what_is_left_out_is_below_both_levels():
     level = np.float32(0.3)
     np.testing.assert_allclose(
         found[places], np.minimum(level - np.abs(margin[places] - level), 0), atol=1e-6)
+
+
+def test_means_fade_and_what_is_missing_of_the_full_weight_is_told():
+    rng = np.random.default_rng(4)
+    weight, sums = (rng.random((13, 17)).astype(np.float32) for _ in range(2))
+    weight[:3] = sums[:3] = 0
+    means = sums.copy()
+    seeded, missing = shares(weight, means, 0.02, 0.6)
+    np.testing.assert_allclose(means, sums / (weight + 0.02), rtol=1e-5)
+    expected = np.minimum(weight / 0.6, 1)
+    np.testing.assert_allclose(seeded, expected, rtol=1e-5)
+    np.testing.assert_allclose(missing, (1 - expected) ** 2 * (1 + 2 * expected), atol=1e-6)
+
+
+def test_detail_is_moved_by_the_larger_of_two_shares():
+    rng = np.random.default_rng(5)
+    detail, broad, near, missing = (rng.random((13, 17)).astype(np.float32) for _ in range(4))
+    moved = detail.copy()
+    lay_under(moved, broad, near, missing)
+    np.testing.assert_allclose(moved, detail + np.maximum(near, missing) * (broad - detail),
+                               rtol=1e-5, atol=1e-6)
