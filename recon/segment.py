@@ -93,7 +93,7 @@ _SPUR_MM = 30.0
 # A part of the area, cut off from the largest, that is smaller than this share of it.
 _ISLAND_SHARE = 0.15
 # Around the box, what may hide a part of it and what smooths its outline.
-_WINDOW_MARGIN_PX = 16
+_WINDOW_MARGIN_PX = 8
 
 
 @dataclass(frozen=True, eq=False)
