@@ -1,11 +1,10 @@
 """The light on a face, by spherical harmonics of its normals, compiled."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from recon._compiled import compiled
+from recon._systems import solved
 
 __all__ = ["find_light", "lit_places"]
 
@@ -87,9 +86,9 @@ def find_light(
 def _fitted(
     basis: NDArray[np.float64], seen: NDArray[np.float64], weights: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Solve the normal equations, with a ridge, by Cholesky."""
+    """Solve the normal equations, with a ridge."""
     count = len(seen)
-    L, x = np.zeros((_TERMS, _TERMS)), np.zeros(_TERMS)
+    matrix, right = np.zeros((_TERMS, _TERMS)), np.zeros(_TERMS)
     weighted = np.empty(count)
     for j in range(_TERMS):
         one = basis[j]
@@ -99,23 +98,10 @@ def _fitted(
             other, total = basis[k], 0.0
             for i in range(count):
                 total += weighted[i] * other[i]
-            L[j, k] = total
+            matrix[j, k] = matrix[k, j] = total
         total = 0.0
         for i in range(count):
             total += weighted[i] * seen[i]
-        x[j] = total
-        L[j, j] += _RIDGE * count
-    for j in range(_TERMS):
-        for k in range(j):
-            for i in range(k):
-                L[j, k] -= L[j, i] * L[k, i]
-            L[j, k] /= L[k, k]
-            L[j, j] -= L[j, k] * L[j, k]
-            x[j] -= L[j, k] * x[k]
-        L[j, j] = math.sqrt(L[j, j])
-        x[j] /= L[j, j]
-    for j in range(_TERMS - 1, -1, -1):
-        for k in range(j + 1, _TERMS):
-            x[j] -= L[k, j] * x[k]
-        x[j] /= L[j, j]
-    return x
+        right[j] = total
+        matrix[j, j] += _RIDGE * count
+    return solved(matrix, right)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._compiled import compiled
-from recon._relief_kernels import solved
+from recon._systems import solved
 
 __all__ = ["facing_points", "mirror_costs", "mirror_image", "most_curved", "refine_plane"]
 

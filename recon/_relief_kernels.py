@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._compiled import compiled
+from recon._systems import solved
 
-__all__ = ["curved_cells", "fitted_bulge", "solved"]
+__all__ = ["curved_cells", "fitted_bulge"]
 
 # What is this much nearer or farther than the middle is not part of the same head.
 _HEAD_MM = 120.0
@@ -16,8 +17,6 @@ _BEFORE_MM = 20.0
 _FITS = 3
 # Of a cell's surroundings so many each way are enough.
 _SAMPLES = 5
-# Makes depths in a row no division by zero, and changes nothing else.
-_RIDGE = 1e-6
 
 
 @compiled
@@ -68,25 +67,6 @@ def _normal_equations(
             for column in range(4):
                 matrix[row, column] += term[row] * term[column]
     return matrix, right, count
-
-
-@compiled
-def solved(matrix: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve a positive definite system by elimination; both are written over."""
-    size = len(right)
-    for k in range(size):
-        matrix[k, k] += _RIDGE
-    for k in range(size):
-        for row in range(k + 1, size):
-            share = matrix[row, k] / matrix[k, k]
-            right[row] -= share * right[k]
-            for column in range(k, size):
-                matrix[row, column] -= share * matrix[k, column]
-    for k in range(size - 1, -1, -1):
-        for column in range(k + 1, size):
-            right[k] -= matrix[k, column] * right[column]
-        right[k] /= matrix[k, k]
-    return right
 
 
 @compiled
