@@ -24,20 +24,14 @@ def add_between(
 
     rows, columns : (m,), (k,), places in `coarse`, inside it, rising
     """
-    flat, wide, count = coarse.ravel(), np.uint64(coarse.shape[1]), np.uint64(len(columns))
     left, part = _places(columns, coarse.shape[1])
-    upper, lower = np.empty(len(columns), np.float32), np.empty(len(columns), np.float32)
-    known = -2
+    lines, known = np.empty((2, len(columns)), np.float32), -2
     for i in range(len(rows)):
         above = min(int(rows[i]), coarse.shape[0] - 2)
-        if above == known + 1:
-            upper, lower = lower, upper
-        elif above != known:
-            _along(flat, np.uint64(above) * wide, left, part, _1, _0, count, upper)
         if above != known:
-            _along(flat, np.uint64(above + 1) * wide, left, part, _1, _0, count, lower)
+            _read_rows(coarse, above, known, left, part, lines)
             known = above
-        down = rows[i] - np.float32(above)
+        upper, lower, down = lines[above & 1], lines[1 - (above & 1)], rows[i] - np.float32(above)
         own = image[i]
         for j in range(len(columns)):
             own[j] += upper[j] + down * (lower[j] - upper[j])
@@ -49,26 +43,36 @@ def above(
     level: float,
 ) -> NDArray[np.bool_]:
     """Say where an image is above a level between its points, (m, k); places of `add_between`."""
-    flat, wide, count = coarse.ravel(), np.uint64(coarse.shape[1]), np.uint64(len(columns))
     left, part = _places(columns, coarse.shape[1])
-    upper, lower = np.empty(len(columns), np.float32), np.empty(len(columns), np.float32)
+    lines, known = np.empty((2, len(columns)), np.float32), -2
     out = np.empty((len(rows), len(columns)), np.bool_)
     least = np.float32(level)
-    known = -2
     for i in range(len(rows)):
         first = min(int(rows[i]), coarse.shape[0] - 2)
-        if first == known + 1:
-            upper, lower = lower, upper
-        elif first != known:
-            _along(flat, np.uint64(first) * wide, left, part, _1, _0, count, upper)
         if first != known:
-            _along(flat, np.uint64(first + 1) * wide, left, part, _1, _0, count, lower)
+            _read_rows(coarse, first, known, left, part, lines)
             known = first
-        down = rows[i] - np.float32(first)
+        upper, lower, down = lines[first & 1], lines[1 - (first & 1)], rows[i] - np.float32(first)
         own = out[i]
         for j in range(len(columns)):
             own[j] = upper[j] + down * (lower[j] - upper[j]) > least
     return out
+
+
+@compiled
+def _read_rows(
+    image: NDArray[np.float32], first: int, known: int, left: NDArray[np.uint32],
+    part: NDArray[np.float32], lines: NDArray[np.float32],
+) -> None:
+    """Read a row of an image and the next between its points.
+
+    known : which row and its next were read before
+    lines : (2, k), in which an even row stands first, an odd one last
+    """
+    flat, wide, count = image.ravel(), np.uint64(image.shape[1]), np.uint64(len(left))
+    if first != known + 1:
+        _along(flat, np.uint64(first) * wide, left, part, _1, _0, count, lines[first & 1])
+    _along(flat, np.uint64(first + 1) * wide, left, part, _1, _0, count, lines[1 - (first & 1)])
 
 
 @compiled

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recon._image_kernels import collect, unset
-from recon._scatter_kernels import BILINEAR_VARIANCE, mark, places
+from recon._scatter_kernels import BILINEAR_VARIANCE, places
 from recon.colors import average_neighbors
 from recon.detail import DetailedSurface
 from recon.face import DenseCloud
-from recon.masks import disc
 from recon.rbf import Surface
 from recon.registration import LookUp
 from recon.segment import Seeds
@@ -60,7 +59,7 @@ def densify(
     supported, sheet = _sheet(seeds.points, surface, spacing)
     slopes = sheet[1], sheet[2]
     step = float(np.sqrt(supported.area / (ratio * len(seeds.points))))
-    supported = _unbridged(supported, slopes, seeds.points, spacing)
+    supported = _unbridged(supported, slopes, spacing)
     xs, ys, support = supported.on_grid(step)
     origin = float(xs[0]), float(ys[0])
 
@@ -75,7 +74,7 @@ def densify(
     points, normals, colors, sigma, cells = collect(
         support, xs, ys, sheet, rows, columns, colors, every, sigma, sources.every)
     if look_up is not None:
-        near = _near_seeds(seeds.points, supported, _HOLE * spacing)
+        near = supported.near_seeds(_HOLE * spacing)
         hole = unset(near, rows, columns, cells)
         if len(hole):
             own, seen = look_up(points[hole])
@@ -102,28 +101,18 @@ def _sheet(
 
 
 def _unbridged(
-    supported: Support, slopes: tuple[NDArray[np.float32], NDArray[np.float32]],
-    points: NDArray[np.float32], spacing: float,
+    supported: Support, slopes: tuple[NDArray[np.float32], NDArray[np.float32]], spacing: float
 ) -> Support:
     """Leave out where the fit bridges a step that nothing was read of."""
     along, down = slopes
     bridge = along * along + down * down > np.float32(_STEEP**2)
     if not bridge.any():
         return supported
-    bridge &= _near_seeds(points, supported, _UNREAD * spacing) == 0
+    bridge &= supported.near_seeds(_UNREAD * spacing) == 0
     # A surface riddled with pinholes is worse than a bridge.
     kernel = np.ones((_SPECK, _SPECK), np.uint8)
     opened = cv2.dilate(cv2.erode(bridge.view(np.uint8), kernel), kernel, anchor=(0, 0))
     return supported.without(np.asarray(opened > 0))
-
-
-def _near_seeds(
-    points: NDArray[np.float32], supported: Support, radius: float
-) -> NDArray[np.uint8]:
-    """Which points of the support's grid have a seed within a radius, mm; 0 or 1."""
-    seeded = mark(points, (supported.xs[0], supported.ys[0]), supported.step,
-                  len(supported.ys), len(supported.xs))
-    return np.asarray(cv2.dilate(seeded, disc(radius / supported.step)), np.uint8)
 
 
 def _colors(

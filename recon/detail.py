@@ -9,7 +9,6 @@ doi:10.1109/TPAMI.1980.4766994, keeps what stands above noise.
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -109,7 +108,7 @@ def add_detail(
     cells = grid.halved().halved()
     counts, sums = cells.sums(rest)
     broad = broad_average(counts, sums, BROADER * radius / (4 * step), 16 * float(usual), rim, 2)
-    lay_under(detail, _doubled(broad, detail), _doubled(rim.nearness, detail), missing)
+    lay_under(detail, enlarged(broad, detail.shape), enlarged(rim.nearness, detail.shape), missing)
     filled, hole = fill_holes(counts, sums, missing, rim, heights, detail, spacing)
     detail *= 1 - hole
 
@@ -142,7 +141,7 @@ def add_detail(
     smaller = halved(heights)
     across, down = np.empty_like(smaller), np.empty_like(smaller)
     slopes(smaller, 2 * step, across, down)
-    detail += _doubled(rim.frayed_depth((across, down), spacing), detail)
+    detail += enlarged(rim.frayed_depth((across, down), spacing), detail.shape)
     detail += filled
     sheet = np.empty((3, *detail.shape), np.float32)
     np.add(heights, detail, out=sheet[0])
@@ -183,14 +182,6 @@ class _Seeded:
 def _unshared(sigma: float) -> float:
     """The radius of a blur, less what sharing a value among four pixels has blurred already."""
     return math.sqrt(sigma * sigma - BILINEAR_VARIANCE)
-
-
-def _doubled(image: Image, like: Image) -> Image:
-    """A halved grid's image between its pixels."""
-    finer = cv2.resize(image, None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
-    return np.ascontiguousarray(finer[:like.shape[0], :like.shape[1]], np.float32)
-
-
 
 
 def _gain(

@@ -40,6 +40,7 @@ class Support:
     ----------
     xs, ys : (columns,), (rows,) float64, mm, a grid of two points for each spacing
     step : distance of its points, mm
+    seeded : (rows, columns) uint8, 1 at the points nearest to the seeds, 0 elsewhere
     margin : (rows, columns) float32, above 0 where supported, between the points above `level`
     level : a disc of so few pixels reaches farther than its radius
     """
@@ -47,6 +48,7 @@ class Support:
     xs: NDArray[np.float64]
     ys: NDArray[np.float64]
     step: float
+    seeded: NDArray[np.uint8]
     margin: NDArray[np.float32]
     level: float
 
@@ -74,7 +76,7 @@ class Support:
                                          math.sqrt(np.count_nonzero(around) / math.pi)))
         margin = _broadly_blurred(closed, even) - np.float32(least)
         most = cv2.dilate(closed, disc(_GROWTH * _FINENESS))
-        return cls(xs, ys, step, margin, pixels - least).without(most == 0)
+        return cls(xs, ys, step, seeded, margin, pixels - least).without(most == 0)
 
     @property
     def inside(self) -> NDArray[np.bool_]:
@@ -85,6 +87,10 @@ class Support:
     def area(self) -> float:
         """Of the supported places, mm^2."""
         return float(np.count_nonzero(self.inside) * self.step**2)
+
+    def near_seeds(self, radius: float) -> NDArray[np.uint8]:
+        """Which of the grid's points have a seed within a radius, mm; 0 or 1."""
+        return np.asarray(cv2.dilate(self.seeded, disc(radius / self.step)), np.uint8)
 
     def without(self, places: NDArray[np.bool_]) -> Self:
         """Give the same without some of the grid's points, up to half of the way to the next."""

@@ -128,3 +128,15 @@ def test_what_is_left_out_ends_half_way_to_the_next_point():
     _, _, before = support.on_grid(step)
     gone = np.argwhere(before & ~inside) * step
     np.testing.assert_allclose(np.ptp(gone, axis=0), 5 * support.step, atol=0.1)
+
+
+def test_what_is_near_a_seed():
+    """To half a point of the grid each way, by which a seed may be beside its point."""
+    points = disc_seeds(2.0, 20.0, 10.0)
+    found = Support.of(points, 2.0)
+    away = to_seed(np.stack(np.meshgrid(found.xs, found.ys), axis=-1), points)
+    near = found.near_seeds(3.0)
+    beside = found.step / np.sqrt(2)
+    assert near[away < 3 - 2 * beside].all()
+    assert not near[away > 3 + beside].any()
+    assert 0 < near.mean() < 1
