@@ -214,7 +214,6 @@ class Streams:
         return np.ascontiguousarray(image[:, ::-1]) if stream.mirrored else image
 
 
-
 def _accepted(openni2: Any, kind: str) -> dict[int, str]:
     if kind == DEPTH:
         return {int(openni2.PIXEL_FORMAT_DEPTH_1_MM): "depth in 1 mm",
