@@ -22,7 +22,7 @@ ENV PATH=/opt/denseface/bin:$PATH \
     DENSEFACE_DATA=/data
 USER denseface
 # Compiled for this processor into the user's cache: else the first start would wait for it.
-RUN python3 -c 'from recon import warm; warm()'
+RUN python3 -c 'from denseface.service.daemons.worker import warm; warm()'
 WORKDIR /data
 VOLUME /data
 ENTRYPOINT ["denseface"]

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from capture import RgbdFrame, open_source
-from recon import Preset, Settings, reconstruct
+from denseface.capture import RgbdFrame, open_source
+from denseface.recon import Preset, Settings, reconstruct
 from tests.simulator import Accuracy, Truth, measure
 
 __all__ = ["RECORDINGS", "measured"]

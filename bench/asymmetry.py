@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bench.calibration_samples import CHOOSING, REPORTING
 from bench.machine import describe
-from recon import Preset, ReconstructionError, Settings, reconstruct
+from denseface.recon import Preset, ReconstructionError, Settings, reconstruct
 from tests.simulator import (
     KINECT_CALIBRATED,
     Deformed,

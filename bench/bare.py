@@ -5,8 +5,8 @@ from itertools import cycle
 
 import cv2
 
-from capture import open_source
-from recon import reconstruct, warm
+from denseface.capture import open_source
+from denseface.recon import reconstruct, warm
 
 
 def main() -> int:

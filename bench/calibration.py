@@ -1,7 +1,7 @@
 """How honest `sigma` is: the share of errors within it, against the share that should be.
 
 Frames of the reporting heads at 0.6-1.1 m, few and many holes. `--fit` fits the coefficients of
-`recon/uncertainty.py` anew, on the choosing heads, and prints them.
+`recon/propagation/uncertainty.py` anew, on the choosing heads, and prints them.
 """
 
 import argparse
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bench.calibration_samples import CHOOSING, REPORTING, Floats, Samples, frames, sample
 from bench.machine import describe
 from bench.sigma_fit import fitted
-from recon import Preset
+from denseface.recon import Preset
 
 __all__: list[str] = []
 
@@ -74,7 +74,7 @@ def main() -> int:
     print(describe(" ".join(["script/bench calibration", *sys.argv[1:]])))
     if args.fit:
         found = fitted(_taken(CHOOSING, args.frames, _CHOOSING_SEED, distance=False))
-        print("\nFor recon/uncertainty.py: "
+        print("\nFor recon/propagation/uncertainty.py: "
               + ", ".join(f"{name} = {value:.3g}" for name, value in found.items()))
     taken = _taken(REPORTING, args.frames, _REPORTING_SEED, distance=True)
     for preset, of in reversed(taken.items()):

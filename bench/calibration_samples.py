@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from bench.cases import Case, with_preset
-from capture import RgbdFrame
-from recon import Preset, ReconstructionError, densify, reconstruct
-from recon.face import Face
-from recon.uncertainty import Sources, sources_of_error
+from denseface.capture import RgbdFrame
+from denseface.recon import Preset, ReconstructionError, reconstruct
+from denseface.recon.face import Face
+from denseface.recon.propagation import densify
+from denseface.recon.propagation.uncertainty import Sources, sources_of_error
 from tests.simulator import KINECT_CALIBRATED, Person, Scene, Truth, head_names, simulate
 
 __all__ = ["CHOOSING", "REPORTING", "Samples", "frames", "sample"]

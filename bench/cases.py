@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from bench.accuracy import RECORDINGS
-from capture import RgbdFrame, open_source
-from recon import Neighbors, Preset, ReconstructionError, Settings, reconstruct
-from recon.face import Face
+from denseface.capture import RgbdFrame, open_source
+from denseface.recon import Neighbors, Preset, ReconstructionError, Settings, reconstruct
+from denseface.recon.face import Face
 from tests.simulator import KINECT_CALIBRATED, Person, Scene, Truth, head_names, simulate
 
 __all__ = ["HOLE_SPACINGS", "Case", "posed", "recorded", "reporting_heads", "simulated",

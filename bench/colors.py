@@ -13,9 +13,9 @@ from scipy.spatial import cKDTree
 
 from bench.cases import HOLE_SPACINGS, reporting_heads
 from bench.machine import describe
-from recon import ReconstructionError, reconstruct
-from recon.face import Face
-from recon.registration import look_up, register
+from denseface.recon import ReconstructionError, reconstruct
+from denseface.recon.face import Face
+from denseface.recon.registration.registration import look_up, register
 from tests.simulator import KINECT_CALIBRATED, Person, Scene, TrueColors, head_names, simulate
 
 __all__ = ["PARTS", "Compared"]

@@ -9,8 +9,8 @@ from itertools import cycle, islice
 from bench.accuracy import RECORDINGS
 from bench.machine import describe
 from bench.memory import resident_mb
-from capture import RgbdFrame, open_source
-from recon import ReconstructionError, reconstruct, warm
+from denseface.capture import RgbdFrame, open_source
+from denseface.recon import ReconstructionError, reconstruct, warm
 
 __all__: list[str] = []
 

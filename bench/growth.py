@@ -10,7 +10,7 @@ from bench.dense_solve import dense_heights
 from bench.own import after_segmentation, milliseconds
 from bench.pcl_peer import Pcl
 from bench.peer_methods import griddata_points, inpaint_points, poisson_points, rbf_points
-from recon import Preset, reconstruct
+from denseface.recon import Preset, reconstruct
 from tests.simulator import KINECT_DEFAULT, KinectModel, Person, Scene, simulate
 
 __all__ = ["growth"]

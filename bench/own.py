@@ -5,13 +5,13 @@ from collections.abc import Callable
 from functools import partial
 
 from bench.cases import Case
-from recon import Settings
-from recon.densify import densify
-from recon.neighbors import mean_spacing
-from recon.pipeline import surface_of
-from recon.registration import look_up, register
-from recon.segment import segment_face
-from recon.uncertainty import noise_share
+from denseface.recon import Settings
+from denseface.recon.pipeline import surface_of
+from denseface.recon.propagation.densify import densify
+from denseface.recon.propagation.uncertainty import noise_share
+from denseface.recon.registration.registration import look_up, register
+from denseface.recon.segmentation.segment import segment_face
+from denseface.recon.surface.spacing import mean_spacing
 
 __all__ = ["after_segmentation", "milliseconds"]
 

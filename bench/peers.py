@@ -19,7 +19,7 @@ from bench.machine import describe
 from bench.pcl_peer import Pcl
 from bench.peer_methods import griddata_points, inpaint_points, poisson_points, rbf_points
 from bench.tally import HEADINGS, Tally
-from recon import Preset, reconstruct
+from denseface.recon import Preset, reconstruct
 
 __all__: list[str] = []
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from capture import RgbdFrame
-from capture.frame import CameraModel
-from capture.npz import load_frame, save_frame
+from denseface.capture import RgbdFrame
+from denseface.capture.frame import CameraModel
+from denseface.capture.npz import load_frame, save_frame
 from tests.simulator import KINECT_CALIBRATED, Light, Person, Scene, Truth, head_names, simulate
 
 __all__ = ["CHOOSING", "REPORTING", "View", "empty_views", "face_views", "taken"]

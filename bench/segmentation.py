@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bench.machine import describe
-from recon import ReconstructionError, reconstruct
-from recon.face import Box
+from denseface.recon import ReconstructionError, reconstruct
+from denseface.recon.face import Box
 from tests.simulator import (
     KINECT_CALIBRATED,
     Accuracy,

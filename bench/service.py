@@ -18,9 +18,9 @@ from bench.accuracy import RECORDINGS
 from bench.machine import describe
 from bench.service_processes import Bare, Running, kind_of, running
 from bench.service_steps import Laps, one_capture_each
-from capture import open_source
-from capture.npz import save_frame
-from recon import warm
+from denseface.capture import open_source
+from denseface.capture.npz import save_frame
+from denseface.service.daemons.worker import warm
 
 __all__: list[str] = []
 

@@ -14,10 +14,10 @@ from typing import IO
 import psutil
 import zmq
 
-from service.addresses import publications_of
-from service.client import Client
-from service.outputs import Topic
-from service.sockets import open_socket
+from denseface.service.client.blocking import Client
+from denseface.service.protocol.outputs import Topic
+from denseface.service.transport.addresses import publications_of
+from denseface.service.transport.sockets import open_socket
 
 __all__ = ["Bare", "Running", "kind_of", "running"]
 
@@ -88,7 +88,7 @@ def running(source: Path, workers: int) -> Iterator[Running]:
         address = f"ipc://{folder}/hub"
         with (folder / "log").open("wb") as log:
             process = subprocess.Popen(
-                [sys.executable, "-m", "service", "up", "--source", str(source), "--address",
+                [sys.executable, "-m", "denseface", "up", "--source", str(source), "--address",
                  address, "--data", str(folder / "data"), "--workers", str(workers)],
                 stdin=subprocess.DEVNULL, stderr=log)
         stack.callback(_stop, process)

@@ -7,19 +7,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from capture import RgbdFrame
-from recon import reconstruct
-from recon.face import Face
-from recon.settings import Settings
-from service import messages
-from service.hub import Hub
-from service.outputs import Output
-from service.payload import FaceHeader, FrameHeader
-from service.published import outcome_of
-from service.settings import ServiceSettings
-from service.spool import write_atomically
-from service.store import FolderStore
-from service.wire import Buffer, Packet, decode_from_hub, decode_to_hub, encode
+from denseface.capture import RgbdFrame
+from denseface.recon import reconstruct
+from denseface.recon.face import Face
+from denseface.recon.settings import Settings
+from denseface.service.client.events import outcome_of
+from denseface.service.hub.hub import Hub
+from denseface.service.protocol import messages
+from denseface.service.protocol.outputs import Output
+from denseface.service.protocol.payload import FaceHeader, FrameHeader
+from denseface.service.protocol.wire import Buffer, Packet, decode_from_hub, decode_to_hub, encode
+from denseface.service.settings import ServiceSettings
+from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage.record_file import write_atomically
 
 __all__ = ["Laps", "one_capture_each"]
 

@@ -1,4 +1,4 @@
-"""The coefficients of `recon.uncertainty`, by maximum likelihood.
+"""The coefficients of `recon.propagation.uncertainty`, by maximum likelihood.
 
 Errors have heavier tails than a normal distribution, so the likelihood is Student's t with five
 degrees of freedom, whose scale a few large errors do not set; then all is scaled so that 68 %
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize
 
 from bench.calibration_samples import Samples
-from recon import Preset, Settings
-from recon.uncertainty import average_cutoff, cutoff
+from denseface.recon import Preset, Settings
+from denseface.recon.propagation.uncertainty import average_cutoff, cutoff
 
 __all__ = ["fitted"]
 

@@ -24,10 +24,10 @@ from bench.memory import extra_memory, resident_mb
 from bench.own import after_segmentation, milliseconds
 from bench.pcl_peer import Pcl
 from bench.peer_methods import inpaint_points, rbf_points
-from recon import Preset, Settings, pipeline, reconstruct, warm
-from recon.pipeline import surface_of
-from recon.rbf import MIN_SEEDS, fit_surface
-from recon.registration import look_up, register
+from denseface.recon import Preset, Settings, pipeline, reconstruct, warm
+from denseface.recon.pipeline import surface_of
+from denseface.recon.registration.registration import look_up, register
+from denseface.recon.surface.rbf import MIN_SEEDS, fit_surface
 
 __all__: list[str] = []
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from capture.errors import CalibrationError, FrameError
+from denseface.capture.errors import CalibrationError, FrameError
 
 __all__ = ["MAX_SIDE", "Calibration", "CameraModel", "DepthToColor", "RgbdFrame"]
 

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from capture._chosen import ChosenCalibration
-from capture.errors import CaptureError, FrameError, UnreadableSourceError
-from capture.frame import MAX_SIDE, Calibration, RgbdFrame
+from denseface.capture._chosen import ChosenCalibration
+from denseface.capture.errors import CaptureError, FrameError, UnreadableSourceError
+from denseface.capture.frame import MAX_SIDE, Calibration, RgbdFrame
 
 __all__ = ["NpzSource", "load_frame", "save_frame"]
 

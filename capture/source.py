@@ -15,9 +15,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
-from capture._chosen import choose_calibration
-from capture.errors import UnreadableSourceError
-from capture.frame import Calibration, RgbdFrame
+from denseface.capture._chosen import choose_calibration
+from denseface.capture.errors import UnreadableSourceError
+from denseface.capture.frame import Calibration, RgbdFrame
 
 __all__ = ["Source", "open_source"]
 
@@ -81,7 +81,7 @@ def open_source(
     """
     text = str(uri)
     if text.lower().startswith(_LIVE):
-        from capture.openni2 import LiveSource
+        from denseface.capture.openni2 import LiveSource
 
         return LiveSource(text[len(_LIVE):] or None, choose_calibration(None, calibration))
     path = Path(text)
@@ -92,9 +92,9 @@ def open_source(
         found = "is a folder, not a file" if path.is_dir() else "no such file"
         raise UnreadableSourceError(f"{text}: {found}")
     if kind == ".npz":
-        from capture.npz import NpzSource
+        from denseface.capture.npz import NpzSource
 
         return NpzSource(path, choose_calibration(path, calibration))
-    from capture.openni2 import RecordingSource
+    from denseface.capture.openni2 import RecordingSource
 
     return RecordingSource(path, choose_calibration(path, calibration))

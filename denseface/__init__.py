@@ -7,11 +7,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from capture import RgbdFrame, open_source
-    from recon import Face, Settings, reconstruct
-    from service.aio import AsyncClient
-    from service.client import Client
-    from service.export import load_face, save_face
+    from denseface.capture import RgbdFrame, open_source
+    from denseface.recon import Face, Settings, reconstruct
+    from denseface.service.client.aio import AsyncClient
+    from denseface.service.client.blocking import Client
+    from denseface.service.export.formats import load_face, save_face
 
     __version__: str
 
@@ -21,15 +21,15 @@ __all__ = [
 ]
 
 _HOMES = {
-    "AsyncClient": "service.aio",
-    "Client": "service.client",
+    "AsyncClient": "denseface.service.client.aio",
+    "Client": "denseface.service.client.blocking",
     "Face": "recon",
     "RgbdFrame": "capture",
     "Settings": "recon",
-    "load_face": "service.export",
+    "load_face": "denseface.service.export.formats",
     "open_source": "capture",
     "reconstruct": "recon",
-    "save_face": "service.export",
+    "save_face": "denseface.service.export.formats",
 }
 
 

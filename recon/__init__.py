@@ -2,19 +2,19 @@
 
 from typing import TYPE_CHECKING
 
-from recon.errors import (
+from denseface.recon.errors import (
     FaceWithoutDepthError,
     NoDepthError,
     NoFaceError,
     ReconstructionError,
     TooLittleDepthError,
 )
-from recon.face import DenseCloud, Face, PointCloud, Report
-from recon.settings import Neighbors, Preset, Settings
+from denseface.recon.face import DenseCloud, Face, PointCloud, Report
+from denseface.recon.settings import Neighbors, Preset, Settings
 
 if TYPE_CHECKING:
-    from recon.pipeline import reconstruct
-    from recon.warmup import warm
+    from denseface.recon.pipeline import reconstruct
+    from denseface.recon.warmup import warm
 
 __all__ = [
     "DenseCloud",
@@ -37,11 +37,11 @@ __all__ = [
 def __getattr__(name: str) -> object:
     # OpenCV and SciPy take most of a second: who only handles faces shall not wait for them.
     if name == "reconstruct":
-        from recon.pipeline import reconstruct
+        from denseface.recon.pipeline import reconstruct
 
         return reconstruct
     if name == "warm":
-        from recon.warmup import warm
+        from denseface.recon.warmup import warm
 
         return warm
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, FailFast
 
-from recon.settings import Settings
+from denseface.recon.settings import Settings
 
 __all__ = ["Box", "DenseCloud", "Face", "FaceCandidate", "PointCloud", "Report"]
 

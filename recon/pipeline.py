@@ -11,19 +11,19 @@ from importlib.metadata import version
 import numpy as np
 from numpy.typing import NDArray
 
-from capture.frame import RgbdFrame
-from recon._threads import one_blas_thread
-from recon.densify import densify
-from recon.detail import DetailedSurface, add_detail
-from recon.detect import detect_face
-from recon.errors import NoDepthError, TooLittleDepthError
-from recon.face import Face, PointCloud, Report
-from recon.neighbors import mean_spacing
-from recon.rbf import MIN_SEEDS, Surface, fit_surface
-from recon.registration import LookUp, Registration, look_up, register
-from recon.segment import segment_face, window_of_box
-from recon.settings import Settings
-from recon.uncertainty import noise_share
+from denseface.capture.frame import RgbdFrame
+from denseface.recon.detail.detail import DetailedSurface, add_detail
+from denseface.recon.detection.detect import detect_face
+from denseface.recon.errors import NoDepthError, TooLittleDepthError
+from denseface.recon.face import Face, PointCloud, Report
+from denseface.recon.numerics.threads import one_blas_thread
+from denseface.recon.propagation.densify import densify
+from denseface.recon.propagation.uncertainty import noise_share
+from denseface.recon.registration.registration import LookUp, Registration, look_up, register
+from denseface.recon.segmentation.segment import segment_face, window_of_box
+from denseface.recon.settings import Settings
+from denseface.recon.surface.rbf import MIN_SEEDS, Surface, fit_surface
+from denseface.recon.surface.spacing import mean_spacing
 
 __all__ = ["reconstruct", "surface_of"]
 

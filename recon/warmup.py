@@ -5,20 +5,19 @@ from functools import cache, partial
 
 import numpy as np
 
-from capture.frame import Calibration, CameraModel, RgbdFrame
-from recon._detect_kernels import depths_in_box, middle_depths
-from recon._relief import bulge_mm
-from recon.densify import densify
-from recon.detail import add_detail
-from recon.detect import detect_face
-from recon.errors import NoFaceError
-from recon.heap import keep_freed_memory
-from recon.neighbors import mean_spacing
-from recon.packing import pack
-from recon.rbf import fit_surface
-from recon.registration import look_up, register
-from recon.segment import segment_face
-from recon.settings import Settings
+from denseface.capture.frame import Calibration, CameraModel, RgbdFrame
+from denseface.recon.detail.detail import add_detail
+from denseface.recon.detection._kernels import depths_in_box, middle_depths
+from denseface.recon.detection._relief import bulge_mm
+from denseface.recon.detection.detect import detect_face
+from denseface.recon.errors import NoFaceError
+from denseface.recon.numerics.malloc import keep_freed_memory
+from denseface.recon.propagation.densify import densify
+from denseface.recon.registration.registration import look_up, register
+from denseface.recon.segmentation.segment import segment_face
+from denseface.recon.settings import Settings
+from denseface.recon.surface.rbf import fit_surface
+from denseface.recon.surface.spacing import mean_spacing
 
 __all__ = ["warm"]
 
@@ -31,11 +30,11 @@ _HOLE = np.s_[66:76, 82:92]
 
 @cache
 def warm() -> None:
-    """Go once through every stage, with a ball for a face, and pack it; does nothing when repeated.
+    """Go once through every stage, with a ball for a face; does nothing when repeated.
 
     The ball has a hole, which is filled.
 
-    From then on the process keeps memory that a frame frees for the next: `recon.heap`.
+    From then on the process keeps memory that a frame frees for the next: `recon.numerics.malloc`.
     """
     keep_freed_memory()
     settings = Settings()
@@ -53,7 +52,7 @@ def warm() -> None:
     fit = fit_surface(seeds.points, settings.r0_factor * spacing, settings.smoothing)
     looked_up = partial(look_up, frame, registered)
     surface = add_detail(fit, seeds.points, spacing, spacing, symmetry=True, look_up=looked_up)
-    pack(densify(seeds, surface, spacing, settings.ratio, 1.0, looked_up))
+    densify(seeds, surface, spacing, settings.ratio, 1.0, looked_up)
 
 
 def _ball() -> RgbdFrame:

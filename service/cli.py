@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from types import FrameType
 from typing import NoReturn
 
-from service.commands import COMMANDS, load
+from denseface.service.commands import COMMANDS, load
 
 __all__ = ["main"]
 
@@ -80,8 +80,8 @@ class _Version(argparse.Action):
 
 
 def _status_of(error: Exception) -> int:
-    from capture.errors import CalibrationError, FrameError, UnreadableSourceError
-    from service.errors import (
+    from denseface.capture.errors import CalibrationError, FrameError, UnreadableSourceError
+    from denseface.service.errors import (
         FormatError,
         LocalProtocolError,
         SettingsError,

@@ -35,7 +35,7 @@ class ServiceError(Exception):
 
 
 class ProtocolError(ServiceError, ValueError):
-    """A message is not as `service.wire` describes it."""
+    """A message is not as `service.protocol.wire` describes it."""
 
 
 class LocalProtocolError(ProtocolError):

@@ -17,9 +17,9 @@ from pydantic import (
     field_validator,
 )
 
-from service.errors import SettingsError
-from service.loopback import loopback_place
-from service.times import retention_of
+from denseface.service.errors import SettingsError
+from denseface.service.runtime.loopback import loopback_place
+from denseface.service.runtime.times import retention_of
 
 __all__ = ["ServiceSettings", "default_address", "private_folder", "runtime_folder"]
 

@@ -38,4 +38,4 @@ class Command(Protocol):
 
 def load(name: str) -> Command:
     """Import a command's module."""
-    return cast("Command", import_module(f"service.commands.{name}"))
+    return cast("Command", import_module(f"denseface.service.commands.{name}"))

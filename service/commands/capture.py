@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from service.commands import options
+from denseface.service.commands import options
 
 __all__ = ["add_arguments", "run"]
 
@@ -28,6 +28,6 @@ def add_source(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Do it."""
     options.start_daemon(args, "capture")
-    from service import captured
+    from denseface.service.daemons import capture
 
-    return captured.run(options.service_settings(args), args.source, args.calibration)
+    return capture.run(options.service_settings(args), args.source, args.calibration)

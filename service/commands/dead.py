@@ -2,7 +2,7 @@
 
 import argparse
 
-from service.commands import options
+from denseface.service.commands import options
 
 __all__ = ["add_arguments", "run"]
 
@@ -22,7 +22,7 @@ def run(args: argparse.Namespace) -> int:
     """Do it."""
     from pydantic import ValidationError
 
-    from service.errors import LocalProtocolError, UsageError
+    from denseface.service.errors import LocalProtocolError, UsageError
 
     if args.action == "list" and (args.ids or args.all):
         raise UsageError("dead list: takes neither ids nor --all")

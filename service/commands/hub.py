@@ -2,7 +2,7 @@
 
 import argparse
 
-from service.commands import options
+from denseface.service.commands import options
 
 __all__ = ["add_arguments", "run"]
 
@@ -21,6 +21,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Do it."""
     options.start_daemon(args, "hub")
-    from service import hubd
+    from denseface.service.daemons import hub
 
-    return hubd.run(options.service_settings(args), options.recon_settings(args))
+    return hub.run(options.service_settings(args), options.recon_settings(args))

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from service.commands import options
+from denseface.service.commands import options
 
 __all__ = ["add_arguments", "run"]
 
@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
     """Do it."""
     import os
 
-    from service.settings import ServiceSettings
+    from denseface.service.settings import ServiceSettings
 
     folder = ServiceSettings.of(os.environ, keys=args.keys).keys
     {"new": _new, "allow": _allow, "revoke": _revoke, "list": _list}[args.action](args, folder)
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _new(args: argparse.Namespace, folder: Path) -> None:
-    from service.keys import new_pair, read_public
+    from denseface.service.security.keys import new_pair, read_public
 
     secret, public = new_pair(folder, args.name)
     print(f"{secret}  stays where it is used\n{public}  goes to the other side: "
@@ -50,22 +50,22 @@ def _new(args: argparse.Namespace, folder: Path) -> None:
 
 
 def _allow(args: argparse.Namespace, folder: Path) -> None:
-    from service.keyring import Role, allow
-    from service.keys import read_public
+    from denseface.service.security.allow_list import Role, allow
+    from denseface.service.security.keys import read_public
 
     one = allow(folder, args.name, read_public(args.public), frozenset(map(Role, args.roles)))
     print(f"{one.name} ({one.fingerprint}) may come in as {', '.join(sorted(one.roles))}")
 
 
 def _revoke(args: argparse.Namespace, folder: Path) -> None:
-    from service.keyring import revoke
+    from denseface.service.security.allow_list import revoke
 
     revoke(folder, args.name)
     print(f"{args.name} may come in no more")
 
 
 def _list(args: argparse.Namespace, folder: Path) -> None:  # noqa: ARG001
-    from service.keyring import Keyring
+    from denseface.service.security.allow_list import Keyring
 
     for one in sorted(Keyring(folder), key=lambda one: one.name):
         print(f"{one.name:20} {one.fingerprint}  {', '.join(sorted(one.roles))}")

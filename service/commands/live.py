@@ -7,15 +7,15 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from service.commands import capture, options
-from service.commands.press import seconds
+from denseface.service.commands import capture, options
+from denseface.service.commands.press import seconds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from recon.settings import Settings
-    from service.live import LiveFrame, Tally
-    from service.stopping import StopSignal
+    from denseface.recon.settings import Settings
+    from denseface.service.runtime.signals import StopSignal
+    from denseface.service.tools.live import LiveFrame, Tally
 
 __all__ = ["add_arguments", "run"]
 
@@ -40,10 +40,10 @@ def run(args: argparse.Namespace) -> int:
 
     import cv2
 
-    from capture import open_source
-    from recon import warm
-    from service.live import Tally, live
-    from service.stopping import StopSignal
+    from denseface.capture import open_source
+    from denseface.recon import warm
+    from denseface.service.runtime.signals import StopSignal
+    from denseface.service.tools.live import Tally, live
 
     cv2.setNumThreads(1)
     with open_source(args.source, args.calibration) as source, StopSignal() as stop:
@@ -97,7 +97,7 @@ class _StatusLine:
 
 
 def _said(done: "LiveFrame") -> str:
-    from recon import Face
+    from denseface.recon import Face
 
     if isinstance(done.outcome, Face):
         report = done.outcome.report

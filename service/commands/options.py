@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from recon.settings import Settings
-    from service.client import Client
-    from service.operator import Operator
-    from service.settings import ServiceSettings
+    from denseface.recon.settings import Settings
+    from denseface.service.client.blocking import Client
+    from denseface.service.client.operator import Operator
+    from denseface.service.settings import ServiceSettings
 
 __all__ = ["add_address", "add_credentials", "add_daemon", "add_hub", "add_keys", "add_listen",
            "add_metrics", "add_recon", "add_retention", "client", "moment", "operator",
@@ -82,7 +82,7 @@ def add_metrics(parser: argparse.ArgumentParser) -> None:
 
 def moment(text: str) -> datetime:
     """Read a time."""
-    from service.times import parse_time
+    from denseface.service.runtime.times import parse_time
 
     try:
         return parse_time(text)
@@ -115,8 +115,8 @@ def recon_settings(args: argparse.Namespace) -> "Settings":
     """
     from pydantic import ValidationError
 
-    from recon.settings import Settings
-    from service.errors import UsageError
+    from denseface.recon.settings import Settings
+    from denseface.service.errors import UsageError
 
     given = {"preset": args.preset} if args.preset else {}
     for change in args.changes:
@@ -136,7 +136,7 @@ def recon_settings(args: argparse.Namespace) -> "Settings":
 
 def service_settings(args: argparse.Namespace) -> "ServiceSettings":
     """Put the flags over the environment."""
-    from service.settings import ServiceSettings
+    from denseface.service.settings import ServiceSettings
 
     names = ("address", "data", "key", "hub_key", "keys", "listen", "retention", "metrics")
     return ServiceSettings.of(
@@ -145,23 +145,23 @@ def service_settings(args: argparse.Namespace) -> "ServiceSettings":
 
 def client(args: argparse.Namespace) -> "Client":
     """Connect as the flags of `add_address` and `add_credentials` say."""
-    from service.client import Client
+    from denseface.service.client.blocking import Client
 
     return Client(args.address, key=args.key, hub_key=args.hub_key)
 
 
 def operator(args: argparse.Namespace) -> "Operator":
     """Connect as `client`, to remove too."""
-    from service.operator import Operator
+    from denseface.service.client.operator import Operator
 
     return Operator(args.address, key=args.key, hub_key=args.hub_key)
 
 
 def start_daemon(args: argparse.Namespace, name: str) -> None:
     """Do what every process of the service does first."""
-    from service import failpoints
-    from service.log import configure
-    from service.stopping import die_with_parent
+    from denseface.service.runtime import failpoints
+    from denseface.service.runtime.logging import configure
+    from denseface.service.runtime.signals import die_with_parent
 
     die_with_parent()
     configure(args.log, name)
@@ -173,7 +173,7 @@ def use_one_thread() -> None:
 
     They read it once, when NumPy is first imported: to be called before.
     """
-    from service.supervisor import ONE_THREAD
+    from denseface.service.daemons.supervisor import ONE_THREAD
 
     for name, value in ONE_THREAD.items():
         os.environ.setdefault(name, value)

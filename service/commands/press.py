@@ -4,7 +4,7 @@ import argparse
 import math
 from pathlib import Path
 
-from service.commands import options
+from denseface.service.commands import options
 
 __all__ = ["add_arguments", "run", "seconds"]
 
@@ -30,7 +30,7 @@ def add_outputs(parser: argparse.ArgumentParser, *save: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do it."""
-    from service.files import FaceFiles
+    from denseface.service.export.files import FaceFiles
 
     files = FaceFiles(args.save, args.report, args.preview)
     with options.client(args) as client:

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from service.commands import options
+from denseface.service.commands import options
 
 __all__ = ["add_arguments", "run"]
 
@@ -27,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
     """Do it."""
     from pydantic import ValidationError
 
-    from service.errors import LocalProtocolError, UsageError
+    from denseface.service.errors import LocalProtocolError, UsageError
 
     chosen = (f"capture {args.capture_id}" if args.capture_id is not None
               else f"all captures accepted before {args.before:%Y-%m-%d %H:%M:%S} UTC"

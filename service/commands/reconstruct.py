@@ -4,11 +4,11 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service.commands import options
-from service.commands.press import add_outputs
+from denseface.service.commands import options
+from denseface.service.commands.press import add_outputs
 
 if TYPE_CHECKING:
-    from capture import RgbdFrame
+    from denseface.capture import RgbdFrame
 
 __all__ = ["add_arguments", "run"]
 
@@ -26,13 +26,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do it."""
-    from service.files import FaceFiles
+    from denseface.service.export.files import FaceFiles
 
     files = FaceFiles(args.save, args.report, args.preview)
     settings = options.recon_settings(args)
     frame = _frame(args.input, args.frame, args.calibration)
 
-    from recon import reconstruct
+    from denseface.recon import reconstruct
 
     face = reconstruct(frame, settings)
     files.write(face)
@@ -43,8 +43,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _frame(uri: str, number: int, calibration: Path | None) -> "RgbdFrame":
-    from capture import open_source
-    from service.errors import UsageError
+    from denseface.capture import open_source
+    from denseface.service.errors import UsageError
 
     if uri.startswith("openni2:"):
         raise UsageError(f"{uri}: expected a .npz or .oni file; `denseface up` serves a sensor")

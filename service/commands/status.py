@@ -5,11 +5,11 @@ import json
 import time
 from typing import TYPE_CHECKING
 
-from service.commands import options
-from service.commands.press import seconds
+from denseface.service.commands import options
+from denseface.service.commands.press import seconds
 
 if TYPE_CHECKING:
-    from service.messages import Status
+    from denseface.service.protocol.messages import Status
 
 __all__ = ["add_arguments", "run"]
 
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do it."""
-    from service.errors import ClientTimeoutError
+    from denseface.service.errors import ClientTimeoutError
 
     deadline = time.monotonic() + (args.wait or 0)
     with options.client(args) as client:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from service.commands import options
+from denseface.service.commands import options
 
 __all__ = ["add_arguments", "run"]
 
@@ -28,9 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do it."""
-    from service.client import PublishedFailure
-    from service.errors import UsageError
-    from service.files import FaceFiles
+    from denseface.service.client.blocking import PublishedFailure
+    from denseface.service.errors import UsageError
+    from denseface.service.export.files import FaceFiles
 
     for name in ("count", "after", "last"):
         value = getattr(args, name)

@@ -3,7 +3,7 @@
 import argparse
 import os
 
-from service.commands import capture, options
+from denseface.service.commands import capture, options
 
 __all__ = ["add_arguments", "run"]
 
@@ -25,11 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Do it."""
     options.start_daemon(args, "up")
-    from service.addresses import check_bindable, is_local
-    from service.entrance import guard
-    from service.errors import AddressError
-    from service.locking import check_folder
-    from service.supervisor import Supervisor, processes
+    from denseface.service.daemons.supervisor import Supervisor, processes
+    from denseface.service.errors import AddressError
+    from denseface.service.storage.folder_lock import check_folder
+    from denseface.service.transport.addresses import check_bindable, is_local
+    from denseface.service.transport.listeners import guard
 
     settings = options.service_settings(args)
     if not is_local(settings.address):

@@ -2,7 +2,7 @@
 
 import argparse
 
-from service.commands import options
+from denseface.service.commands import options
 
 __all__ = ["add_arguments", "run"]
 
@@ -18,6 +18,6 @@ def run(args: argparse.Namespace) -> int:
     """Do it."""
     options.use_one_thread()
     options.start_daemon(args, "worker")
-    from service import workerd
+    from denseface.service.daemons import worker
 
-    return workerd.run(options.service_settings(args))
+    return worker.run(options.service_settings(args))

@@ -14,9 +14,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from service.client import Client
-from service.errors import ServiceError
-from service.failpoints import NAMES, TOKENS, VARIABLE
+from denseface.service.client.blocking import Client
+from denseface.service.errors import ServiceError
+from denseface.service.runtime.failpoints import NAMES, TOKENS, VARIABLE
 
 __all__ = ["PACE", "Cluster", "Nursery", "Part", "until"]
 

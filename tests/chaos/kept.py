@@ -4,9 +4,9 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 
-from service.errors import StoreError
-from service.kept import read_face, read_frame
-from service.layout import Layout
+from denseface.service.errors import StoreError
+from denseface.service.storage.folder_layout import Layout
+from denseface.service.storage.records import read_face, read_frame
 from tests.chaos.history import Kept
 
 __all__ = ["read_kept"]

@@ -20,12 +20,15 @@ _PR_SET_PDEATHSIG = 1
 def _main() -> None:
     import cv2
 
-    from recon import warm
-    from service import captured, hubd, workerd  # noqa: F401
-    from service.commands import COMMANDS, load
+    from denseface.service.commands import COMMANDS, load
+    from denseface.service.daemons import (
+        capture,  # noqa: F401
+        hub,  # noqa: F401
+        worker,
+    )
 
     cv2.setNumThreads(1)  # a thread would not live on in what is forked
-    warm()
+    worker.warm()
     for name in COMMANDS:
         load(name)
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # the kernel buries them
@@ -56,7 +59,7 @@ def _become(wanted: dict[str, object]) -> NoReturn:
         if not isinstance(environment, dict) or not isinstance(arguments, list):
             raise TypeError("expected environment and arguments")  # noqa: TRY301
         os.environ.update(environment)
-        from service.cli import main
+        from denseface.service.cli import main
 
         status = main(arguments)
     except SystemExit as end:

@@ -7,12 +7,12 @@ from typing import Self
 
 import zmq
 
-from service.addresses import publications_of
-from service.client import Client, PublishedFace
-from service.errors import PressRefusedError, ProtocolError, ServiceError
-from service.messages import CaptureFailed, FaceDone
-from service.outputs import Topic
-from service.wire import decode_from_hub
+from denseface.service.client.blocking import Client, PublishedFace
+from denseface.service.errors import PressRefusedError, ProtocolError, ServiceError
+from denseface.service.protocol.messages import CaptureFailed, FaceDone
+from denseface.service.protocol.outputs import Topic
+from denseface.service.protocol.wire import decode_from_hub
+from denseface.service.transport.addresses import publications_of
 from tests.chaos.history import Answer, Seen
 
 __all__ = ["Follower", "Listener", "Presser"]

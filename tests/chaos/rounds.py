@@ -10,8 +10,8 @@ from pathlib import Path
 
 import zmq
 
-from service.addresses import publications_of
-from service.outputs import Topic
+from denseface.service.protocol.outputs import Topic
+from denseface.service.transport.addresses import publications_of
 from tests.chaos.cluster import Nursery
 from tests.chaos.history import Answer, History, violations
 from tests.chaos.proxy import Proxy

@@ -5,9 +5,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from capture import RgbdFrame, open_source
-from capture.frame import Calibration
-from capture.npz import save_frame
+from denseface.capture import RgbdFrame, open_source
+from denseface.capture.frame import Calibration
+from denseface.capture.npz import save_frame
 
 __all__ = ["CHEAP", "write_small_frame"]
 

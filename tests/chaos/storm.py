@@ -7,8 +7,8 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from service.failpoints import NAMES
-from service.layout import Layout
+from denseface.service.runtime.failpoints import NAMES
+from denseface.service.storage.folder_layout import Layout
 from tests.chaos.cluster import Part
 from tests.chaos.scene import Scene
 

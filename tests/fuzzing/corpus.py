@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from recon.settings import Settings
-from service import messages
-from service.messages import Message
-from service.payload import Arrays, FaceHeader, FrameHeader, Payload
-from service.wire import Packet, encode
+from denseface.recon.settings import Settings
+from denseface.service.protocol import messages
+from denseface.service.protocol.messages import Message
+from denseface.service.protocol.payload import Arrays, FaceHeader, FrameHeader, Payload
+from denseface.service.protocol.wire import Packet, encode
 from tests.unit.service.faces import small_face, small_frame
 
 __all__ = ["Parts", "encoded", "kinds", "pack", "packets", "unpack"]

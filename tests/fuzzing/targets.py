@@ -5,9 +5,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.errors import ProtocolError
-from service.payload import FaceHeader, FrameHeader
-from service.wire import Packet, decode_from_hub, decode_kept, decode_to_hub, encode
+from denseface.service.errors import ProtocolError
+from denseface.service.protocol.payload import FaceHeader, FrameHeader
+from denseface.service.protocol.wire import (
+    Packet,
+    decode_from_hub,
+    decode_kept,
+    decode_to_hub,
+    encode,
+)
 from tests.fuzzing.corpus import Parts
 
 __all__ = ["DECODERS", "Cost", "UnexpectedError", "check"]

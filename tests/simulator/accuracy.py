@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from capture.frame import RgbdFrame
-from recon.face import Face
+from denseface.capture.frame import RgbdFrame
+from denseface.recon.face import Face
 from tests.simulator.labels import Label
 from tests.simulator.truth import Truth
 

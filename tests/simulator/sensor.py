@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from capture.frame import RgbdFrame
+from denseface.capture.frame import RgbdFrame
 from tests.simulator.camera_views import color_view, depth_view
 from tests.simulator.heads import load_head
 from tests.simulator.holes import hole_share

@@ -2,9 +2,9 @@
 
 import pytest
 
-from service.client import Client
-from service.errors import UnknownCaptureError
-from service.keys import read_pair
+from denseface.service.client.blocking import Client
+from denseface.service.errors import UnknownCaptureError
+from denseface.service.security.keys import read_pair
 from tests.system.guarded import Peer, guarded_hub, press_through
 from tests.waiting import until
 

@@ -14,13 +14,13 @@ from pathlib import Path
 import zmq
 from zmq.utils.monitor import parse_monitor_message
 
-from service import messages
-from service.addresses import publications_of
-from service.client import Client
-from service.keyring import Role, allow
-from service.keys import KeyPair, new_pair, read_pair, read_public
-from service.payload import FaceHeader, FrameHeader
-from service.wire import Packet, decode_from_hub, encode
+from denseface.service.client.blocking import Client
+from denseface.service.protocol import messages
+from denseface.service.protocol.payload import FaceHeader, FrameHeader
+from denseface.service.protocol.wire import Packet, decode_from_hub, encode
+from denseface.service.security.allow_list import Role, allow
+from denseface.service.security.keys import KeyPair, new_pair, read_pair, read_public
+from denseface.service.transport.addresses import publications_of
 from tests.ports import free_port
 from tests.system.running import REPOSITORY
 from tests.unit.service.faces import small_face, small_frame
@@ -152,9 +152,10 @@ def guarded_hub(folder: Path, host: str = "127.0.0.1", port: int | None = None,
         log = folder / "hub.log"
         with log.open("w") as stderr:
             process = subprocess.Popen(
-                [sys.executable, "-c", f"import sys\n{code}\nfrom service.cli import main\n"
-                 "sys.exit(main(sys.argv[1:]))", "hub", "--address", local, "--listen", address,
-                 "--keys", str(keys), "--data", str(folder / "data")],
+                [sys.executable, "-c", f"import sys\n{code}\n"
+                 "from denseface.service.cli import main\nsys.exit(main(sys.argv[1:]))",
+                 "hub", "--address", local, "--listen", address, "--keys", str(keys),
+                 "--data", str(folder / "data")],
                 cwd=REPOSITORY, stderr=stderr, text=True,
                 env=os.environ | _PACE | environment)
         hub = GuardedHub(process, local, address, keys, log)

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import psutil
 
-from service.client import Client
-from service.messages import Status
+from denseface.service.client.blocking import Client
+from denseface.service.protocol.messages import Status
 from tests.waiting import until
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -25,7 +25,7 @@ longer than three of these heartbeats."""
 def denseface(*arguments: object, **environment: str) -> "subprocess.CompletedProcess[str]":
     """Run one command to its end."""
     return subprocess.run(
-        [sys.executable, "-m", "service", *map(str, arguments)], cwd=REPOSITORY, check=False,
+        [sys.executable, "-m", "denseface", *map(str, arguments)], cwd=REPOSITORY, check=False,
         capture_output=True, text=True, timeout=60, env=os.environ | environment)
 
 
@@ -74,7 +74,7 @@ def service(
         log = data.with_suffix(".log")
         with log.open("w") as stderr:
             process = subprocess.Popen(
-                [sys.executable, "-m", "service", "up", "--source", str(source), "--data",
+                [sys.executable, "-m", "denseface", "up", "--source", str(source), "--data",
                  str(data), "--address", address, "--workers", "1", *map(str, arguments)],
                 cwd=REPOSITORY, stderr=stderr, text=True,
                 env=os.environ | (environment or {}) | PACE)
@@ -107,7 +107,7 @@ def hub_alone(address: str, data: Path, *arguments: str) -> Iterator[Path]:
     log = data.with_suffix(".log")
     with log.open("w") as stderr:
         process = subprocess.Popen(
-            [sys.executable, "-m", "service", "hub", "--address", address, "--data", str(data),
+            [sys.executable, "-m", "denseface", "hub", "--address", address, "--data", str(data),
              *arguments], cwd=REPOSITORY, stderr=stderr)
     try:
         yield log

@@ -9,8 +9,8 @@ from functools import cached_property
 
 import pytest
 
-from capture.frame import RgbdFrame
-from recon import Face, NoFaceError, Preset, Settings, reconstruct
+from denseface.capture.frame import RgbdFrame
+from denseface.recon import Face, NoFaceError, Preset, Settings, reconstruct
 from tests.simulator import Accuracy, Truth, measure
 from tests.virtual_sensor.fixtures import FOLDER
 from tests.virtual_sensor.process import play

@@ -13,13 +13,13 @@ import psutil
 import pytest
 import zmq
 
-from service import messages
-from service.addresses import publications_of
-from service.errors import KeyRefusedError
-from service.keyring import Role, allow, revoke
-from service.keys import KeyPair, new_pair, read_pair, read_public
-from service.payload import MAX_ARRAY_BYTES
-from service.wire import Packet, encode
+from denseface.service.errors import KeyRefusedError
+from denseface.service.protocol import messages
+from denseface.service.protocol.payload import MAX_ARRAY_BYTES
+from denseface.service.protocol.wire import Packet, encode
+from denseface.service.security.allow_list import Role, allow, revoke
+from denseface.service.security.keys import KeyPair, new_pair, read_pair, read_public
+from denseface.service.transport.addresses import publications_of
 from tests.ports import free_port
 from tests.system.guarded import (
     FACE,
@@ -61,7 +61,7 @@ def test_without_keys_the_hub_does_not_open_the_door(tmp_path):
 
 _STOPS = """
 from pathlib import Path
-from service.zap import Authenticator
+from denseface.service.security.zap import Authenticator
 answer = Authenticator.answer
 def changed(self):
     if not Path({flag!r}).exists():

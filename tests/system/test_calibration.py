@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bench.calibration_samples import Samples, sample
-from recon import Preset
+from denseface.recon import Preset
 from tests.simulator import Truth
 from tests.system.test_accuracy import BOUNDS, first_frame
 from tests.virtual_sensor.fixtures import FOLDER

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from service.export import load_face
+from denseface.service.export.formats import load_face
 from tests.ports import free_port
 from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone
 from tests.waiting import until
@@ -61,7 +61,7 @@ def test_a_room_without_a_face_is_one_line_and_status_1(recording, tmp_path):
 def test_ctrl_c_ends_a_waiting_command_quietly(command, tmp_path):
     address = f"ipc://{tmp_path}/none"[:90]
     waiting = subprocess.Popen(
-        [sys.executable, "-m", "service", *command, "--address", address], cwd=REPOSITORY,
+        [sys.executable, "-m", "denseface", *command, "--address", address], cwd=REPOSITORY,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     until(lambda: _threads(waiting.pid) > 2)  # ZeroMQ's own: it is waiting, or nearly
     waiting.send_signal(signal.SIGINT)

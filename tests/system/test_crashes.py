@@ -9,10 +9,10 @@ import psutil
 import pytest
 import zmq
 
-from service.addresses import publications_of
-from service.failpoints import NAMES
-from service.layout import Layout
-from service.outputs import Topic
+from denseface.service.protocol.outputs import Topic
+from denseface.service.runtime.failpoints import NAMES
+from denseface.service.storage.folder_layout import Layout
+from denseface.service.transport.addresses import publications_of
 from tests.chaos.cluster import Nursery, Part, until
 from tests.chaos.history import Answer, violations
 from tests.chaos.proxy import Proxy

@@ -12,8 +12,8 @@ _HASH = """
 import hashlib, json, sys
 import cv2, numba
 from threadpoolctl import threadpool_info
-from capture import open_source
-from recon import Preset, Settings, reconstruct
+from denseface.capture import open_source
+from denseface.recon import Preset, Settings, reconstruct
 # OpenCV goes by no variable that every build of it reads.
 cv2.setNumThreads(int(sys.argv[2]))
 with open_source(sys.argv[1]) as source:

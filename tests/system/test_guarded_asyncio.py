@@ -6,9 +6,9 @@ from contextlib import aclosing
 import numpy as np
 import pytest
 
-from service.aio import AsyncClient
-from service.errors import KeyRefusedError, RequestFailedError
-from service.keyring import Role, revoke
+from denseface.service.client.aio import AsyncClient
+from denseface.service.errors import KeyRefusedError, RequestFailedError
+from denseface.service.security.allow_list import Role, revoke
 from tests.system.guarded import guarded_hub, press_through
 from tests.unit.service.faces import small_face
 

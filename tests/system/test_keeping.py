@@ -12,11 +12,12 @@ from pathlib import Path
 import pytest
 import zmq
 
-from recon.settings import Settings
-from service.client import Client
-from service.errors import PressRefusedError, UnknownCaptureError
-from service.hub import settings_hash
-from service.messages import (
+from denseface.recon.settings import Settings
+from denseface.service.client.blocking import Client
+from denseface.service.client.operator import Operator
+from denseface.service.errors import PressRefusedError, UnknownCaptureError
+from denseface.service.hub.hub import settings_hash
+from denseface.service.protocol.messages import (
     Announce,
     Frame,
     FrameAccepted,
@@ -25,10 +26,9 @@ from service.messages import (
     SensorReady,
     Take,
 )
-from service.operator import Operator
-from service.payload import FaceHeader, FrameHeader
-from service.store import FolderStore
-from service.wire import Packet, decode_from_hub, encode
+from denseface.service.protocol.payload import FaceHeader, FrameHeader
+from denseface.service.protocol.wire import Packet, decode_from_hub, encode
+from denseface.service.storage.folder_store import FolderStore
 from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, service
 from tests.unit.service.faces import small_face, small_frame
 from tests.unit.service.keep import accept, finish

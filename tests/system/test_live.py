@@ -58,7 +58,7 @@ def test_seconds_end_it_too():
 def test_a_signal_ends_it_with_the_summary(number, status):
     ours, theirs = pty.openpty()
     running = subprocess.Popen(
-        [sys.executable, "-m", "service", "live", "--source", str(FRONTAL), "--json"],
+        [sys.executable, "-m", "denseface", "live", "--source", str(FRONTAL), "--json"],
         cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=theirs)
     os.close(theirs)
     shown = b""

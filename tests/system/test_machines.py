@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from service.client import Client
-from service.export import load_face
-from service.keyring import Role, allow
-from service.keys import new_pair, read_public
+from denseface.service.client.blocking import Client
+from denseface.service.export.formats import load_face
+from denseface.service.security.allow_list import Role, allow
+from denseface.service.security.keys import new_pair, read_public
 from tests.ports import free_port
 from tests.system.running import PACE, RECORDINGS, REPOSITORY
 from tests.waiting import until
@@ -71,7 +71,7 @@ def test_a_face_is_made_on_another_machine(machines, tmp_path):
         def start(*arguments: object, before: tuple[str, ...] = ()) -> Path:
             log = tmp_path / f"{arguments[0]}.log"
             process = subprocess.Popen(
-                [*before, sys.executable, "-m", "service", *map(str, arguments)],
+                [*before, sys.executable, "-m", "denseface", *map(str, arguments)],
                 cwd=REPOSITORY, env=environment, stderr=running.enter_context(log.open("w")))
             running.callback(process.wait, 20)
             running.callback(process.terminate)
@@ -84,7 +84,7 @@ def test_a_face_is_made_on_another_machine(machines, tmp_path):
         with Client(local) as client:
             until(lambda: client.status(timeout=20).ready, within_s=60)
         pressed = subprocess.run(
-            [*there, sys.executable, "-m", "service", "press", *to_hub, "--save",
+            [*there, sys.executable, "-m", "denseface", "press", *to_hub, "--save",
              str(tmp_path / "face.npz")], cwd=REPOSITORY, env=environment, check=False,
             capture_output=True, text=True, timeout=60)
         assert (pressed.returncode, pressed.stderr) == (0, ""), hub_log.read_text()

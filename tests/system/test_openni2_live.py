@@ -79,7 +79,8 @@ def test_an_argument_wins_over_what_the_sensor_says(clip, tmp_path):
 def failing(uri: str, env: dict[str, str], code: str = "") -> tuple[str, str]:
     """Read until an error; give what was printed and the error's line."""
     done = run_python(
-        "import sys\nfrom capture import open_source\nfrom capture.openni2 import LiveSource\n"
+        "import sys\nfrom denseface.capture import open_source\n"
+        "from denseface.capture.openni2 import LiveSource\n"
         + (code or "for frame in open_source(sys.argv[1]):\n    print(frame.depth_timestamp_us)"),
         uri, env=env)
     assert done.returncode == 1, done.stderr
@@ -89,8 +90,8 @@ def failing(uri: str, env: dict[str, str], code: str = "") -> tuple[str, str]:
 def test_a_sensor_that_is_unplugged(clip):
     out, error = failing("openni2:", environment(clip, disconnect_after=4))
     assert len(out.splitlines()) <= 4
-    assert error == ("capture.errors.SensorError: openni2: the sensor virtual:0 was unplugged "
-                     "or failed")
+    assert error == ("denseface.capture.errors.SensorError: openni2: the sensor virtual:0 "
+                     "was unplugged or failed")
 
 
 def test_a_sensor_that_falls_silent(clip):
@@ -104,9 +105,9 @@ def test_a_sensor_that_falls_silent(clip):
 
 def test_no_stale_frame_at_a_press(clip):
     """The sensor sends three frames and no more: a press later must not get one of those."""
-    code = ("from capture.errors import SensorTimeoutError\n"
+    code = ("from denseface.capture.errors import SensorTimeoutError\n"
             "source = LiveSource(timeout_s=0.3)\n"
-            "from capture._openni2_streams import DEPTH\n"
+            "from denseface.capture.openni2._streams import DEPTH\n"
             "try:\n"
             "    while True: source.read()\n"
             "except SensorTimeoutError: pass\n"
@@ -125,38 +126,39 @@ def test_flush_forgets_what_waits(clip):
             "assert source.pairer.waiting == (0, 0)\n"
             "print(source.read().depth_timestamp_us > before + 33_333)\n"
             "source.close()\nsource.close()")
-    done = run_python("from capture.openni2 import LiveSource\n" + code, env=environment(clip))
+    done = run_python("from denseface.capture.openni2 import LiveSource\n" + code,
+                      env=environment(clip))
     assert done.stdout == "True\n", done.stderr
 
 
 @pytest.mark.parametrize(("streams", "missing"), [("depth", "color"), ("color", "depth")])
 def test_a_missing_stream_is_named(clip, streams, missing):
     _, error = failing("openni2:", environment(clip, streams=streams))
-    assert error == (f"capture.errors.SensorError: openni2: has no {missing} stream; depth and "
-                     "color are needed")
+    assert error == (f"denseface.capture.errors.SensorError: openni2: has no {missing} stream; "
+                     "depth and color are needed")
 
 
 def test_no_sensor():
     _, error = failing("openni2:", environment())
-    assert error == "capture.errors.SensorError: openni2: OpenNI2 finds no sensor"
+    assert error == "denseface.capture.errors.SensorError: openni2: OpenNI2 finds no sensor"
 
 
 @pytest.mark.parametrize("uri", ["nothing", "ä", "/dev/null"])
 def test_another_sensor_than_those_found(clip, uri):
     _, error = failing(f"openni2:{uri}", environment(clip))
-    assert error == (f"capture.errors.SensorError: openni2:{uri}: no such sensor; "
+    assert error == (f"denseface.capture.errors.SensorError: openni2:{uri}: no such sensor; "
                      "found: virtual:0")
 
 
 def test_a_missing_library(tmp_path):
     env = environment() | {"OPENNI2_REDIST": str(tmp_path)}
     _, error = failing("openni2:", env)
-    assert error == (f"capture.errors.SensorError: OPENNI2_REDIST={tmp_path}: no libOpenNI2.so "
-                     "in that folder")
+    assert error == (f"denseface.capture.errors.SensorError: OPENNI2_REDIST={tmp_path}: "
+                     "no libOpenNI2.so in that folder")
 
 
 def test_nothing_is_printed_and_no_folder_left(clip, tmp_path):
-    code = ("from capture import open_source\n"
+    code = ("from denseface.capture import open_source\n"
             "with open_source('openni2:') as source: next(iter(source))")
     done = run_python(code, env=environment(clip), cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
@@ -164,7 +166,8 @@ def test_nothing_is_printed_and_no_folder_left(clip, tmp_path):
 
 
 def test_a_forked_process_is_refused(clip):
-    code = ("import os\nfrom capture import open_source\nfrom capture.errors import SensorError\n"
+    code = ("import os\nfrom denseface.capture import open_source\n"
+            "from denseface.capture.errors import SensorError\n"
             "source = open_source('openni2:')\n"
             "if os.fork() == 0:\n"
             "    try: open_source('openni2:')\n"

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from capture._oni_file import check_oni
+from denseface.capture.openni2._oni_file import check_oni
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.process import environment, play, record_clip, run_python
 
@@ -56,8 +56,8 @@ def test_a_mirrored_recording_is_turned_back(shown, tmp_path):
     write_clip(tmp_path / "clip", shown)
     code = """
 import sys
-from capture import recorder
-from capture._openni2_streams import Streams
+from denseface.capture.openni2 import recorder
+from denseface.capture.openni2._streams import Streams
 Streams._mirrored = lambda self, handle: handle.get_mirroring_enabled()
 recorder.record(None, sys.argv[1], int(sys.argv[2]))
 """
@@ -80,7 +80,7 @@ def test_each_pass_starts_at_the_first_frame(recorded):
     code = """
 import sys
 from itertools import islice
-from capture import open_source
+from denseface.capture import open_source
 with open_source(sys.argv[1]) as source:
     for most in (2, 9, 0, 9):
         print(source.frame_count, [f.depth_timestamp_us for f in islice(source, most)])
@@ -95,7 +95,7 @@ def test_many_openings_in_one_process(recorded):
     """OpenNI2's player crashes where streams are destroyed while its thread is awake."""
     code = """
 import sys
-from capture import open_source
+from denseface.capture import open_source
 for _ in range(25):
     with open_source(sys.argv[1]) as source:
         assert len(list(source)) == 4
@@ -108,7 +108,7 @@ print("done")
 def test_one_file_opened_twice_at_once(recorded):
     code = """
 import sys
-from capture import open_source
+from denseface.capture import open_source
 first, second = open_source(sys.argv[1]), open_source(sys.argv[1])
 print([f.depth_timestamp_us == g.depth_timestamp_us for f, g in zip(first, second, strict=True)])
 """
@@ -124,7 +124,7 @@ print([f.depth_timestamp_us == g.depth_timestamp_us for f, g in zip(first, secon
     "for _ in range(5): source = open_source(sys.argv[1]); source.me = source; list(source)",
 ])
 def test_sources_that_nobody_closes(recorded, how):
-    done = run_python(f"import sys\nfrom capture import open_source\n{how}", recorded,
+    done = run_python(f"import sys\nfrom denseface.capture import open_source\n{how}", recorded,
                       env=environment())
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -168,7 +168,7 @@ def test_damaged_files_end_cleanly(recorded, tmp_path, how):
     done = run_python(_OPEN, path, env=environment())
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].startswith(
-        f"capture.errors.UnreadableSourceError: {path}: ")
+        f"denseface.capture.errors.UnreadableSourceError: {path}: ")
 
 
 @pytest.mark.parametrize(("name", "becomes"), [
@@ -182,7 +182,7 @@ def test_damaged_properties_end_cleanly(recorded, tmp_path, name, becomes):
     done = run_python(_OPEN, path, env=environment())
     assert done.returncode in (0, 1), done.stderr
     if done.returncode:
-        assert "capture.errors.UnreadableSourceError" in done.stderr
+        assert "denseface.capture.errors.UnreadableSourceError" in done.stderr
 
 
 @pytest.mark.parametrize("sides", [None, (0, 480), (640, 2**31)])
@@ -201,8 +201,8 @@ def test_a_stream_without_a_size_is_named_before_openni2_sees_it(recorded, tmp_p
     found = "no size" if sides is None else "{}x{}".format(*sides)
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == (
-        f"capture.errors.UnreadableSourceError: {path}: the depth stream has {found}, expected "
-        "sides of 1 to 16384")
+        f"denseface.capture.errors.UnreadableSourceError: {path}: the depth stream has {found}, "
+        "expected sides of 1 to 16384")
 
 
 @pytest.fixture(scope="module")

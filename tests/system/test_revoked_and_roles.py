@@ -9,11 +9,11 @@ from contextlib import suppress
 import pytest
 import zmq
 
-from service import messages
-from service.errors import ClientTimeoutError, KeyRefusedError
-from service.keyring import Role, revoke
-from service.operator import Operator
-from service.wire import Packet, encode
+from denseface.service.client.operator import Operator
+from denseface.service.errors import ClientTimeoutError, KeyRefusedError
+from denseface.service.protocol import messages
+from denseface.service.protocol.wire import Packet, encode
+from denseface.service.security.allow_list import Role, revoke
 from tests.system.guarded import (
     FACE,
     FACE_ARRAYS,

@@ -7,7 +7,7 @@ of the points may lie on something else.
 import pytest
 
 from bench.segmentation import CASES
-from recon import reconstruct
+from denseface.recon import reconstruct
 from tests.simulator import KINECT_CALIBRATED, Person, measure, simulate
 
 

@@ -11,14 +11,14 @@ import numpy as np
 import psutil
 import pytest
 
-from service.client import Client, PublishedFace, PublishedFailure
-from service.errors import (
+from denseface.service.client.blocking import Client, PublishedFace, PublishedFailure
+from denseface.service.errors import (
     CaptureFailedError,
     ClientTimeoutError,
     PressRefusedError,
     UnknownCaptureError,
 )
-from service.export import load_face
+from denseface.service.export.formats import load_face
 from tests.ports import free_port
 from tests.system.running import RECORDINGS, denseface, hub_alone, service, sockets
 from tests.virtual_sensor.clip import write_clip

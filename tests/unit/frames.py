@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from capture.frame import Calibration, CameraModel, DepthToColor, RgbdFrame
+from denseface.capture.frame import Calibration, CameraModel, DepthToColor, RgbdFrame
 
 
 def camera(width: int = 160, height: int = 120, f: float = 150.0, **changes: object) -> CameraModel:

@@ -6,7 +6,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from capture._openni2_library import find_library
+from denseface.capture.openni2._library import find_library
 
 __all__ = ["build"]
 

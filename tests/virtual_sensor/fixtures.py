@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from capture.frame import RgbdFrame
+from denseface.capture.frame import RgbdFrame
 from tests.simulator import (
     KINECT_CALIBRATED,
     KINECT_DEFAULT,

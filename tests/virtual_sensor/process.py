@@ -20,8 +20,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from capture.frame import RgbdFrame
-from capture.npz import load_frame
+from denseface.capture.frame import RgbdFrame
+from denseface.capture.npz import load_frame
 from tests.virtual_sensor.build import build
 
 __all__ = ["environment", "play", "record_clip", "run_python"]
@@ -30,8 +30,8 @@ _ROOT = Path(__file__).resolve().parents[2]
 _PLAY = """
 import sys
 from itertools import islice
-from capture import open_source
-from capture.npz import save_frame
+from denseface.capture import open_source
+from denseface.capture.npz import save_frame
 with open_source(sys.argv[1]) as source:
     for number, frame in enumerate(islice(source, int(sys.argv[3]))):
         save_frame(f"{sys.argv[2]}/{number}.npz", frame)
@@ -39,7 +39,7 @@ with open_source(sys.argv[1]) as source:
 """
 _RECORD = """
 import sys
-from capture.recorder import record
+from denseface.capture.openni2.recorder import record
 record(None, sys.argv[1], int(sys.argv[2]))
 """
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from bench.colors import PARTS, Compared
-from recon import reconstruct
+from denseface.recon import reconstruct
 from tests.simulator import KINECT_DEFAULT, Person, Scene, TrueColors, simulate
 
 SKIN, GREEN, HAIR = (200, 150, 120), (30, 220, 40), (50, 40, 30)

@@ -3,8 +3,8 @@ import pytest
 
 from bench.calibration_samples import Samples
 from bench.sigma_fit import fitted
-from recon import Preset, Settings
-from recon.uncertainty import average_cutoff, cutoff, noise_share
+from denseface.recon import Preset, Settings
+from denseface.recon.propagation.uncertainty import average_cutoff, cutoff, noise_share
 
 COUNT = 60_000
 HOLE, SLOPE, RIM, RIM_ALONE, SHARE, DETAIL_PART = 0.8, 0.1, 2.0, 3.0, 50.0, 0.6

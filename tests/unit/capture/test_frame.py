@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from capture.errors import CalibrationError, FrameError
-from capture.frame import Calibration, CameraModel, DepthToColor, RgbdFrame
+from denseface.capture.errors import CalibrationError, FrameError
+from denseface.capture.frame import Calibration, CameraModel, DepthToColor, RgbdFrame
 from tests.unit.frames import calibration, camera, cameras, frame, poses
 
 

@@ -7,10 +7,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays_of
 
-from capture import open_source
-from capture.errors import CalibrationError, FrameError, UnreadableSourceError
-from capture.frame import Calibration, RgbdFrame
-from capture.npz import load_frame, save_frame
+from denseface.capture import open_source
+from denseface.capture.errors import CalibrationError, FrameError, UnreadableSourceError
+from denseface.capture.frame import Calibration, RgbdFrame
+from denseface.capture.npz import load_frame, save_frame
 from tests.unit import frames
 
 H, W = 6, 8

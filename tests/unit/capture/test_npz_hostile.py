@@ -11,8 +11,8 @@ from random import Random
 import numpy as np
 import pytest
 
-from capture.errors import CalibrationError, FrameError, UnreadableSourceError
-from capture.npz import load_frame
+from denseface.capture.errors import CalibrationError, FrameError, UnreadableSourceError
+from denseface.capture.npz import load_frame
 from tests.unit.capture.test_npz import H, W, write
 
 NAMED = (UnreadableSourceError, FrameError, CalibrationError)

@@ -4,9 +4,9 @@ import sys
 import numpy as np
 import pytest
 
-from capture import Source, open_source
-from capture.errors import CalibrationError, UnreadableSourceError
-from capture.npz import save_frame
+from denseface.capture import Source, open_source
+from denseface.capture.errors import CalibrationError, UnreadableSourceError
+from denseface.capture.npz import save_frame
 from tests.unit import frames
 
 ARGUMENT, BESIDE, OWN = (frames.calibration(color=frames.camera(f=f)) for f in (101., 102., 103.))

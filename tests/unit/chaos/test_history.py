@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service import recovery
+from denseface.service.storage import recovery
 from tests.chaos.history import JUMP, Answer, History, Kept, Seen, violations
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from recon import reconstruct
+from denseface.recon import reconstruct
 from tests.simulator import Person, Scene, simulate
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from capture.frame import DepthToColor
-from recon.registration import Registration, register
-from recon.segment import Seeds
+from denseface.capture.frame import DepthToColor
+from denseface.recon.registration.registration import Registration, register
+from denseface.recon.segmentation.segment import Seeds
 from tests.unit.frames import calibration, camera, frame
 
 FOCAL = 300.0

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from recon.face import FaceCandidate, PointCloud, Report
-from recon.settings import Settings
+from denseface.recon.face import FaceCandidate, PointCloud, Report
+from denseface.recon.settings import Settings
 from tests.unit.service.faces import small_face
 
 

@@ -9,15 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from capture.frame import CameraModel, DepthToColor, RgbdFrame
-from recon import Settings
-from recon.densify import densify
-from recon.face import DenseCloud
-from recon.neighbors import exact_spacing, mean_spacing
-from recon.pipeline import surface_of
-from recon.registration import look_up, register
-from recon.segment import Seeds
-from recon.settings import Neighbors
+from denseface.capture.frame import CameraModel, DepthToColor, RgbdFrame
+from denseface.recon import Settings
+from denseface.recon.face import DenseCloud
+from denseface.recon.pipeline import surface_of
+from denseface.recon.propagation.densify import densify
+from denseface.recon.registration.registration import look_up, register
+from denseface.recon.segmentation.segment import Seeds
+from denseface.recon.settings import Neighbors
+from denseface.recon.surface.spacing import exact_spacing, mean_spacing
 
 HOW = Settings()
 

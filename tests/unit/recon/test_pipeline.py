@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from capture.frame import RgbdFrame
-from recon import (
+from denseface.capture.frame import RgbdFrame
+from denseface.recon import (
     FaceWithoutDepthError,
     NoDepthError,
     NoFaceError,
@@ -20,11 +20,11 @@ from recon import (
     TooLittleDepthError,
     reconstruct,
 )
-from recon.neighbors import mean_spacing
-from recon.pipeline import surface_of
-from recon.registration import look_up, register
-from recon.segment import segment_face
-from recon.settings import Neighbors
+from denseface.recon.pipeline import surface_of
+from denseface.recon.registration.registration import look_up, register
+from denseface.recon.segmentation.segment import segment_face
+from denseface.recon.settings import Neighbors
+from denseface.recon.surface.spacing import mean_spacing
 from tests.simulator import Accuracy, Light, Person, Scene, measure, simulate
 from tests.unit.frames import resampled
 

@@ -3,7 +3,7 @@
 import pytest
 from pydantic import ValidationError
 
-from recon.settings import Neighbors, Preset, Settings
+from denseface.recon.settings import Neighbors, Preset, Settings
 
 
 def test_best_is_the_default():

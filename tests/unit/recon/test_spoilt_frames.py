@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from capture.frame import CameraModel, DepthToColor, RgbdFrame
-from recon import ReconstructionError, Settings, reconstruct
+from denseface.capture.frame import CameraModel, DepthToColor, RgbdFrame
+from denseface.recon import ReconstructionError, Settings, reconstruct
 from tests.unit.frames import resampled
 
 DEEPEST = 65535

@@ -5,11 +5,11 @@ import pkgutil
 
 import numba
 
-import recon
-from recon import reconstruct, warm
+import denseface.recon
+from denseface.recon import reconstruct, warm
 
-MODULES = [importlib.import_module(f"recon.{found.name}")
-           for found in pkgutil.iter_modules(recon.__path__)]
+MODULES = [importlib.import_module(found.name)
+           for found in pkgutil.walk_packages(denseface.recon.__path__, "denseface.recon.")]
 
 
 def compiled():

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from capture.frame import RgbdFrame
-from recon.face import DenseCloud, Face, PointCloud, Report
-from recon.settings import Settings
+from denseface.capture.frame import RgbdFrame
+from denseface.recon.face import DenseCloud, Face, PointCloud, Report
+from denseface.recon.settings import Settings
 from tests.unit.frames import calibration, camera, frame
 
 

@@ -8,11 +8,11 @@ from contextlib import contextmanager
 import numpy as np
 import zmq
 
-from service import messages
-from service.addresses import publications_of
-from service.outputs import Topic
-from service.payload import FaceHeader, PreviewHeader
-from service.wire import Packet, decode_to_hub, encode
+from denseface.service.protocol import messages
+from denseface.service.protocol.outputs import Topic
+from denseface.service.protocol.payload import FaceHeader, PreviewHeader
+from denseface.service.protocol.wire import Packet, decode_to_hub, encode
+from denseface.service.transport.addresses import publications_of
 from tests.unit.service.faces import small_face
 
 

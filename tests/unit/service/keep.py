@@ -1,10 +1,10 @@
 """Keeps a frame or a face in one go: its file, then its row."""
 
-from recon.settings import Settings
-from service.errors import StoreError
-from service.stored import Store
-from service.wire import Packet
-from service.writing import write
+from denseface.recon.settings import Settings
+from denseface.service.errors import StoreError
+from denseface.service.protocol.wire import Packet
+from denseface.service.storage.base import Store
+from denseface.service.storage.writer import write
 
 __all__ = ["accept", "finish"]
 

@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from capture.npz import save_frame
-from service.cli import main
+from denseface.capture.npz import save_frame
+from denseface.service.cli import main
 from tests.unit.frames import calibration, frame
 
 
@@ -116,13 +116,13 @@ def test_ctrl_c_is_status_130(room, monkeypatch, capsys):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("recon.reconstruct", interrupted)
+    monkeypatch.setattr("denseface.recon.reconstruct", interrupted)
     assert outcome(capsys, "reconstruct", room) == (130, "")
 
 
 def test_help_imports_nothing_heavy():
-    code = ("import sys, service.cli\n"
-            "try: service.cli.main(['--help'])\n"
+    code = ("import sys, denseface.service.cli\n"
+            "try: denseface.service.cli.main(['--help'])\n"
             "except SystemExit: pass\n"
             "heavy = {'numpy', 'cv2', 'open3d', 'zmq', 'pydantic', 'scipy', 'structlog'}\n"
             "sys.exit(repr(heavy & set(sys.modules)) if heavy & set(sys.modules) else 0)")
@@ -135,16 +135,17 @@ def test_a_reader_that_leaves_is_no_error():
     reading, writing = os.pipe()
     os.close(reading)
     done = subprocess.run(
-        [sys.executable, "-c", "import service.cli, sys; from service.commands import status\n"
+        [sys.executable, "-c", "import sys\nfrom denseface.service import cli\n"
+         "from denseface.service.commands import status\n"
          "status.run = lambda args: print('x' * 100000) or 0\n"
-         "sys.exit(service.cli.main(['status']))"],
+         "sys.exit(cli.main(['status']))"],
         stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writing)
     assert (done.returncode, done.stderr) == (141, "")
 
 
 def test_a_sigterm_while_the_interpreter_ends_leaves_no_traceback():
-    code = ("import atexit, os, signal, sys\nfrom service.cli import main\n"
+    code = ("import atexit, os, signal, sys\nfrom denseface.service.cli import main\n"
             "atexit.register(os.kill, os.getpid(), signal.SIGTERM)\n"
             "sys.exit(main(['status', '--address', 'ipc:///tmp/none', '--wait', '0.01']))\n")
     ended = subprocess.run(

@@ -4,11 +4,16 @@ import socket
 
 import pytest
 
-from service.addresses import check_bindable, is_local, publications_of, socket_file
-from service.aio import AsyncClient
-from service.client import Client
-from service.errors import AddressError, HubRunningError, SettingsError
-from service.settings import ServiceSettings, default_address, private_folder
+from denseface.service.client.aio import AsyncClient
+from denseface.service.client.blocking import Client
+from denseface.service.errors import AddressError, HubRunningError, SettingsError
+from denseface.service.settings import ServiceSettings, default_address, private_folder
+from denseface.service.transport.addresses import (
+    check_bindable,
+    is_local,
+    publications_of,
+    socket_file,
+)
 
 
 def test_a_flag_wins_over_the_environment_and_that_over_the_default(tmp_path):

@@ -3,10 +3,10 @@
 from collections import deque
 from collections.abc import Callable
 
-from service.errors import DiskFullError
-from service.kept import Draft
-from service.store import FolderStore
-from service.writing import Written, write
+from denseface.service.errors import DiskFullError
+from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage.records import Draft
+from denseface.service.storage.writer import Written, write
 
 __all__ = ["KilledError", "StepWriter", "UnkindStore"]
 

@@ -1,0 +1,92 @@
+"""What recordings and live sensors have in common: a device, its streams, a calibration, pairs."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from denseface.capture._chosen import ChosenCalibration
+from denseface.capture.errors import FrameError, SensorError
+from denseface.capture.frame import RgbdFrame
+from denseface.capture.openni2._calibration import calibration_of
+from denseface.capture.openni2._library import close_at_exit, close_handle
+from denseface.capture.openni2._streams import COLOR, DEPTH, Image, Streams
+from denseface.capture.pairing import Pair, Pairer
+
+__all__ = ["OpenNI2Source"]
+
+
+class OpenNI2Source(ABC):
+    """An open device that gives frames."""
+
+    frame_count: int | None = None
+    _live: bool
+    _device: Any = None
+    _streams: Streams | None = None
+    _origin: str
+
+    def __init__(self, uri: str, chosen: ChosenCalibration | None) -> None:
+        self.uri = uri
+        self._name = uri.rstrip(":")
+        self.pairer: Pairer[Any, Any] = Pairer()
+        self._chosen = chosen
+        self._registered = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        self.close()
+
+    @abstractmethod
+    def __iter__(self) -> Iterator[RgbdFrame]:
+        """Give the pairs as frames."""
+
+    def close(self) -> None:
+        """Stop the streams and close the device; harmless when repeated."""
+        if self._streams is not None:
+            self._streams.close()
+            self._streams = None
+        if self._device is not None:
+            close_handle(self._device)
+            self._device = None
+
+    def holds(self, path: Path) -> bool:  # noqa: ARG002
+        """Say whether this is an open source of that file."""
+        return False
+
+    def _open_streams(self, openni2: Any, device: Any) -> Streams:
+        self._device = device
+        close_at_exit(self)
+        try:
+            streams = self._streams = Streams(openni2, device, self._name, live=self._live)
+            if self._chosen is None:
+                calibration, said = calibration_of(
+                    streams.properties, streams.size(DEPTH), streams.size(COLOR))
+                self._chosen = ChosenCalibration(calibration, f"{self._origin}: {said}")
+        except BaseException:
+            self.close()
+            raise
+        return streams
+
+    def _add(self, kind: str, image: Image) -> Pair[Any, Any] | None:
+        return (self.pairer.add_depth if kind == DEPTH else self.pairer.add_color)(*image)
+
+    def _frame(self, pair: Pair[Any, Any]) -> RgbdFrame:
+        if self._chosen is None:
+            raise SensorError(f"{self._name}: is closed")
+        calibration, origin = self._chosen
+        try:
+            return RgbdFrame(pair.depth, pair.color, pair.depth_us, pair.color_us, calibration,
+                             self._registered, calibration_origin=origin)
+        except FrameError as error:
+            raise FrameError(f"{self._name}: {error} (calibration: {origin})") from error

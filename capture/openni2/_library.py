@@ -1,0 +1,159 @@
+"""Finding and loading OpenNI2: once for each process, quietly, and never after a fork."""
+
+import atexit
+import os
+import sysconfig
+import threading
+from pathlib import Path
+from typing import Any
+from weakref import WeakSet
+
+from denseface.capture.errors import SensorError
+
+__all__ = ["close_at_exit", "close_handle", "find_library", "gone_devices", "load",
+           "open_sources", "reason"]
+
+_NAME = "libOpenNI2.so"
+_VARIABLES = ("OPENNI2_REDIST64", "OPENNI2_REDIST")
+_ERRORS_ONLY = 3
+
+_lock = threading.Lock()
+_loaded_in: int | None = None
+_watch: Any = None
+_open: WeakSet[Any] = WeakSet()
+
+
+def find_library() -> Path:
+    """Give the folder that holds `libOpenNI2.so`.
+
+    The environment variables OPENNI2_REDIST64 and OPENNI2_REDIST name it; otherwise Debian's
+    multiarch folder and the usual ones are searched.
+
+    Raises
+    ------
+    SensorError
+        It is not there; the message names the Debian package.
+    """
+    for variable in _VARIABLES:
+        if value := os.environ.get(variable):
+            folder = Path(value).absolute()
+            if (folder / _NAME).is_file():
+                return folder
+            raise SensorError(f"{variable}={value}: no {_NAME} in that folder")
+    multiarch = sysconfig.get_config_var("MULTIARCH")
+    folders = [Path("/usr/lib"), Path("/usr/local/lib")]
+    if multiarch:
+        folders = [root / str(multiarch) for root in folders] + folders
+    for folder in folders:
+        if (folder / _NAME).is_file():
+            return folder
+    raise SensorError(
+        f"{_NAME} not found in {', '.join(map(str, folders))}: install the Debian package "
+        f"libopenni2-dev (apt install libopenni2-dev), or name the folder in OPENNI2_REDIST")
+
+
+def load() -> Any:
+    """Give the `primesense.openni2` module, initialised.
+
+    It is never unloaded before the process ends: a second initialisation crashes.
+
+    Raises
+    ------
+    SensorError
+        The library is missing or refuses, or the process was forked after it was loaded.
+    """
+    global _loaded_in, _watch
+    with _lock:
+        from primesense import _openni2 as c_api
+        from primesense import openni2
+        from primesense.utils import OpenNIError
+
+        if _loaded_in is not None:
+            if _loaded_in != os.getpid():
+                raise SensorError("OpenNI2 was loaded before this process was forked: start "
+                                  "processes by spawn, or open the sensor in the child alone")
+            return openni2
+        folder = find_library()
+        try:
+            c_api.load_dll(str(folder / _NAME))
+            _be_quiet(c_api)
+            # The binding's own loading would change the working directory.
+            openni2.loaded_dll_directory = str(folder)
+            openni2.initialize()
+            _be_quiet(c_api)
+            _watch = _make_watch(openni2)
+        except (OSError, AttributeError, ValueError, OpenNIError) as error:
+            raise SensorError(f"{folder / _NAME}: OpenNI2 cannot be loaded: "
+                              f"{reason(error)}") from error
+        # Before the binding's own clean-up, which destroys streams in any order.
+        atexit.register(_close_all)
+        _loaded_in = os.getpid()
+        return openni2
+
+
+def close_at_exit(source: Any) -> None:
+    """Close this, where its owner forgets, before the library is unloaded."""
+    _open.add(source)
+
+
+def open_sources() -> list[Any]:
+    """Give the sources that may be open."""
+    return list(_open)
+
+
+def _close_all() -> None:
+    for source in open_sources():
+        source.close()
+
+
+def gone_devices() -> set[bytes]:
+    """Give the URIs of the devices that were unplugged or failed since they were opened."""
+    return _watch.gone if _watch is not None else set()
+
+
+def close_handle(handle: Any) -> None:
+    """Close a device or stream of the binding; one that is gone may refuse."""
+    from primesense.utils import OpenNIError
+
+    try:
+        handle.close()
+    except OpenNIError:
+        # Its finaliser would only try, and complain, again.
+        handle._handle = None
+
+
+def reason(error: BaseException) -> str:
+    """Give one line for an error of the binding."""
+    message = error.args[1] if len(error.args) > 1 else None
+    if isinstance(message, bytes) and message:
+        return " ".join(message.decode("utf-8", "replace").split())
+    code = getattr(error, "code", None)
+    return repr(code).split(".")[-1] if code is not None else str(error) or type(error).__name__
+
+
+def _be_quiet(c_api: Any) -> None:
+    """No Log folder in the working directory and nothing on the terminal."""
+    c_api.oniSetLogFileOutput(False)
+    c_api.oniSetLogConsoleOutput(False)
+    c_api.oniSetLogMinSeverity(_ERRORS_ONLY)
+
+
+def _make_watch(openni2: Any) -> Any:
+    class Watch(openni2.DeviceListener):  # type: ignore[misc]
+        """Notes who left. The binding's own handlers use sets that do not exist yet."""
+
+        def __init__(self) -> None:
+            self.gone: set[bytes] = set()
+            super().__init__()
+
+        def _on_connected(self, info: Any, _: Any) -> None:
+            """A device that came back has to be opened anew: it stays noted as gone."""
+
+        def _on_disconnected(self, info: Any, _: Any) -> None:
+            self.gone.add(bytes(info[0].uri))
+
+        def _on_state_changed(self, info: Any, state: Any, _: Any) -> None:
+            if int(state) == 1:  # ONI_DEVICE_STATE_ERROR
+                self.gone.add(bytes(info[0].uri))
+
+    return Watch()

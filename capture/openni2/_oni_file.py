@@ -1,0 +1,141 @@
+r"""The record structure of an `.oni` file: what is read of it before OpenNI2 may see the file.
+
+OpenNI2 reports any damage as one bare error, or delivers fewer frames and falls silent. And it
+tells nothing of depth that OpenNI 1 recorded in the colour camera's pixels. Both stand in the
+records, which are a header and a chain: ``NIR\0``, uint32 type, node, size of fields, size of
+payload, uint64 undo position, fields, payload; all little-endian.
+"""
+
+import struct
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+from denseface.capture.errors import UnreadableSourceError
+
+__all__ = ["DEPTH_NODE", "IMAGE_NODE", "OniNode", "check_oni", "frames_so_far"]
+
+DEPTH_NODE, IMAGE_NODE = 2, 3
+
+_HEADER = struct.Struct("<4sBBHIQI")
+_RECORD = struct.Struct("<4s4IQ")
+_U32 = struct.Struct("<I")
+_NODE_ADDED = (0x02, 0x0C, 0x0D)
+_INT_PROPERTY = 0x03
+_PROPERTIES = (0x03, 0x04, 0x05, 0x06)
+_MODE = "xnMapOutputMode"
+_MODE_VALUE = struct.Struct("<III")
+"""Its size, then width and height."""
+_NEW_DATA = 0x0A
+_END = 0x0B
+_MAX_FIELDS = 1 << 20
+
+
+@dataclass
+class OniNode:
+    """One stream of a recording, or the device."""
+
+    kind: int
+    """DEPTH_NODE, IMAGE_NODE, or something else."""
+    frames: int = 0
+    """How many frame records the file holds."""
+    properties: dict[str, int] = field(default_factory=dict)
+    """The whole-number properties."""
+    sides: tuple[int, int] | None = None
+    """Width and height of the images, pixels; None where the file does not say."""
+
+    @property
+    def registered(self) -> bool:
+        """OpenNI 1 recorded this in another camera's pixels (`AlternativeViewPoint`)."""
+        return self.properties.get("AlternativeViewPoint", 0) == 1
+
+
+def check_oni(path: Path) -> tuple[list[OniNode], int]:
+    """Walk through a recording's records.
+
+    Returns
+    -------
+    the nodes, and where the last record ends: a recorder may leave empty space behind it
+
+    Raises
+    ------
+    UnreadableSourceError
+        The file is missing, not an `.oni`, damaged, or was never finished.
+    """
+    try:
+        with path.open("rb") as file:
+            size = file.seek(0, 2)
+            file.seek(0)
+            nodes: dict[int, OniNode] = {}
+            end = _walk(str(path), file, size, nodes)
+            return list(nodes.values()), end
+    except OSError as error:
+        if isinstance(error, UnreadableSourceError):
+            raise
+        raise UnreadableSourceError(f"{path}: {error.strerror or error}") from error
+
+
+def frames_so_far(path: Path) -> int:
+    """Count the frames that a recorder has written of each stream, at least, while it is at work.
+
+    0 where there is no depth or no colour stream.
+    """
+    nodes: dict[int, OniNode] = {}
+    with suppress(UnreadableSourceError, OSError), path.open("rb") as file:
+        size = file.seek(0, 2)
+        file.seek(0)
+        _walk(str(path), file, size, nodes)
+    found = {node.kind: node.frames for node in nodes.values()}
+    return min(found.get(DEPTH_NODE, 0), found.get(IMAGE_NODE, 0))
+
+
+def _walk(name: str, file: BinaryIO, size: int, nodes: dict[int, OniNode]) -> int:
+    """Fill in the nodes; give where the end record ends."""
+    header = file.read(_HEADER.size)
+    if not header:
+        raise UnreadableSourceError(f"{name}: the file is empty")
+    if header[:2] != b"NI":
+        raise UnreadableSourceError(
+            f"{name}: not an .oni recording: starts with {header[:4]!r}, expected b'NI10'")
+    at = _HEADER.size
+    while True:
+        raw = file.read(_RECORD.size)
+        if len(raw) < _RECORD.size:
+            raise UnreadableSourceError(
+                f"{name}: ends after {size} bytes without an end record: cut off, or the "
+                f"recorder was not closed")
+        magic, kind, node, fields, payload, _ = _RECORD.unpack(raw)
+        body = fields - _RECORD.size
+        if magic != b"NIR\0" or not 0 <= body <= _MAX_FIELDS:
+            raise UnreadableSourceError(f"{name}: damaged at byte {at}: no valid record there")
+        after: int = at + fields + payload
+        if kind == _END:
+            return after
+        content = file.read(body)
+        at = file.seek(after)
+        if at > size:
+            raise UnreadableSourceError(
+                f"{name}: ends after {size} bytes in the middle of a record that needs {at}")
+        if kind in _NODE_ADDED:
+            nodes[node] = OniNode(int.from_bytes(_text(name, content)[1][:_U32.size], "little"))
+        elif kind in _PROPERTIES:
+            key, value = _text(name, content)
+            if kind == _INT_PROPERTY and node in nodes:
+                nodes[node].properties[key] = int.from_bytes(value[_U32.size:], "little")
+            elif key == _MODE and node in nodes and len(value) >= _MODE_VALUE.size:
+                nodes[node].sides = _MODE_VALUE.unpack_from(value)[1:]
+        elif kind == _NEW_DATA and node in nodes:
+            nodes[node].frames += 1
+
+
+def _text(name: str, content: bytes) -> tuple[str, bytes]:
+    """Split a counted, zero-ended string from what follows it."""
+    length = _U32.unpack_from(content)[0] if len(content) >= _U32.size else 0
+    end = _U32.size + length
+    text = content[_U32.size:end]
+    # OpenNI2 crashes on a byte outside ASCII: it indexes a hash table with it, signed.
+    if end > len(content) or text[-1:] != b"\0" or not text[:-1].decode("latin-1").isprintable() \
+            or not text.isascii():
+        raise UnreadableSourceError(f"{name}: damaged: a record has no valid name")
+    return text[:-1].decode("ascii"), content[end:]

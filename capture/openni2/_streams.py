@@ -1,0 +1,226 @@
+"""A device's depth and colour streams: opened, started, and read by copy."""
+
+import ctypes
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from denseface.capture.errors import SensorError
+from denseface.capture.frame import MAX_SIDE
+from denseface.capture.openni2._calibration import SensorProperties
+from denseface.capture.openni2._library import close_handle, reason
+
+__all__ = ["COLOR", "DEPTH", "Image", "Streams"]
+
+DEPTH, COLOR = "depth", "color"
+Image = tuple[int, NDArray[Any]]
+"""Stamp (sensor clock, microseconds) and pixels: (H, W) uint16 mm or (H, W, 3) uint8 RGB."""
+
+_FOV, _MIRRORING = 1, 7
+_ZPD, _ZPPS, _DCRCDIS = 0x1080100C, 0x1080100D, 0x1080100F
+_LIVE_SIZE, _LIVE_FPS = (640, 480), 30
+_C = TypeVar("_C", bound="ctypes._SimpleCData[Any]")
+
+
+@dataclass
+class _Stream:
+    kind: str
+    handle: Any
+    size: tuple[int, int]
+    pixel_format: int
+    mirrored: bool
+
+
+class Streams:
+    """Both streams of an open device, started.
+
+    Parameters
+    ----------
+    openni2 : the loaded binding
+    device : an open `openni2.Device`; it stays the caller's
+    name : of the source, for messages
+    live : ask for 640x480 at 30 frames a second; a recording has its own modes
+
+    Raises
+    ------
+    SensorError
+        A stream is missing or has no mode that can be used.
+    """
+
+    def __init__(self, openni2: Any, device: Any, name: str, *, live: bool) -> None:
+        self._openni2 = openni2
+        self._name = name
+        self._streams: dict[str, _Stream] = {}
+        from primesense.utils import OpenNIError
+
+        self._error = OpenNIError
+        try:
+            # Both are created before either starts: a sensor may begin with the first start.
+            for kind in (DEPTH, COLOR):
+                self._streams[kind] = self._create(device, kind, live=live)
+            self.properties = self._read_properties(device)
+        except BaseException:
+            self.close()
+            raise
+
+    def start(self) -> None:
+        """Start both; only then may they be read."""
+        for kind, stream in self._streams.items():
+            try:
+                stream.handle.start()
+            except self._error as error:
+                raise SensorError(f"{self._name}: the {kind} stream does not start: "
+                                  f"{reason(error)}") from error
+
+    def stop(self) -> None:
+        """Stop both; a device that is gone may refuse."""
+        for stream in self._streams.values():
+            with suppress(self._error):
+                stream.handle.stop()
+
+    def handle(self, kind: str) -> Any:
+        """Give the binding's own stream, for its recorder."""
+        return self._streams[kind].handle
+
+    def size(self, kind: str) -> tuple[int, int]:
+        """Give (width, height), pixels."""
+        return self._streams[kind].size
+
+    def wait(self, timeout_s: float, kinds: tuple[str, ...] = (DEPTH, COLOR)) -> str | None:
+        """Wait until a stream has a frame; None where none came in time, or the file is at its end.
+
+        This is the only safe way to wait: reading without it may block for ever.
+        """
+        handles = [self.handle(kind) for kind in kinds]
+        try:
+            ready = self._openni2.wait_for_any_stream(handles, timeout_s)
+        except self._error as error:
+            raise SensorError(f"{self._name}: waiting for a frame failed: "
+                              f"{reason(error)}") from error
+        return next((k for k, h in zip(kinds, handles, strict=True) if h is ready), None)
+
+    def read(self, kind: str) -> Image:
+        """Copy the frame that `wait` announced out of the driver's memory."""
+        stream = self._streams[kind]
+        try:
+            frame = stream.handle.read_frame()
+        except self._error as error:
+            raise SensorError(f"{self._name}: reading a {kind} frame failed: "
+                              f"{reason(error)}") from error
+        try:
+            return int(frame.timestamp), self._copy(stream, frame)
+        finally:
+            frame.close()
+
+    def close(self) -> None:
+        """Stop and destroy both; a device that is gone may refuse, which changes nothing."""
+        for stream in self._streams.values():
+            close_handle(stream.handle)
+        self._streams.clear()
+
+    def _create(self, device: Any, kind: str, *, live: bool) -> _Stream:
+        make = device.create_depth_stream if kind == DEPTH else device.create_color_stream
+        try:
+            handle = make()
+        except self._error as error:
+            raise SensorError(f"{self._name}: the {kind} stream cannot be opened: "
+                              f"{reason(error)}") from error
+        if handle is None:
+            raise SensorError(f"{self._name}: has no {kind} stream; depth and color are needed")
+        try:
+            return self._configure(device, kind, handle, live=live)
+        except self._error as error:
+            close_handle(handle)
+            raise SensorError(f"{self._name}: the {kind} stream has no video mode: "
+                              f"{reason(error)}") from error
+        except BaseException:
+            close_handle(handle)
+            raise
+
+    def _configure(self, device: Any, kind: str, handle: Any, *, live: bool) -> _Stream:
+        if live:
+            self._choose_mode(device, kind, handle)
+        mode = handle.video_mode
+        accepted = _accepted(self._openni2, kind)
+        if int(mode.pixelFormat) not in accepted:
+            raise SensorError(
+                f"{self._name}: the {kind} stream is {_format_name(mode.pixelFormat)}, "
+                f"expected {' or '.join(accepted.values())}")
+        if not (0 < mode.resolutionX <= MAX_SIDE and 0 < mode.resolutionY <= MAX_SIDE):
+            raise SensorError(f"{self._name}: the {kind} stream is {mode.resolutionX}x"
+                              f"{mode.resolutionY}, expected sides of 1 to {MAX_SIDE}")
+        return _Stream(kind, handle, (int(mode.resolutionX), int(mode.resolutionY)),
+                       int(mode.pixelFormat), self._mirrored(handle))
+
+    def _choose_mode(self, device: Any, kind: str, handle: Any) -> None:
+        modes = [(int(m.resolutionX), int(m.resolutionY), int(m.fps), int(m.pixelFormat))
+                 for m in device.get_sensor_info(handle.sensor_type).videoModes]
+        for pixel_format in _accepted(self._openni2, kind):
+            wanted = (*_LIVE_SIZE, _LIVE_FPS, pixel_format)
+            if wanted in modes:
+                handle.configure_mode(*wanted)
+                return
+        raise SensorError(
+            f"{self._name}: the {kind} stream does not offer 640x480 at 30 frames a second as "
+            f"{' or '.join(_accepted(self._openni2, kind).values())}")
+
+    def _mirrored(self, handle: Any) -> bool:
+        """Switch mirroring off; where that fails, as on recordings, say whether it is on."""
+        with suppress(self._error):
+            handle.set_mirroring_enabled(False)
+        try:
+            return bool(handle.get_property(_MIRRORING, ctypes.c_int).value)
+        except self._error:
+            return False
+
+    def _read_properties(self, device: Any) -> SensorProperties:
+        depth, color = self.handle(DEPTH), self.handle(COLOR)
+        return SensorProperties(
+            zpd_mm=self._property(depth, _ZPD, ctypes.c_uint64),
+            zpps_mm=self._property(depth, _ZPPS, ctypes.c_double),
+            dcrcdis_cm=self._property(depth, _DCRCDIS, ctypes.c_double),
+            depth_fov=self._property(depth, _FOV, ctypes.c_float),
+            color_fov=self._property(color, _FOV, ctypes.c_float),
+            usb_vendor=int(device.device_info.usbVendorId),
+        )
+
+    def _property(self, handle: Any, number: int, kind: type[_C]) -> Any:
+        try:
+            return handle.get_property(number, kind).value
+        except self._error:
+            return None
+
+    def _copy(self, stream: _Stream, frame: Any) -> NDArray[Any]:
+        width, height = stream.size
+        pixel = 2 if stream.kind == DEPTH else 3
+        stride, size = int(frame.stride), int(frame.dataSize)
+        if ((int(frame.width), int(frame.height)) != stream.size or stride < width * pixel
+                or size < stride * (height - 1) + width * pixel):
+            raise SensorError(
+                f"{self._name}: a {stream.kind} frame of {frame.width}x{frame.height} in {size} "
+                f"bytes, expected {width}x{height} (cropping is not supported)")
+        # The next read reuses this memory, and closing frees it.
+        memory = ctypes.string_at(int(frame.data), size)
+        rows: NDArray[np.uint8] = np.ndarray(
+            (height, width * pixel), np.uint8, memory, 0, (stride, 1))
+        image: NDArray[Any] = rows.copy().reshape(height, width, pixel)
+        if stream.kind == DEPTH:
+            image = image.view(np.uint16)[..., 0]
+            if stream.pixel_format == int(self._openni2.PIXEL_FORMAT_DEPTH_100_UM):
+                image = ((image.astype(np.uint32) + 5) // 10).astype(np.uint16)
+        return np.ascontiguousarray(image[:, ::-1]) if stream.mirrored else image
+
+
+def _accepted(openni2: Any, kind: str) -> dict[int, str]:
+    if kind == DEPTH:
+        return {int(openni2.PIXEL_FORMAT_DEPTH_1_MM): "depth in 1 mm",
+                int(openni2.PIXEL_FORMAT_DEPTH_100_UM): "depth in 100 um"}
+    return {int(openni2.PIXEL_FORMAT_RGB888): "RGB888"}
+
+
+def _format_name(pixel_format: Any) -> str:
+    return repr(pixel_format).split("PIXEL_FORMAT_")[-1]
+

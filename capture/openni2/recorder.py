@@ -1,0 +1,96 @@
+"""Recording a live sensor to an `.oni` file with OpenNI2's own recorder."""
+
+import os
+import time
+from pathlib import Path
+
+from denseface.capture.errors import SensorError, SensorTimeoutError
+from denseface.capture.openni2 import LiveSource
+from denseface.capture.openni2._library import load, reason
+from denseface.capture.openni2._oni_file import check_oni, frames_so_far
+from denseface.capture.openni2._path import plain_name
+from denseface.capture.openni2._streams import COLOR, DEPTH
+
+__all__ = ["record"]
+
+_SILENCE_S = 3.0
+_POLL_S = 0.01
+
+
+def record(device_uri: str | None, path: str | Path, frames: int) -> int:
+    """Record a live sensor.
+
+    Depth is stored without loss (but the codec can get some of the last 32 pixels of the last row
+    wrong), colour as JPEG. OpenNI2's recorder starts the stamps of each stream at 0, so the skew
+    between the two is not in the file.
+
+    Parameters
+    ----------
+    device_uri : OpenNI2's URI of the device; None for the first one
+    path : of the `.oni`; it appears only when it is whole
+    frames : how many pairs to wait for; a sensor that goes on may add one or two to the file
+
+    Returns
+    -------
+    how many frames of each stream the file holds at least
+
+    Raises
+    ------
+    SensorError
+        No sensor, or the recorder refuses.
+    SensorTimeoutError
+        Too few frames came.
+    """
+    if frames < 1:
+        raise ValueError(f"frames must be at least 1, got {frames}")
+    path = Path(path)
+    part = path.with_name(f".{os.getpid()}.part.oni")
+    try:
+        _record(device_uri, part, frames)
+        _, end = check_oni(part)
+        found = frames_so_far(part)
+        if found < frames:
+            raise SensorTimeoutError(
+                f"{path}: the sensor fell silent after {found} of {frames} frames")
+        # The recorder reserves space in steps and leaves the rest behind.
+        os.truncate(part, end)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+    return found
+
+
+def _record(device_uri: str | None, part: Path, frames: int) -> None:
+    openni2 = load()
+    from primesense.utils import OpenNIError
+
+    with LiveSource(device_uri, start=False) as source:
+        try:
+            with plain_name(part) as name:
+                recorder = openni2.Recorder(name)
+            try:
+                # Both before the start, or the second stream's frames are not in the file.
+                for each in (DEPTH, COLOR):
+                    recorder.attach(source.streams.handle(each), each == COLOR)
+                recorder.start()
+                source.start()
+                left = {DEPTH: frames, COLOR: frames}
+                while max(left.values()) > 0:
+                    kind = source.streams.wait(_SILENCE_S)
+                    if kind is None:
+                        break
+                    source.streams.read(kind)
+                    left[kind] -= 1
+                _wait_until_written(part, frames)
+                recorder.stop()
+            finally:
+                recorder.close()
+        except OpenNIError as error:
+            raise SensorError(f"{part}: recording failed: {reason(error)}") from error
+
+
+def _wait_until_written(part: Path, frames: int) -> None:
+    """The recorder writes in a thread of its own; what it has not begun at its stop, it drops."""
+    deadline = time.monotonic() + _SILENCE_S
+    while frames_so_far(part) < frames and time.monotonic() < deadline:
+        time.sleep(_POLL_S)

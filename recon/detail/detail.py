@@ -1,0 +1,201 @@
+"""Stage 5, `best` preset: what a broad fit smooths away, given back where it is more than noise.
+
+One smoothing for the whole face is a compromise: cheeks and forehead could bear more of it, lips
+and eyelids less. So the fit is broad, and what it leaves of the seeds is averaged around each
+place by a narrow Gaussian. Of this detail the local Wiener gain of Lee, 1980,
+doi:10.1109/TPAMI.1980.4766994, keeps what stands above noise.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from denseface.recon.detail.holes import fill_holes
+from denseface.recon.detail.mirror_plane import find_plane
+from denseface.recon.detail.rim import BROADER, Rim, broad_average, halved
+from denseface.recon.detail.shading import shading_detail
+from denseface.recon.detail.symmetry import helped_by_mirror
+from denseface.recon.numerics.local_means import blurred, enlarged, local_means
+from denseface.recon.numerics.percentile import percentile
+from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, read_between, share_out
+from denseface.recon.propagation._image_kernels import add_between
+from denseface.recon.registration.registration import LookUp
+from denseface.recon.surface._sheet_kernels import face_field, lay_under, shares, slopes
+from denseface.recon.surface.rbf import Surface
+from denseface.recon.surface.support import Support
+
+__all__ = ["DetailedSurface", "add_detail"]
+
+Image = NDArray[np.float32]
+
+# Below this share of the usual weight lies a hole, or the rim: a broad average is taken there.
+_FULL = 0.4
+# An average fades where the seeds within reach weigh less than this share of what is usual.
+_FADING = 0.005
+# Over what radius detail counts as local (standard deviation).
+_WINDOW_MM = 11.0
+# The smoothest part of a face shows what noise alone adds to the detail, away from the rim, where
+# broad averages leave less of it.
+_NOISE_PERCENTILE = 26
+_AT_RIM = 0.5
+# What lies within about so many spacings of the rim tells little of the noise, and of the other
+# side.
+_FADING_RIM = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class DetailedSurface:
+    """A fit with what was added to it, between the points of a grid.
+
+    Attributes
+    ----------
+    sheet : (3, rows, columns) float32: height, mm, and slopes along x and y
+    support : whose grid this is, and where the seeds support the surface
+    noise : standard deviation of the seeds about the surface, mm
+    """
+
+    sheet: Image
+    support: Support
+    noise: float
+
+    def on_grid(self, xs: NDArray[np.float64], ys: NDArray[np.float64]) -> Image:
+        """Evaluate on an axis-aligned grid: (k,), (m,) mm -> (m, k) mm."""
+        return self.sampled(xs, ys)[0]
+
+    def sampled(
+        self, xs: NDArray[np.float64], ys: NDArray[np.float64]
+    ) -> tuple[Image, Image, Image]:
+        """Give f, df/dx, df/dy on an axis-aligned grid at once, in single precision.
+
+        As `Surface.sampled`: (k,), (m,) mm -> (m, k) each.
+        """
+        columns, rows = self.support.places(xs, ys)
+        found = np.zeros((3, len(rows), len(columns)), np.float32)
+        for one, known in zip(found, self.sheet, strict=True):
+            add_between(one, known, rows, columns)
+        return found[0], found[1], found[2]
+
+
+def add_detail(
+    base: Surface, points: NDArray[np.float32], spacing: float, radius: float, *,
+    symmetry: bool = False, look_up: LookUp | None = None,
+) -> DetailedSurface:
+    """Add to a broad fit what its seeds show besides.
+
+    Parameters
+    ----------
+    base : a fit of `points`
+    points : (n, 3) float32, mm, depth camera frame
+    spacing : mean spacing of the points, mm
+    radius : of the average (standard deviation), mm
+    symmetry : let each side of the face be helped by the other's mirror image
+    look_up : tells points' colours, of whose shading more detail is taken; None: of depth alone
+    """
+    supported = Support.of(points, spacing)
+    xs, ys, step, support = supported.xs, supported.ys, supported.step, supported.inside
+    columns, rows = (((points[:, axis] - low) / step).astype(np.float32)
+                     for axis, low in ((0, xs[0]), (1, ys[0])))
+    grid = _Seeded(columns, rows, support.shape)
+    heights = base.heights(xs, ys)
+    rest = points[:, 2] - grid.at_seeds(heights)
+    usual = np.float32((step / spacing) ** 2)
+    weight, detail = (blurred(one, _unshared(radius / step)) for one in grid.sums(rest))
+    seeded, missing = shares(weight, detail, float(usual) * _FADING, float(usual) * _FULL)
+    rim = Rim.of(support, step / spacing)
+    # So broad an average needs no more than every fourth point.
+    cells = grid.halved().halved()
+    counts, sums = cells.sums(rest)
+    broad = broad_average(counts, sums, BROADER * radius / (4 * step), 16 * float(usual), rim, 2)
+    lay_under(detail, enlarged(broad, detail.shape), enlarged(rim.nearness, detail.shape), missing)
+    filled, hole = fill_holes(counts, sums, missing, rim, heights, detail, spacing)
+    detail *= 1 - hole
+
+    # How much of it is more than noise varies slowly: every second point is enough.
+    some = np.s_[::2, ::2]
+    shown = support[some].astype(np.float32)
+    inner = np.clip(2 * blurred(shown, _FADING_RIM) - 1, 0, 1) * shown
+    field = face_field(heights, detail, seeded, inner, spacing)
+    gain, noise = _gain(
+        field[..., 3], inner * (1 - hole[some]), rim.nearness < _AT_RIM, spacing)
+    origin = float(xs[0]), float(ys[0])
+    plane = find_plane(field, origin, spacing) if symmetry else None
+    kept = gain * detail[some]
+    between = [(np.arange(side) / 2).astype(np.float32) for side in detail.shape]
+    share = np.zeros_like(detail)
+    add_between(share, gain, *between)
+    detail *= share
+    more = np.zeros_like(shown)
+    if plane is not None:
+        more = helped_by_mirror(field, kept, filled[some], hole[some], plane, noise, _WINDOW_MM,
+                                origin, spacing)
+    if look_up is not None:
+        surface = heights[some] + detail[some] + filled[some] + more
+        across, down = np.empty_like(surface), np.empty_like(surface)
+        slopes(surface, spacing, across, down)
+        more += shading_detail(
+            surface, shown * rim.within, (across, down), (xs[::2], ys[::2]), look_up)
+    add_between(detail, more, *between)
+
+    smaller = halved(heights)
+    across, down = np.empty_like(smaller), np.empty_like(smaller)
+    slopes(smaller, 2 * step, across, down)
+    detail += enlarged(rim.frayed_depth((across, down), spacing), detail.shape)
+    detail += filled
+    sheet = np.empty((3, *detail.shape), np.float32)
+    np.add(heights, detail, out=sheet[0])
+    slopes(sheet[0], step, sheet[1], sheet[2])
+    return DetailedSurface(sheet, supported, noise=float((rest - grid.at_seeds(detail)).std()))
+
+
+class _Seeded:
+    """Seeds over an image.
+
+    Parameters
+    ----------
+    columns, rows : (n,) float32, where they are, pixels, inside the image and off its last row
+        and column
+    shape : (rows, columns) of the image
+    """
+
+    def __init__(self, columns: Image, rows: Image, shape: tuple[int, ...]) -> None:
+        self.columns, self.rows, self.shape = columns, rows, shape
+
+    def halved(self) -> "_Seeded":
+        """The same over an image of which each pixel is four of these."""
+        half = np.float32(0.5)
+        columns, rows = (half * (one - half) for one in (self.columns, self.rows))
+        return _Seeded(columns, rows, ((self.shape[0] + 1) // 2, (self.shape[1] + 1) // 2))
+
+    def sums(self, values: Image) -> tuple[Image, Image]:
+        """Sum the seeds, and their values, each shared among the four pixels around it."""
+        counts, sums = np.zeros(self.shape, np.float32), np.zeros(self.shape, np.float32)
+        share_out(self.columns, self.rows, values, counts, sums)
+        return counts, sums
+
+    def at_seeds(self, image: Image) -> Image:
+        """Interpolate an image, (n,)."""
+        return read_between(image, self.columns, self.rows)
+
+
+def _unshared(sigma: float) -> float:
+    """The radius of a blur, less what sharing a value among four pixels has blurred already."""
+    return math.sqrt(sigma * sigma - BILINEAR_VARIANCE)
+
+
+def _gain(
+    detail: Image, inner: Image, narrow: NDArray[np.bool_], step: float
+) -> tuple[Image, float]:
+    """How much of the detail is not noise, 0-1, place by place, and the variance of noise.
+
+    detail : mm along the normal: along z, noise and detail both grow where a face is steep
+    inner : 0-1, what counts as face
+    narrow : where the detail is of narrow averages; where it is so nowhere, all of it tells
+    """
+    local, = local_means(inner, _WINDOW_MM / (2 * step), detail * detail)
+    local = enlarged(local, detail.shape)
+    seen = local[(inner > 0) & narrow] if narrow.any() else local[inner > 0]
+    noise = percentile(seen, _NOISE_PERCENTILE) if seen.size else 0.0
+    gain = 1 - np.float32(noise) / np.maximum(local, np.float32(max(noise, 1e-12)))
+    return np.asarray(gain, np.float32), noise

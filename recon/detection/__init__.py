@@ -1,0 +1,1 @@
+"""Stage 2: the face in the colour image, confirmed by its depth."""

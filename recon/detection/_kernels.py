@@ -1,0 +1,83 @@
+"""The loops of detection over the registered depth, compiled."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from denseface.recon.numerics.jit import compiled
+
+__all__ = ["depths_in_box", "fill_layers", "middle_depths", "nearest_in_cells"]
+
+
+@compiled
+def fill_layers(
+    pixels: NDArray[np.float32], color_depth: NDArray[np.float32], visible: NDArray[np.bool_],
+    edges: NDArray[np.float64], cell: float, filled: NDArray[np.uint8],
+) -> None:
+    """Set to 1, layer by layer of depth, the cells of the colour image that hold a depth.
+
+    edges : (layers + 1,), mm, rising
+    cell : side of a cell, pixels of the colour image
+    filled : (layers, rows, columns)
+    """
+    layers, rows, columns = filled.shape
+    for i in range(visible.shape[0]):
+        for j in range(visible.shape[1]):
+            z = color_depth[i, j]
+            if not visible[i, j] or z <= edges[0] or z > edges[layers]:
+                continue
+            layer = 0
+            while z > edges[layer + 1]:
+                layer += 1
+            row = int((pixels[i, j, 1] + 0.5) / cell)
+            column = int((pixels[i, j, 0] + 0.5) / cell)
+            filled[layer, min(row, rows - 1), min(column, columns - 1)] = 1
+
+
+@compiled
+def nearest_in_cells(
+    pixels: NDArray[np.float32], color_depth: NDArray[np.float32], visible: NDArray[np.bool_],
+    cell: float, nearest: NDArray[np.float32],
+) -> None:
+    """Lower each of the (rows, columns) cells to the nearest depth in it, mm."""
+    rows, columns = nearest.shape
+    for i in range(visible.shape[0]):
+        for j in range(visible.shape[1]):
+            if visible[i, j]:
+                row = min(int((pixels[i, j, 1] + 0.5) / cell), rows - 1)
+                column = min(int((pixels[i, j, 0] + 0.5) / cell), columns - 1)
+                nearest[row, column] = min(nearest[row, column], color_depth[i, j])
+
+
+@compiled
+def depths_in_box(
+    pixels: NDArray[np.float32], color_depth: NDArray[np.float32], visible: NDArray[np.bool_],
+    left: float, top: float, width: float, height: float,
+) -> NDArray[np.float64]:
+    """Give the (n, 3) u, v and z of what the colour camera sees in a box.
+
+    u and v are -1 and 1 at the sides of the box.
+    """
+    found = np.empty((visible.size, 3))
+    count = 0
+    for i in range(visible.shape[0]):
+        for j in range(visible.shape[1]):
+            if not visible[i, j]:
+                continue
+            u = (pixels[i, j, 0] - left) / width * 2 - 1
+            v = (pixels[i, j, 1] - top) / height * 2 - 1
+            if abs(u) < 1 and abs(v) < 1:
+                found[count, 0], found[count, 1], found[count, 2] = u, v, color_depth[i, j]
+                count += 1
+    return found[:count]
+
+
+@compiled
+def middle_depths(depths: NDArray[np.float64], middle: float) -> NDArray[np.float64]:
+    """Give the z of (n, 3) u, v and z with both u and v nearer to 0 than `middle`."""
+    found = np.empty(len(depths))
+    count = 0
+    for i in range(len(depths)):
+        found[count] = depths[i, 2]
+        if abs(depths[i, 0]) < middle and abs(depths[i, 1]) < middle:
+            count += 1
+    return found[:count]

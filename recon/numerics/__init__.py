@@ -1,0 +1,1 @@
+"""Numerical tools that know no faces; import the one that is needed."""

@@ -1,0 +1,1 @@
+"""Stage 6: the dense cloud, its colours and its standard error."""

@@ -1,0 +1,137 @@
+"""Stage 6: the seeds propagated over their support, holes filled, coloured by their neighbours.
+
+Inside a hole there are no neighbours to be coloured by, often because it is dark there: brows,
+hair, pupils. Their place in the colour image says more than the hole's border.
+"""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from denseface.recon.detail.detail import DetailedSurface
+from denseface.recon.face import DenseCloud
+from denseface.recon.numerics.push_pull import average_neighbors
+from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, places
+from denseface.recon.propagation._image_kernels import collect, unset
+from denseface.recon.propagation.uncertainty import sources_of_error, standard_error
+from denseface.recon.registration.registration import LookUp
+from denseface.recon.segmentation.segment import Seeds
+from denseface.recon.surface.rbf import Surface
+from denseface.recon.surface.support import Support
+
+__all__ = ["densify"]
+
+# In units of the mean spacing.
+# A colour is the mean of the seeds around it, weighted by a Gaussian of this radius.
+_COLOR_RADIUS = 0.58
+_COLOR_STEP = 0.6
+# In pixels; no blur is less.
+_LEAST_RADIUS = 0.4
+# Farther than this from every seed, over (X, Y), a point is in a hole.
+_HOLE = 1.5
+# Steeper than this, and farther than that from every seed, the fit bridges a step: no sensor reads
+# what it sees at so grazing an angle.
+_STEEP = 4.0
+_UNREAD = 0.7
+# But for specks, of fewer points of the support's grid each way.
+_SPECK = 2
+
+
+def densify(
+    seeds: Seeds,
+    surface: Surface | DetailedSurface,
+    spacing: float,
+    ratio: float,
+    share: float,
+    look_up: LookUp | None = None,
+) -> DenseCloud:
+    """Sample the surface on a regular grid, `ratio` points for each seed.
+
+    Parameters
+    ----------
+    seeds : the initial cloud
+    surface : the fit over (X, Y)
+    spacing : mean spacing of the seeds, mm
+    ratio : dense points for each seed
+    share : of the residuals' variance, how much the surface keeps as error: `noise_share`
+    look_up : tells the colours of points in holes; None, and their border's colours fill them
+    """
+    supported, sheet = _sheet(seeds.points, surface, spacing)
+    slopes = sheet[1], sheet[2]
+    step = float(np.sqrt(supported.area / (ratio * len(seeds.points))))
+    supported = _unbridged(supported, slopes, spacing)
+    xs, ys, support = supported.on_grid(step)
+    origin = float(xs[0]), float(ys[0])
+
+    sources = sources_of_error(
+        seeds.points, supported.inside, sheet[0], slopes, origin, supported.step, spacing)
+    error = standard_error(sources, share, detailed=isinstance(surface, DetailedSurface))
+    sigma = np.asarray(cv2.copyMakeBorder(error, 0, 1, 0, 1, cv2.BORDER_REPLICATE), np.float32)
+    # Colours have no detail finer than the seeds: every so many points are enough.
+    every = max(1, round(_COLOR_STEP * spacing / step))
+    colors = _colors(seeds, origin, every * step, spacing, _coarser(support, every))
+    columns, rows = supported.places(xs, ys)
+    points, normals, colors, sigma, cells = collect(
+        support, xs, ys, sheet, rows, columns, colors, every, sigma, sources.every)
+    if look_up is not None:
+        near = supported.near_seeds(_HOLE * spacing)
+        hole = unset(near, rows, columns, cells)
+        if len(hole):
+            own, seen = look_up(points[hole])
+            colors[hole[seen]] = own[seen]
+    return DenseCloud(
+        points=points,
+        colors=colors,
+        normals=normals,
+        sigma=sigma,
+        cells=cells,
+        grid_shape=support.shape,
+        grid_step_mm=step,
+    )
+
+
+def _sheet(
+    points: NDArray[np.float32], surface: Surface | DetailedSurface, spacing: float
+) -> tuple[Support, NDArray[np.float32]]:
+    """Give the support, and height and slopes on its grid, (3, rows, columns)."""
+    if isinstance(surface, DetailedSurface):
+        return surface.support, surface.sheet
+    supported = Support.of(points, spacing)
+    return supported, np.stack(surface.sampled(supported.xs, supported.ys))
+
+
+def _unbridged(
+    supported: Support, slopes: tuple[NDArray[np.float32], NDArray[np.float32]], spacing: float
+) -> Support:
+    """Leave out where the fit bridges a step that nothing was read of."""
+    along, down = slopes
+    bridge = along * along + down * down > np.float32(_STEEP**2)
+    if not bridge.any():
+        return supported
+    bridge &= supported.near_seeds(_UNREAD * spacing) == 0
+    # A surface riddled with pinholes is worse than a bridge.
+    kernel = np.ones((_SPECK, _SPECK), np.uint8)
+    opened = cv2.dilate(cv2.erode(bridge.view(np.uint8), kernel), kernel, anchor=(0, 0))
+    return supported.without(np.asarray(opened > 0))
+
+
+def _colors(
+    seeds: Seeds, origin: tuple[float, float], step: float, spacing: float,
+    wanted: NDArray[np.bool_],
+) -> NDArray[np.uint8]:
+    """The seeds' mean colour on a grid of its own, (rows, columns, 3)."""
+    # Sharing a colour among four pixels, and reading between four, blurs by as much.
+    radius = np.sqrt(max((_COLOR_RADIUS * spacing / step) ** 2 - 2 * BILINEAR_VARIANCE,
+                         _LEAST_RADIUS**2))
+    return average_neighbors(seeds.colors, places(seeds.points, origin, step), wanted,
+                             float(radius), spacing / step)
+
+
+def _coarser(support: NDArray[np.bool_], every: int) -> NDArray[np.bool_]:
+    """Which of every so many points each way are next to a supported one."""
+    rows, columns = (-(-side // every) for side in support.shape)
+    whole = cv2.copyMakeBorder(
+        support.view(np.uint8) * 255, 0, (rows + 1) * every - support.shape[0], 0,
+        (columns + 1) * every - support.shape[1], cv2.BORDER_CONSTANT, value=0)
+    any_in = cv2.resize(whole, (columns + 1, rows + 1), interpolation=cv2.INTER_AREA)
+    return cv2.dilate(any_in, np.ones((2, 2), np.uint8), anchor=(1, 1)) > 0

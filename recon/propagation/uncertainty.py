@@ -1,0 +1,146 @@
+"""Stage 6: how far off each dense point may be, along its viewing ray.
+
+    sigma^2 = k r^2 (1 + H d) + S (h g^2)^2 + E e (h g)^2
+
+r, mm : what the seeds around the point are off the surface, root mean square: the sensor's noise
+    and detail that smoothing took away, k of it left in the surface (`noise_share`)
+d, spacings : how far into a hole: distance from the nearest seed, less one
+h, mm : mean spacing of the seeds, which grows with the distance from the camera
+g : slope of the surface: where it is steep, a reading's sideways jitter, as large as h, is depth
+e, 0-1 : how near the rim, where seeds lie on one side alone; 1 on it
+
+A Gaussian process has its own posterior variance, but only where noise is independent from seed
+to seed and the fit has no bias: a Kinect's is correlated over several pixels, and lips, lids and
+nostrils are bias. So the form is made of what an error can come from, and the coefficients are
+fitted by maximum likelihood to simulated frames with known truth (`python -m bench.calibration
+--fit`, on the heads that settings are chosen on; docs/decisions/0007-sigma.md).
+"""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from denseface.recon.numerics._push_pull_kernels import blur
+from denseface.recon.numerics.morphology import gaussian
+from denseface.recon.propagation._uncertainty_kernels import coarsen
+from denseface.recon.settings import Settings
+
+__all__ = ["Sources", "average_cutoff", "cutoff", "noise_share", "sources_of_error",
+           "standard_error"]
+
+# From bench/calibration.py: H, S, E above, E of a fit without detail, which has no broad average at
+# the rim, and those of `noise_share`.
+_HOLE = 0.4
+_SLOPE = 0.075
+_RIM = 1.46
+_RIM_ALONE = 2.4
+_SHARE = 90.0
+_DETAIL_PART = 0.12
+
+# Over what radius (standard deviation) residuals and slopes count as local, spacings.
+_WINDOW = 2.5
+# As much as so many seeds for each spacing squared, the whole face's residuals count too.
+_PRIOR = 0.03
+# What averaging tens of readings in whole millimetres leaves of their 0.29 mm.
+_LEAST_MM = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """The parts of sigma^2 before their coefficients, on every so many points of a grid.
+
+    Attributes
+    ----------
+    noise, hole, slope, rim : r^2, r^2 d, (h g^2)^2, e (h g)^2, (rows, columns) float32, mm^2
+    every : grid points from node to node
+    """
+
+    noise: NDArray[np.float32]
+    hole: NDArray[np.float32]
+    slope: NDArray[np.float32]
+    rim: NDArray[np.float32]
+    every: int
+
+
+def noise_share(settings: Settings) -> float:
+    """Give k: how much of the residuals' variance is the error left in the surface.
+
+    A smoother lets pass what is longer than some L, where signal and smoothing weigh the same: of
+    noise, a share in proportion to (h / L)^2. Detail that is added to the fit brings back a part
+    of the share of its own average.
+    """
+    share = _SHARE * cutoff(settings.r0_factor, settings.smoothing) ** 2
+    if settings.detail_factor is not None:
+        share += _DETAIL_PART * _SHARE * average_cutoff(settings.detail_factor) ** 2
+    return share
+
+
+def cutoff(r0_factor: float, smoothing: float) -> float:
+    """Give h / L of a fit, L = pi R0 / sqrt(ln(pi (R0/h)^2 / lambda))."""
+    weight = max(math.pi * r0_factor**2 / smoothing, math.e)
+    return math.sqrt(math.log(weight)) / (math.pi * r0_factor)
+
+
+def average_cutoff(detail_factor: float) -> float:
+    """Give h / L of a Gaussian average: of a wave of length L, half is left."""
+    return math.sqrt(math.log(2) / 2) / (math.pi * detail_factor)
+
+
+def sources_of_error(
+    points: NDArray[np.float32],
+    support: NDArray[np.bool_],
+    heights: NDArray[np.float32],
+    slopes: tuple[NDArray[np.float32], NDArray[np.float32]],
+    origin: tuple[float, float],
+    step: float,
+    spacing: float,
+) -> Sources:
+    """Find what an error can come from, place by place.
+
+    Parameters
+    ----------
+    points : (n, 3) float32, mm, the seeds, depth camera frame
+    support : (rows, columns) bool, where the dense grid has points
+    heights, slopes : (rows, columns) float32, mm, and dz/dx, dz/dy; used on the support alone
+    origin : (x, y) of the grid's first point, mm
+    step : distance of its points, mm
+    spacing : h, mean spacing of the seeds, mm
+    """
+    every = max(1, round(spacing / step))
+    node = every * step / spacing
+    planes = coarsen(points, support, heights, *slopes, origin, step, every)
+    far = cv2.distanceTransform((planes[..., 2] == 0).astype(np.uint8), cv2.DIST_L2, 5)
+    seeds, squares = planes[..., 2].sum(dtype=np.float64), planes[..., 3].sum(dtype=np.float64)
+    covered, slope, count, square = cv2.split(blur(planes, gaussian(_WINDOW / node)))
+    prior = np.float32(_PRIOR * node**2)
+    noise = (square + prior * np.float32(squares / max(seeds, 1.0))) / (count + prior)
+    hole = noise * np.maximum(np.float32(node) * far - 1, np.float32(0))
+    slope /= np.maximum(covered, np.float32(1e-3))
+    across = np.float32(spacing**2)
+    edge = np.clip(2 - 2 * covered, np.float32(0), np.float32(1))
+    return Sources(noise=np.asarray(noise, np.float32), hole=np.asarray(hole, np.float32),
+                   slope=np.asarray(across * slope * slope, np.float32),
+                   rim=np.asarray(across * slope * edge, np.float32), every=every)
+
+
+def standard_error(sources: Sources, share: float, *, detailed: bool) -> NDArray[np.float32]:
+    """Give sigma on the nodes of its sources.
+
+    Parameters
+    ----------
+    sources : of this face
+    share : k, of the settings that the surface was fitted with
+    detailed : whether detail was added to the fit
+
+    Returns
+    -------
+    (rows, columns) float32, mm: 68 % of the errors along the viewing ray are within it, 95 % within
+    twice
+    """
+    rim = np.float32(_RIM if detailed else _RIM_ALONE)
+    variance = (np.float32(share) * (sources.noise + np.float32(_HOLE) * sources.hole)
+                + np.float32(_SLOPE) * sources.slope + rim * sources.rim)
+    return np.asarray(np.maximum(np.sqrt(variance), np.float32(_LEAST_MM)), np.float32)

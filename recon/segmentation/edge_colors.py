@@ -1,0 +1,100 @@
+"""The seeds' colours: none of the background's along the outline, none where another hides it."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from denseface.recon.numerics.morphology import at_pixels
+from denseface.recon.numerics.push_pull import average_missing
+from denseface.recon.registration.registration import Registration
+from denseface.recon.segmentation._edge_color_kernels import box_sums, take_out
+
+__all__ = ["seed_colors"]
+
+# How far inside the outline the background may still mix into a depth pixel's colour, and how far
+# inside it a pixel may lie that shows nothing else: the sensor's edge is frayed.
+_RIM = np.ones((5, 5), np.uint8)
+_FRAYED = np.ones((7, 7), np.uint8)
+# Around the face, where its background is looked for.
+_AROUND = np.ones((9, 9), np.uint8)
+# How many pixels wide the windows are in which the face's own colour, and its background's, are
+# looked for. Background farther aside may have another colour: it is never taken out, but where
+# none is known nearby, as in the projector's shadow, what shows it is not the face's own.
+_INSIDE = 7
+_BESIDE = 25
+_FARTHER = 81
+_MARGIN_PX = 16
+# What lies so far behind the face is background, not hair, neck or a hand.
+_BEHIND_MM = 25.0
+# Two colours nearer than this, of 255, are not told apart.
+_ALIKE = 10.0
+# With this share of the background, nothing of the face's own is left in a colour.
+_SHARE = 0.35
+# And with this share of a background that is known from farther aside alone.
+_MUCH = 0.5
+# A mixture lies on the way from the face's colour to the background's, within this share of it
+# and so many of 255: hair before a wall does not.
+_ASIDE = 0.5
+_ASIDE_LEAST = 10.0
+# Within the rim's inner border, a background less different (of 255) would not be noticed.
+_CONTRAST = 60.0
+
+
+def seed_colors(
+    registered: Registration, face: NDArray[np.bool_], solid: NDArray[np.uint8]
+) -> NDArray[np.uint8]:
+    """Give the colour of each pixel of the face, (n, 3) uint8, RGB, in the order of its rows.
+
+    Where the colour camera does not see it, its neighbours' mean. Along the outline, what of the
+    colour behind is in it is taken out, and where that is much, the neighbours' mean again. Where
+    nothing is measured behind and beside it, no outline is trusted.
+
+    Parameters
+    ----------
+    registered : the depth tied to the colour image
+    face : (H, W) bool
+    solid : (H, W) uint8, 0 or 1, the same with its holes filled: holes have no outline
+    """
+    if not face.any():
+        return at_pixels(registered.colors, face)
+    window = _window(face, _MARGIN_PX)
+    face, solid = face[window], solid[window]
+    colors = registered.colors[window].copy()
+    seen = registered.visible[window] & face
+    inner = seen & (cv2.erode(solid, _RIM) > 0)
+    inner = inner if inner.any() else seen
+    if not inner.any():
+        return at_pixels(colors, face)
+    deep = inner & (cv2.erode(solid, _FRAYED) > 0)
+    deep = deep if deep.any() else inner
+    behind = _behind(registered, window, face, solid)
+    own = inner.copy()
+    edge = seen & ~deep
+    take_out(colors, own, edge, box_sums(colors, deep, edge, _INSIDE // 2),
+             box_sums(colors, behind, edge, _BESIDE // 2),
+             box_sums(colors, behind, edge, _FARTHER // 2), _ALIKE, _SHARE, _ASIDE, _ASIDE_LEAST,
+             _CONTRAST, _MUCH)
+    # What is missing is found in the face alone.
+    close = _window(face, 0)
+    colors, own, face = colors[close].copy(), own[close].copy(), face[close].copy()
+    average_missing(colors, own, face & ~own)
+    return at_pixels(colors, face)
+
+
+def _window(face: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
+    """The rows and columns of the face, and so many more each way."""
+    rows, columns = (np.flatnonzero(face.any(axis=axis)) for axis in (1, 0))
+    return (slice(max(rows[0] - margin, 0), rows[-1] + margin + 1),
+            slice(max(columns[0] - margin, 0), columns[-1] + margin + 1))
+
+
+def _behind(
+    registered: Registration, window: tuple[slice, slice], face: NDArray[np.bool_],
+    solid: NDArray[np.uint8],
+) -> NDArray[np.bool_]:
+    """The visible pixels beside the face that are farther than any of it nearby."""
+    z = registered.points[window][..., 2]
+    farthest = cv2.dilate(np.where(face, z, np.float32(0)), _AROUND)
+    behind: NDArray[np.bool_] = (
+        registered.visible[window] & (solid == 0) & (z > farthest + np.float32(_BEHIND_MM)))
+    return behind

@@ -1,0 +1,143 @@
+"""Where the seeds support a surface: over them and the holes they enclose, not past their rim."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Self
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from denseface.recon.numerics.local_means import blurred
+from denseface.recon.numerics.morphology import disc, fill_holes
+from denseface.recon.numerics.scatter import bounds, mark
+from denseface.recon.propagation._image_kernels import above
+from denseface.recon.surface._sheet_kernels import left_out
+
+__all__ = ["Support"]
+
+# Points of its grid for each spacing.
+_FINENESS = 2
+# In units of the mean spacing. Gaps narrower than twice the closing are none; the support ends at
+# the rim, counted outward from the outermost seeds.
+_CLOSING = 1.2
+_RIM = 0.2
+# The sensor leaves an edge frayed, over several pixels at once: its outline is evened out by a
+# Gaussian of this radius, where seeds are few by no more than the second: a share of the side of a
+# square as large as they are. It grows into bays by no more than the third.
+_EVEN = 4.0
+_EVEN_PART = 0.1
+_GROWTH = 1.0
+# Pixels for that radius: more change nothing.
+_EVEN_PX = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """The places over the seeds, with enclosed holes but nothing past the rim.
+
+    Attributes
+    ----------
+    xs, ys : (columns,), (rows,) float64, mm, a grid of two points for each spacing
+    step : distance of its points, mm
+    seeded : (rows, columns) uint8, 1 at the points nearest to the seeds, 0 elsewhere
+    margin : (rows, columns) float32, above 0 where supported, between the points above `level`
+    level : a disc of so few pixels reaches farther than its radius
+    """
+
+    xs: NDArray[np.float64]
+    ys: NDArray[np.float64]
+    step: float
+    seeded: NDArray[np.uint8]
+    margin: NDArray[np.float32]
+    level: float
+
+    @classmethod
+    def of(cls, points: NDArray[np.float32], spacing: float) -> Self:
+        """Find where seeds support a surface.
+
+        Parameters
+        ----------
+        points : (n, 3) float32, mm
+        spacing : mean spacing of the seeds, mm
+        """
+        step = spacing / _FINENESS
+        reach = (_CLOSING + _GROWTH) * spacing
+        left, right, top, bottom = bounds(points)
+        xs, ys = (_axis(low - reach, high + reach, step)
+                  for low, high in ((left, right), (top, bottom)))
+        seeded = mark(points, (xs[0], ys[0]), step, len(ys), len(xs))
+        around = disc(_CLOSING * _FINENESS)
+        closed = fill_holes(np.asarray(cv2.dilate(seeded, around), np.uint8))
+        even = min(_EVEN * _FINENESS, _EVEN_PART * math.sqrt(np.count_nonzero(closed)))
+        # Of a Gaussian that far inside a straight edge, so much is inside.
+        least, pixels = (0.5 + 0.5 * math.erf((closing - _RIM * _FINENESS) / (even * math.sqrt(2)))
+                         for closing in (_CLOSING * _FINENESS,
+                                         math.sqrt(np.count_nonzero(around) / math.pi)))
+        margin = _broadly_blurred(closed, even) - np.float32(least)
+        most = cv2.dilate(closed, disc(_GROWTH * _FINENESS))
+        return cls(xs, ys, step, seeded, margin, pixels - least).without(most == 0)
+
+    @property
+    def inside(self) -> NDArray[np.bool_]:
+        """Which of the grid's points are supported, (rows, columns)."""
+        return self.margin > 0
+
+    @property
+    def area(self) -> float:
+        """Of the supported places, mm^2."""
+        return float(np.count_nonzero(self.inside) * self.step**2)
+
+    def near_seeds(self, radius: float) -> NDArray[np.uint8]:
+        """Which of the grid's points have a seed within a radius, mm; 0 or 1."""
+        return np.asarray(cv2.dilate(self.seeded, disc(radius / self.step)), np.uint8)
+
+    def without(self, places: NDArray[np.bool_]) -> Self:
+        """Give the same without some of the grid's points, up to half of the way to the next."""
+        return replace(self, margin=left_out(self.margin, places, self.level))
+
+    def places(
+        self, xs: NDArray[np.float64], ys: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Give where on the grid columns and rows are, (k,), (m,) mm, in its points, inside it."""
+        columns, rows = (
+            np.clip((values - own[0]) / self.step, 0, len(own) - 1).astype(np.float32)
+            for values, own in ((xs, self.xs), (ys, self.ys)))
+        return columns, rows
+
+    def on_grid(
+        self, step: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+        """Tell it on another grid over the same places.
+
+        Parameters
+        ----------
+        step : distance of grid points, mm
+
+        Returns
+        -------
+        xs, ys : (columns,), (rows,) float64, mm
+        support : (rows, columns) bool
+        """
+        xs, ys = (_axis(own[0], own[-1], step) for own in (self.xs, self.ys))
+        columns, rows = self.places(xs, ys)
+        return xs, ys, above(self.margin, rows, columns, self.level)
+
+
+def _broadly_blurred(image: NDArray[np.uint8], sigma: float) -> NDArray[np.float32]:
+    """Blur by a broad Gaussian, on fewer pixels where they are enough."""
+    every = max(1, int(sigma / _EVEN_PX))
+    rows, columns = (-(-side // every) for side in image.shape)
+    whole = cv2.copyMakeBorder(
+        image.astype(np.float32), 0, rows * every - image.shape[0], 0,
+        columns * every - image.shape[1], cv2.BORDER_CONSTANT, value=0)
+    small = np.asarray(
+        cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA), np.float32)
+    broad = blurred(small, sigma / every)
+    return np.asarray(cv2.resize(broad, whole.shape[::-1], interpolation=cv2.INTER_LINEAR),
+                      np.float32)[:image.shape[0], :image.shape[1]]
+
+
+def _axis(low: float, high: float, step: float) -> NDArray[np.float64]:
+    """Points from the least value to behind the largest, an even number."""
+    return low + step * np.arange(2 * (int((high - low) / step) // 2 + 1), dtype=np.float64)

@@ -1,0 +1,1 @@
+"""What other programs import: press, wait for faces, follow what is published."""

@@ -1,0 +1,122 @@
+"""Following the hub's publications without missing one: no sockets, no waiting."""
+
+import time
+from datetime import datetime
+
+from denseface.service.client.events import Published, outcome_of
+from denseface.service.client.exchanges import Hear, Talk, Talks, ask, deadline
+from denseface.service.errors import ClientTimeoutError, LocalProtocolError, RemoteProtocolError
+from denseface.service.protocol.messages import (
+    CaptureFailed,
+    FaceDone,
+    GetNext,
+    GetStatus,
+    NothingNewer,
+    Request,
+    StartAt,
+    Status,
+)
+from denseface.service.protocol.outputs import Topic
+from denseface.service.protocol.wire import Packet
+
+__all__ = ["TOPICS", "Follower"]
+
+TOPICS = (Topic.FACES, Topic.STATUS)
+"""What must be subscribed to."""
+_PATIENCE_S = 5.0
+"""Longest wait for one answer of a hub that may be restarting, seconds."""
+
+
+class Follower:
+    """Publications in order: what did not come by itself is asked for.
+
+    A number that is skipped, a status that knows a higher number and a new epoch each say that
+    something was missed.
+
+    Parameters
+    ----------
+    after, last, since : as in `Client.published`
+
+    Raises
+    ------
+    LocalProtocolError
+        More than one start is given, `last` is not positive or `since` has no zone.
+    """
+
+    def __init__(
+        self, talks: Talks, after: int | None = None, last: int | None = None,
+        since: datetime | None = None,
+    ) -> None:
+        if (after is not None) + (last is not None) + (since is not None) > 1:
+            raise LocalProtocolError("expected at most one of after, last and since")
+        self._talks = talks
+        self._after = after
+        self._find = talks.start(last, since)
+        self._epoch: str | None = None
+        self._last = 0
+        self._behind = True
+
+    def start(self, timeout: float | None) -> Talk[None]:
+        """Find the place to start at; to be done once, when the subscription is made."""
+        until = deadline(timeout)
+        message = self._find or GetStatus(request=self._talks.number())
+        found = (yield from self._patiently(message, until)).message
+        if not isinstance(found, StartAt if self._find else Status):
+            raise RemoteProtocolError(f"the hub answered with {found.kind} to {message.kind}")
+        self._epoch = found.epoch
+        self._last = found.sequence if self._after is None else self._after
+
+    def next(self, timeout: float | None) -> Talk[Published]:
+        """Wait for the next one."""
+        until = deadline(timeout)
+        while True:
+            packet = yield from (self._fetch(until) if self._behind else self._hear(until))
+            if packet is not None:
+                outcome = outcome_of(packet)
+                self._last = outcome.sequence
+                return outcome
+
+    def _fetch(self, until: float) -> Talk[Packet | None]:
+        packet = yield from self._patiently(
+            GetNext(request=self._talks.number(), after=self._last), until)
+        message = packet.message
+        if not isinstance(message, FaceDone | CaptureFailed | NothingNewer):
+            raise RemoteProtocolError(f"the hub answered with {message.kind} to get_next")
+        if self._new_epoch(message.epoch):
+            return None
+        if isinstance(message, NothingNewer):
+            # Numbers up to this one that did not come were removed.
+            self._last = max(self._last, message.sequence)
+            self._behind = False
+            return None
+        return packet
+
+    def _hear(self, until: float) -> Talk[Packet | None]:
+        packet = yield Hear(until - time.monotonic())
+        if packet is None:
+            self._behind = True
+            return None
+        message = packet.message
+        if isinstance(message, Status):
+            self._behind = self._new_epoch(message.epoch) or message.sequence > self._last
+        elif isinstance(message, FaceDone | CaptureFailed):
+            if self._new_epoch(message.epoch) or message.sequence > self._last + 1:
+                self._behind = True
+            elif message.sequence == self._last + 1:
+                return packet
+        return None
+
+    def _new_epoch(self, epoch: str) -> bool:
+        """Start over where the hub has another store: all in it is new."""
+        if epoch == self._epoch:
+            return False
+        self._epoch, self._last, self._behind = epoch, 0, True
+        return True
+
+    def _patiently(self, message: Request, until: float) -> Talk[Packet]:
+        while True:
+            try:
+                return (yield from ask(message, min(_PATIENCE_S, until - time.monotonic())))
+            except ClientTimeoutError:
+                if time.monotonic() >= until:
+                    raise

@@ -1,0 +1,91 @@
+"""What an operator asks of the hub: dead letters, removal. Needs the role `operator`."""
+
+from collections.abc import Iterator
+from datetime import datetime
+
+from denseface.service.client.blocking import Client
+from denseface.service.client.exchanges import expect
+from denseface.service.errors import RemoteProtocolError, UnknownCaptureError
+from denseface.service.protocol import messages
+
+__all__ = ["Operator"]
+
+
+class Operator(Client):
+    """A `Client` that may also remove."""
+
+    def dead(self, *, timeout: float = 5.0) -> Iterator[messages.DeadLetter]:
+        """List the captures that were given up and are kept, by sequence number.
+
+        Raises
+        ------
+        ClientTimeoutError
+            The hub did not answer in `timeout` seconds; so also below.
+        """
+        after = 0
+        while True:
+            answer = self._ask(
+                messages.ListDead(request=self._request(), after=after), timeout).message
+            letters = expect(answer, messages.DeadLetters).letters
+            yield from letters
+            if not letters:
+                return
+            after = letters[-1].sequence
+
+    def retry(self, capture_id: str, *, timeout: float = 5.0) -> None:
+        """Try a capture again that was given up, with all its attempts.
+
+        Raises
+        ------
+        UnknownCaptureError
+            The hub has no such capture.
+        RequestFailedError
+            It is no dead letter, or its frame is damaged.
+        """
+        expect(self._known(messages.RetryDead(
+            request=self._request(), capture_id=capture_id), timeout), messages.CapturePending)
+
+    def drop(self, capture_id: str, *, timeout: float = 5.0) -> None:
+        """Remove a capture that was given up; raises as `retry`."""
+        expect(self._known(messages.DropDead(
+            request=self._request(), capture_id=capture_id), timeout), messages.Removed)
+
+    def purge(
+        self, *, capture_id: str | None = None, before: datetime | None = None,
+        everything: bool = False, timeout: float = 30.0,
+    ) -> int:
+        """Remove captures, whatever became of them, and give their number.
+
+        Parameters
+        ----------
+        capture_id, before, everything : just one: this id; what was accepted before this time,
+            with a zone; all, with what is in quarantine
+        timeout : for each batch, seconds
+
+        Raises
+        ------
+        RequestFailedError
+            The disk refuses.
+        """
+        removed = 0
+        while True:
+            answer = expect(self._ask(messages.Purge(
+                request=self._request(), capture_id=capture_id, before=before,
+                everything=everything), timeout).message, messages.Removed)
+            removed += answer.removed
+            if not answer.left:
+                return removed
+            if not answer.removed:
+                raise RemoteProtocolError("the hub removes nothing and says that some are left")
+
+    def _known(
+        self, message: messages.RetryDead | messages.DropDead, timeout: float
+    ) -> messages.Message:
+        answer = self._ask(message, timeout).message
+        if isinstance(answer, messages.CaptureUnknown):
+            raise UnknownCaptureError(
+                f"capture {message.capture_id}: the hub has no such capture")
+        return answer
+
+    def _request(self) -> int:
+        return self._talks.number()

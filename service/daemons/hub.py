@@ -1,0 +1,174 @@
+"""The hub's process: the only one that binds. Sockets here, decisions in `service.hub.hub`."""
+
+import math
+import os
+import time
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
+
+import structlog
+import zmq
+
+from denseface.recon.numerics.malloc import keep_freed_memory
+from denseface.recon.settings import Settings
+from denseface.service.errors import LocalProtocolError, RemoteProtocolError
+from denseface.service.hub.hub import Hub
+from denseface.service.hub.previews import PERIOD_S
+from denseface.service.monitoring.observer import Observer
+from denseface.service.monitoring.rejections import Refusals
+from denseface.service.protocol import messages
+from denseface.service.protocol.outputs import Output, Publish, Topic, send, steps
+from denseface.service.protocol.wire import Buffer, Packet, decode_to_hub, encode
+from denseface.service.runtime.failpoints import failpoint
+from denseface.service.runtime.signals import StopSignal
+from denseface.service.security.permissions import missing_role
+from denseface.service.settings import ServiceSettings
+from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage.writer import Threads
+from denseface.service.transport.listener import Incoming
+from denseface.service.transport.listeners import Entrance
+
+__all__ = ["run"]
+
+_TICK_S = 0.25
+_SENT = {"take": "hub.take.sent", "frame_accepted": "hub.frame.acknowledged",
+         "press_accepted": "hub.press.acknowledged", "job": "hub.job.sent"}
+"""Failpoints after a kind of message was sent."""
+
+
+def run(settings: ServiceSettings, recon: Settings) -> int:
+    """Serve until SIGINT or SIGTERM and give the exit status.
+
+    Raises
+    ------
+    AddressError, KeyFileError, HubRunningError, StoreError
+        Where an address or the data folder cannot be had.
+    AuthenticatorStoppedError
+        Nobody could be let in any more.
+    """
+    os.umask(0o077)  # the database's files too are for this user alone
+    keep_freed_memory()  # fetched anew for each face, it costs a third of the processor time
+    log = structlog.get_logger("hub")
+    with StopSignal() as stop, FolderStore(settings.data) as store, Threads() as writer, \
+            Observer(settings.data) as observer, zmq.Context() as context:
+        refusals = Refusals(observer.figures.counters)
+        entrance = Entrance(context, settings, refusals, (stop, writer))
+        try:
+            hub = Hub(store, settings, recon, observer.figures, refusals, writer, time.monotonic())
+            loop = _Loop(entrance, hub, refusals, observer, writer)
+            log.info("listening", address=" ".join(entrance.addresses), data=str(settings.data))
+            with _scrapes(settings, observer):
+                loop.serve(stop)
+        finally:
+            entrance.close()
+        log.info("stopped")
+        return stop.exit_status
+
+
+def _scrapes(settings: ServiceSettings, observer: Observer) -> AbstractContextManager[object]:
+    if settings.metrics is None:
+        return nullcontext()
+    from denseface.service.monitoring.health import Health, unwritable
+    from denseface.service.monitoring.http_server import ScrapeServer
+    from denseface.service.monitoring.prometheus import Metrics
+
+    health = Health(observer.board, settings, lambda: unwritable(settings.data))
+    server = ScrapeServer(settings.metrics, Metrics(observer.board).render, health.report)
+    structlog.get_logger("hub").info("metrics", url=f"{server.url}/metrics")
+    return server
+
+
+class _Loop:
+    def __init__(
+        self, entrance: Entrance, hub: Hub, refusals: Refusals, observer: Observer,
+        writer: Threads,
+    ) -> None:
+        self._writer = writer
+        self._entrance = entrance
+        self._hub = hub
+        self._refusals = refusals
+        self._observer = observer
+        self._log = structlog.get_logger("hub")
+
+    def serve(self, stop: StopSignal) -> None:
+        due = time.monotonic()
+        while not stop:
+            if (now := time.monotonic()) >= due:
+                self._hub.was_away(now - due)
+                subscriptions = self._entrance.subscriptions()
+                watched = subscriptions[Topic.PREVIEW] > 0
+                due = now + (PERIOD_S if watched else _TICK_S)
+                if self._entrance.tick():
+                    self._drop_revoked()
+                self._hub.show(wanted=watched)
+                outputs = self._hub.tick(now)
+                self._observer.ticked(now, outputs, subscriptions)
+                self._give_out(outputs)
+            for incoming in self._entrance.receive(max(0, math.ceil((due - now) * 1000))):
+                self._take_in(incoming)
+            if self._writer.any_ended():
+                self._give_out(self._hub.written(time.monotonic()))
+            stop.drain()
+        # What is being written is kept and said; the sockets linger for it.
+        self._give_out(self._hub.written(time.monotonic(), all_of_it=True))
+
+    def _drop_revoked(self) -> None:
+        for peer in self._hub.peers():
+            if not self._entrance.knows(peer):
+                self._give_out(self._hub.unreachable(peer, "its key or its roles changed"))
+
+    def _take_in(self, incoming: Incoming) -> None:
+        who = {"key": incoming.sender.name, "address": incoming.address}
+        try:
+            packet = decode_to_hub(incoming.parts)
+        except RemoteProtocolError as error:
+            self._refusals.note(error.reason, **who, detail=str(error))
+            return
+        message, sender = packet.message, incoming.sender
+        own = (incoming.key != "" and isinstance(message, messages.GetFace)
+               and self._hub.pressed_by(message.capture_id) == incoming.key)
+        lacks = missing_role(sender.roles, message, own=own)
+        if lacks:
+            self._refusals.note("role", **who, detail=lacks)
+            self._give_out([_denied(incoming, message, lacks)])
+            return
+        self._give_out(self._hub.receive(
+            time.monotonic(), incoming.peer, packet, incoming.key), packet)
+
+    def _give_out(self, outputs: list[Output], caused_by: Packet | None = None) -> None:
+        for step in steps(outputs):
+            self._observer.saw(time.monotonic(), caused_by, step)
+            self._send(step)
+            caused_by = None
+
+    def _send(self, outputs: Sequence[Output]) -> None:
+        for output in outputs:
+            try:
+                parts = encode(output.packet)
+            except LocalProtocolError as error:  # one message less is better than no hub
+                self._log.error("message not sent", reason=str(error))
+                continue
+            if isinstance(output, Publish):
+                self._publish(output.topic, parts)
+            elif not self._entrance.send(output.peer, parts):
+                self._give_out(self._hub.unreachable(output.peer))
+            elif name := _SENT.get(output.packet.message.kind):
+                failpoint(name)
+
+    def _publish(self, topic: Topic, parts: Sequence[Buffer]) -> None:
+        if topic is Topic.FACES:
+            failpoint("hub.outcome.publishing")
+        if not self._entrance.publish(topic, parts):
+            self._observer.figures.counters.add("drops", topic)
+        if topic is Topic.FACES:
+            failpoint("hub.outcome.published")
+
+
+def _denied(incoming: Incoming, message: messages.Message, lacks: str) -> Output:
+    """Say it in one line to whoever has a key of another role."""
+    has = ", ".join(sorted(incoming.sender.roles))
+    text = f"refused: {lacks}, the key {incoming.sender.name} has {has}"
+    request = getattr(message, "request", None)
+    if request is None:
+        return send(incoming.peer, messages.Denied(message=text))
+    return send(incoming.peer, messages.RequestFailed(request=request, message=text))

@@ -1,0 +1,298 @@
+"""The hub without sockets: messages and the time in, messages out.
+
+Nothing here waits, sends or reads a clock, so every order of events can be tested. What is to be
+durable goes through the store before the message that says so is given out. The life of a capture
+is the table in `service.protocol.states`.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from hashlib import sha256
+from importlib.metadata import version
+
+import structlog
+
+from denseface.recon.settings import Settings
+from denseface.service.errors import (
+    DamagedDatabaseError,
+    DamagedFaceError,
+    ServiceError,
+    StoreError,
+)
+from denseface.service.hub.jobs import Jobs
+from denseface.service.hub.maintenance import Keeper
+from denseface.service.hub.outcomes import Outcomes
+from denseface.service.hub.peers import MOST_PEERS, Roster, Sensor, Worker
+from denseface.service.hub.presses import Intake
+from denseface.service.hub.previews import Viewfinder
+from denseface.service.monitoring.figures import Figures
+from denseface.service.monitoring.rejections import Refusals
+from denseface.service.protocol import messages
+from denseface.service.protocol.outputs import Output, Publish, Topic, send
+from denseface.service.protocol.states import CaptureState
+from denseface.service.protocol.wire import Packet
+from denseface.service.settings import ServiceSettings
+from denseface.service.storage.base import Store
+from denseface.service.storage.records import FaceAbout, FrameAbout
+from denseface.service.storage.writer import AtOnce, Writer, Written
+
+__all__ = ["Hub", "settings_hash"]
+
+_VERSION = version("denseface")
+
+
+def settings_hash(settings: Settings) -> str:
+    """Name settings in 16 hexadecimal digits."""
+    return sha256(settings.model_dump_json().encode()).hexdigest()[:16]
+
+
+class Hub:
+    """Takes presses, keeps frames, hands out jobs, publishes outcomes.
+
+    Parameters
+    ----------
+    store : what was accepted before is resumed
+    settings : time-outs and limits
+    recon : settings of every job accepted from now on
+    figures : what the status says of this process
+    refusals : counts what was not let through
+    writer : writes the files; what it has ended is taken at each call
+    opened : since when sensors can reach it, seconds
+    """
+
+    def __init__(
+        self, store: Store, settings: ServiceSettings, recon: Settings,
+        figures: Figures | None = None, refusals: Refusals | None = None,
+        writer: Writer | None = None, opened: float = -math.inf,
+    ) -> None:
+        self._store = store
+        self._writer = writer = writer or AtOnce()
+        self._figures = figures or Figures()
+        self._refusals = refusals or Refusals(self._figures.counters)
+        self._settings = settings
+        self._roster = Roster()
+        self._outcomes = Outcomes(store, self._remake)
+        self._jobs = Jobs(store, writer, self._roster, settings.attempts,
+                          self._outcomes.concluded, self._refusals)
+        self._intake = Intake(store, writer, self._roster, settings, recon, settings_hash(recon),
+                              self._jobs.add, opened + settings.silence_s)
+        self._keeper = Keeper(
+            store, settings, self._intake, self._jobs, self._outcomes, self._figures.counters)
+        self._viewfinder = Viewfinder(self._roster, settings.heartbeat_s)
+        self._status_due = 0.0
+        self._log = structlog.get_logger("hub")
+
+    def receive(
+        self, now: float, peer: bytes, packet: Packet, key: str = ""
+    ) -> list[Output]:
+        """Take one message from a peer.
+
+        Parameters
+        ----------
+        now : seconds, of a clock that only goes forward
+        peer : names the sender's connection
+        key : fingerprint of the sender's key; empty where it needed none
+
+        Raises
+        ------
+        DamagedDatabaseError
+            The hub has to end: the next one mends the database.
+        """
+        outputs: list[Output] = []
+        try:
+            outputs.extend(self._receive(now, peer, packet, key))
+            outputs.extend(self._go_on(now))
+        except DamagedDatabaseError:
+            raise
+        except ServiceError as error:
+            self._log.error("message failed", kind=packet.message.kind, reason=str(error))
+            request = getattr(packet.message, "request", None)
+            if request is not None:
+                outputs.append(send(peer, messages.RequestFailed(
+                    request=request, message=str(error))))
+        return outputs
+
+    def written(self, now: float, *, all_of_it: bool = False) -> list[Output]:
+        """Say what comes of the files that were written; raises as `receive`.
+
+        Parameters
+        ----------
+        all_of_it : wait for those that are being written, and begin no other work
+        """
+        outputs: list[Output] = []
+        try:
+            outputs.extend(self._settle(now) if all_of_it else self._go_on(now))
+        except DamagedDatabaseError:
+            raise
+        except ServiceError as error:
+            self._log.error("not kept", reason=str(error))
+        return outputs
+
+    def _go_on(self, now: float) -> Iterator[Output]:
+        """Do what has become possible."""
+        written = self._writer.take()
+        while True:
+            yield from self._written(now, written)
+            yield from self._jobs.dispatch(now)
+            written = self._writer.take()
+            if not written:
+                return
+
+    def _written(self, now: float, written: Sequence[Written]) -> Iterator[Output]:
+        yield from self._intake.written(
+            [one for one in written if isinstance(one.draft.about, FrameAbout)])
+        yield from self._jobs.written(
+            now, [one for one in written if isinstance(one.draft.about, FaceAbout)])
+
+    def _settle(self, now: float) -> Iterator[Output]:
+        self._writer.settle()
+        yield from self._written(now, self._writer.take())
+
+    def tick(self, now: float) -> list[Output]:
+        """Do what is due: time-outs, silent peers, removals, status.
+
+        To be called a few times a second; raises as `receive`.
+        """
+        outputs: list[Output] = []
+        try:
+            outputs.extend(self._intake.tick(now))
+            outputs.extend(self._outcomes.tick(now))
+            for peer in self._roster.silent(now - self._settings.silence_s):
+                outputs.extend(self._gone(peer, "silent"))
+            outputs.extend(self._go_on(now))
+            self._keeper.tick(now)
+            outputs.extend(self._viewfinder.ask(now, busy=len(self._intake) > 0))
+            if now >= self._status_due:
+                self._status_due = now + self._settings.heartbeat_s
+                outputs.append(Publish(Topic.STATUS, Packet(self._status())))
+        except DamagedDatabaseError:
+            raise
+        except ServiceError as error:
+            self._log.error("tick failed", reason=str(error))
+        return outputs
+
+    def was_away(self, seconds: float) -> None:
+        """Take note of how late a tick is: the hub was stopped, or waited for its disk.
+
+        What was said meanwhile has not been heard yet.
+        """
+        if seconds < self._settings.heartbeat_s:  # no more than liveness allows for
+            return
+        self._log.warning("was away", seconds=round(seconds, 1))
+        self._roster.forgive(seconds)
+
+    def unreachable(self, peer: bytes, reason: str = "unreachable") -> list[Output]:
+        """Take note that a message to a peer could not be delivered, nor could the next."""
+        return list(self._gone(peer, reason))
+
+    def pressed_by(self, capture_id: str) -> str | None:
+        """Give the fingerprint of the key that pressed a capture; None where there is none."""
+        try:
+            stored = self._store.find(capture_id)
+        except StoreError as error:
+            self._log.error("who pressed cannot be read", reason=str(error))
+            return None
+        return stored.pressed_by if stored else None
+
+    def show(self, *, wanted: bool) -> None:
+        """Take note of whether somebody looks at the previews; they are asked for at each tick."""
+        self._viewfinder.wanted = wanted
+
+    def peers(self) -> list[bytes]:
+        """Give the sensors and workers that are known."""
+        return [*self._roster.sensors, *self._roster.workers]
+
+    def _receive(
+        self, now: float, peer: bytes, packet: Packet, key: str
+    ) -> Iterator[Output]:
+        match packet.message:
+            case messages.Press() as message:
+                yield from self._intake.press(now, peer, message, self._jobs.queued, key)
+            case messages.GetFace() as message:
+                yield from self._outcomes.get_face(now, peer, message)
+            case messages.GetNext() as message:
+                yield from self._outcomes.get_next(peer, message)
+            case messages.FindStart() as message:
+                yield from self._outcomes.find_start(peer, message)
+            case messages.ListDead() | messages.RetryDead() | messages.DropDead() as message:
+                yield from self._keeper.receive(peer, message)
+            case messages.Purge() as message:
+                yield from self._settle(now)  # so that nothing of it appears afterwards
+                yield from self._keeper.receive(peer, message)
+            case messages.GetStatus(request=request):
+                yield send(peer, self._status(request))
+            case messages.SensorReady(name=name, source=source):
+                if self._has_room(Sensor, peer, name) and self._roster.sensor_ready(
+                        peer, name, now):
+                    self._log.info("sensor ready", name=name, source=source)
+            case messages.WorkerReady(name=name, credit=credit):
+                if self._has_room(Worker, peer, name):
+                    self._worker_ready(now, peer, name, credit)
+            case messages.Heartbeat(holding=holding):
+                if not self._roster.heartbeat(peer, holding, now):
+                    yield send(peer, messages.Announce())
+            case messages.Goodbye():
+                if worker := self._roster.workers.get(peer):
+                    self._jobs.handed_back(worker)
+                yield from self._gone(peer, "goodbye")
+            case messages.Frame() as message:
+                yield from self._intake.frame(peer, message, packet)
+            case messages.PreviewFrame() as message:
+                yield from self._viewfinder.receive(peer, message, packet)
+            case messages.FrameFailed() as message:
+                yield from self._intake.no_frame(message)
+            case messages.Result() as message:
+                self._jobs.result(peer, message, packet)
+            case messages.JobFailed() as message:
+                yield from self._jobs.failed(peer, message)
+
+    def _remake(self, error: DamagedFaceError, kept_before: bool) -> None:
+        # One that is damaged as soon as it is written has used up an attempt.
+        self._jobs.remake(error.capture_id, str(error), attempts_left=kept_before)
+
+    def _has_room(self, kind: type[Sensor | Worker], peer: bytes, name: str) -> bool:
+        room = self._roster.has_room(kind, peer)
+        if not room:
+            self._log.error("too many", kind=kind.__name__.lower(), name=name, most=MOST_PEERS)
+        return room
+
+    def _worker_ready(self, now: float, peer: bytes, name: str, credit: int) -> None:
+        known = self._roster.workers.get(peer)
+        if known is None:
+            self._log.info("worker ready", name=name)
+        elif credit <= known.credit:
+            self._refusals.note("replayed", name=name, detail=f"credit {credit}")
+        self._roster.worker_ready(peer, name, credit, now)
+
+    def _gone(self, peer: bytes, reason: str) -> Iterator[Output]:
+        say = self._log.info if reason == "goodbye" else self._log.warning
+        if sensor := self._roster.sensors.pop(peer, None):
+            say("sensor gone", name=sensor.name, reason=reason)
+            yield from self._intake.sensor_gone(peer, reason)
+        if worker := self._roster.workers.pop(peer, None):
+            say("worker gone", name=worker.name, reason=reason)
+            self._jobs.lost(worker)
+
+    def _status(self, request: int = 0) -> messages.Status:
+        counts, counters = self._store.counts(), self._figures.counters
+        return messages.Status(
+            request=request, epoch=self._store.epoch, sequence=self._store.last_sequence(),
+            hub_version=_VERSION,
+            sensors=tuple(sensor.name for sensor in self._roster.sensors.values()),
+            workers=tuple(worker.name for worker in self._roster.workers.values()),
+            pressed=len(self._intake), queued=self._jobs.queued, working=self._jobs.working,
+            done=counts.get(CaptureState.DONE, 0), failed=counts.get(CaptureState.FAILED, 0),
+            dead=counts.get(CaptureState.DEAD, 0),
+            refused=self._refusals.counts(),
+            presses_refused=counters.labels("press_refused"),
+            since_start={name: count for name, label, count in counters.items() if not label},
+            latencies={stage: messages.Latency(
+                count=one.count, median_s=one.quantile_s(0.5), p99_s=one.quantile_s(0.99))
+                for stage, one in self._figures.latencies.stages().items()},
+            free_bytes=self._free_bytes(), kept_bytes=self._figures.kept_bytes)
+
+    def _free_bytes(self) -> int | None:
+        try:
+            return self._store.free_bytes()
+        except StoreError:
+            return None

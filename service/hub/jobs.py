@@ -1,0 +1,266 @@
+"""The hub's second half: a kept frame becomes an outcome, whatever happens to the workers."""
+
+from collections import deque
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import suppress
+
+import structlog
+from pydantic import ValidationError
+
+from denseface.recon.settings import Settings
+from denseface.service.errors import CorruptFileError, ProtocolError, ServiceError, StoreError
+from denseface.service.hub.peers import Roster, Worker
+from denseface.service.hub.unsaved_faces import Faces
+from denseface.service.monitoring.rejections import Refusals
+from denseface.service.protocol import messages
+from denseface.service.protocol.outputs import Output, send
+from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
+from denseface.service.protocol.wire import Packet
+from denseface.service.runtime.failpoints import failpoint
+from denseface.service.storage.base import Store, Stored
+from denseface.service.storage.writer import Writer, Written
+
+__all__ = ["Jobs"]
+
+_LOST = ("WorkerLost", "the worker that held it went away")
+_PAUSE_S = 1.0
+"""Time until what the disk refused is tried again, seconds."""
+
+
+class Jobs:
+    """Frames that wait for a worker or are held by one."""
+
+    def __init__(
+        self, store: Store, writer: Writer, roster: Roster, attempts: int,
+        concluded: Callable[[str], Iterator[Output]], refusals: Refusals,
+    ) -> None:
+        """Take up what the store has unfinished; `concluded` announces an outcome."""
+        self._store = store
+        self._roster = roster
+        self._attempts = attempts
+        self._concluded = concluded
+        self._refusals = refusals
+        self._queue = deque(store.unfinished())
+        self._reasons: dict[str, tuple[str, str]] = {}
+        self._faces = Faces(store, writer)
+        self._paused_until = 0.0
+        self._log = structlog.get_logger("hub")
+        if self._queue:
+            self._log.info("resumed", accepted=len(self._queue))
+
+    @property
+    def queued(self) -> int:
+        """Frames that wait for a worker."""
+        return len(self._queue)
+
+    @property
+    def working(self) -> int:
+        """Frames held by a worker."""
+        return sum(len(worker.jobs) for worker in self._roster.workers.values())
+
+    def add(self, capture_id: str) -> None:
+        """Queue a frame that was just kept."""
+        if capture_id not in self._queue:
+            self._queue.append(capture_id)
+
+    def forget(self, capture_ids: Collection[str]) -> None:
+        """Drop captures that were removed, from workers' hands too."""
+        self._queue = deque(one for one in self._queue if one not in capture_ids)
+        for capture_id in capture_ids:
+            self._reasons.pop(capture_id, None)
+            self._faces.drop(capture_id)
+        for worker in self._roster.workers.values():
+            worker.jobs = [one for one in worker.jobs if one not in capture_ids]
+
+    def remake(self, capture_id: str, reason: str, *, attempts_left: bool = True) -> None:
+        """Take up a capture again whose face turned out to be damaged."""
+        self._store.reopen(capture_id, attempts_left=attempts_left)
+        self._reasons[capture_id] = "CorruptFileError", reason
+        self.add(capture_id)
+        self._log.warning("face to be made again", capture_id=capture_id, reason=reason)
+
+    def dispatch(self, now: float) -> Iterator[Output]:
+        """Give frames to free workers, oldest first; give up what has no attempt left.
+
+        While the disk refuses what is to be kept, or many faces wait for it, nothing new is begun.
+        """
+        if now < self._paused_until:
+            return
+        try:
+            if self._faces.caught_up():
+                yield from self._dispatch(now)
+        except StoreError as error:
+            self._pause(now, str(error))
+
+    def _pause(self, now: float, reason: str) -> None:
+        self._paused_until = now + _PAUSE_S
+        self._log.error("the disk refuses, work waits", reason=reason, unkept=len(self._faces))
+
+    def _dispatch(self, now: float) -> Iterator[Output]:
+        while self._queue:
+            capture_id = self._queue[0]
+            stored = self._store.find(capture_id)
+            if (stored is None or stored.state is not CaptureState.ACCEPTED
+                    or capture_id in self._faces):
+                self._queue.popleft()
+            elif stored.attempts >= self._attempts:
+                yield from self._give_up(capture_id, *self._reasons.get(capture_id, _LOST))
+            # What may have ended a worker is tried alone: no other frame is lost or blamed with it.
+            elif worker := self._roster.free_worker(alone=stored.attempts > 0):
+                yield from self._give(now, capture_id, stored, worker)
+            else:
+                return
+
+    def result(self, peer: bytes, message: messages.Result, packet: Packet) -> None:
+        """Begin to keep a face, unless this capture has one; `written` says what comes of it."""
+        failpoint("hub.result.received")
+        if self._expected(peer, message, CaptureEvent.RESULT):
+            try:
+                message.face.check(packet.arrays)
+                self._faces.keep(packet)
+            except (ProtocolError, StoreError) as error:
+                self._retry(message.capture_id, type(error).__name__, str(error))
+
+    def written(self, now: float, faces: Sequence[Written]) -> Iterator[Output]:
+        """Announce faces that are safe, in order; those that the disk refused wait."""
+        for capture_id, error in self._faces.written(faces):
+            if error is None:
+                self._log.info("done", capture_id=capture_id)
+                yield from self._announce(capture_id)
+                continue
+            if isinstance(error, StoreError):
+                self._pause(now, str(error))
+            if capture_id not in self._faces:
+                self._retry(capture_id, type(error).__name__, str(error))
+            if not isinstance(error, ServiceError):
+                raise error
+
+    def _announce(self, capture_id: str) -> Iterator[Output]:
+        try:
+            yield from self._concluded(capture_id)
+        except StoreError as error:  # subscribers will see the gap and ask for it
+            self._log.error("not announced", capture_id=capture_id, reason=str(error))
+
+    def failed(self, peer: bytes, message: messages.JobFailed) -> Iterator[Output]:
+        """Announce "no face", or try again."""
+        event = CaptureEvent.REJECTED if message.final else CaptureEvent.LOST
+        if not self._expected(peer, message, event):
+            return
+        capture_id = message.capture_id
+        if not message.final:
+            self._retry(capture_id, message.error, message.message)
+            return
+        try:
+            self._store.fail(capture_id, message.error, message.message, dead=False)
+        except StoreError as error:
+            self._retry(capture_id, type(error).__name__, str(error))
+        else:
+            self._log.info("failed", capture_id=capture_id, error=message.error)
+            yield from self._concluded(capture_id)
+
+    def lost(self, worker: Worker) -> None:
+        """Take back what a worker held that went away.
+
+        It was working on the first: the others were not begun.
+        """
+        self._hand_back(worker, worker.jobs[1:])
+        while worker.jobs:
+            self._retry(worker.jobs.pop(), *_LOST)
+
+    def handed_back(self, worker: Worker) -> None:
+        """Take back what a worker held that was told to stop."""
+        self._hand_back(worker, list(worker.jobs))
+
+    def _hand_back(self, worker: Worker, capture_ids: Sequence[str]) -> None:
+        """Put jobs back in the queue; as an attempt it does not count."""
+        for capture_id in reversed(capture_ids):
+            worker.jobs.remove(capture_id)
+            try:
+                self._store.take_back_attempt(capture_id)
+            except StoreError as error:
+                self._log.warning("attempt not taken back", reason=str(error))
+            self._retry(capture_id, "HandedBack", "the worker that held it was stopped")
+
+    def _give(
+        self, now: float, capture_id: str, stored: Stored, worker: Worker
+    ) -> Iterator[Output]:
+        try:
+            kept = self._store.frame(capture_id)
+            settings = Settings.model_validate_json(kept.about.settings)
+        except (CorruptFileError, ValidationError) as error:
+            yield from self._give_up(capture_id, type(error).__name__, str(error))
+            return
+        attempt = self._store.start_attempt(capture_id)
+        self._queue.popleft()
+        if not worker.jobs:
+            worker.seen = now
+        worker.free, worker.alone = False, attempt > 1
+        worker.jobs.append(capture_id)
+        self._log.info("dispatched", capture_id=capture_id, worker=worker.name, attempt=attempt)
+        yield send(worker.peer, messages.Job(
+            capture_id=capture_id, attempt=attempt, settings=settings,
+            settings_hash=stored.settings_hash, frame_sha256=stored.frame_sha256,
+            frame=kept.message.frame), kept.arrays)
+
+    def _give_up(self, capture_id: str, error: str, reason: str) -> Iterator[Output]:
+        self._store.fail(capture_id, error, reason, dead=True)
+        self._queue.popleft()
+        self._reasons.pop(capture_id, None)
+        self._log.error("dead letter", capture_id=capture_id, error=error, reason=reason)
+        yield from self._concluded(capture_id)
+
+    def _retry(self, capture_id: str, error: str, reason: str) -> None:
+        """Put a capture back in the queue that waits for a face.
+
+        Where the store cannot be read it is put back, and `dispatch` looks again.
+        """
+        with suppress(StoreError):
+            if self._state(capture_id) is not CaptureState.ACCEPTED:
+                return
+        if capture_id not in self._queue:
+            self._log.warning(
+                "to be tried again", capture_id=capture_id, error=error, reason=reason)
+            self._reasons[capture_id] = error, reason
+            self._queue.appendleft(capture_id)
+
+    def _expected(
+        self, peer: bytes, answer: messages.Result | messages.JobFailed, event: CaptureEvent
+    ) -> bool:
+        """Say whether an answer is of use; whoever held the job holds it no more."""
+        capture_id = answer.capture_id
+        useful = self._of_use(answer, event)
+        worker = self._roster.workers.get(peer)
+        if worker and capture_id in worker.jobs:
+            at = worker.jobs.index(capture_id)
+            # Jobs are answered in order: the answers to those before it were lost.
+            before, worker.jobs = worker.jobs[:at], worker.jobs[at + 1:]
+            for one in before if useful else [*before, capture_id]:
+                reason = ("the answer was to another job" if one == capture_id
+                          else "its answer was lost")
+                self._retry(one, "RemoteProtocolError", reason)
+        if not useful:
+            self._refusals.note("replayed", capture_id=capture_id, detail=f"{event}, not asked for")
+        return useful
+
+    def _of_use(
+        self, answer: messages.Result | messages.JobFailed, event: CaptureEvent
+    ) -> bool:
+        stored = self._store.find(answer.capture_id)
+        asked = stored and (stored.settings_hash, stored.frame_sha256)
+        return (asked == (answer.settings_hash, answer.frame_sha256)
+                and advance(self._state(answer.capture_id), event) is not None)
+
+    def _state(self, capture_id: str) -> CaptureState | None:
+        stored = self._store.find(capture_id)
+        if stored is None:
+            return None
+        if stored.state is CaptureState.ACCEPTED:
+            if capture_id in self._faces:
+                return CaptureState.CONCLUDING
+            if self._holder(capture_id):
+                return CaptureState.WORKING
+        return stored.state
+
+    def _holder(self, capture_id: str) -> Worker | None:
+        return next((worker for worker in self._roster.workers.values()
+                     if capture_id in worker.jobs), None)

@@ -1,0 +1,138 @@
+"""The hub's keeper: what is kept for how long, and what an operator does about it."""
+
+from collections.abc import Iterator, Sequence
+
+import structlog
+
+from denseface.service.errors import StoreError
+from denseface.service.hub.jobs import Jobs
+from denseface.service.hub.outcomes import Outcomes
+from denseface.service.hub.presses import Intake
+from denseface.service.monitoring.counters import Counters
+from denseface.service.protocol import messages
+from denseface.service.protocol.outputs import Output, send
+from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
+from denseface.service.settings import ServiceSettings
+from denseface.service.storage.base import Store
+
+__all__ = ["Keeper"]
+
+_BATCH = 20
+"""Captures removed at once: the hub must not be away from its peers for long."""
+_PAGE = 50
+_SWEEP_S = 600.0
+"""Longest time between two looks for what is too old, seconds."""
+
+_Request = messages.ListDead | messages.RetryDead | messages.DropDead | messages.Purge
+
+
+class Keeper:
+    """Retention, dead letters, purges."""
+
+    def __init__(
+        self, store: Store, settings: ServiceSettings, intake: Intake, jobs: Jobs,
+        outcomes: Outcomes, counters: Counters,
+    ) -> None:
+        self._store = store
+        self._retention_s = settings.retention
+        self._sweep_s = min(_SWEEP_S, (settings.retention or _SWEEP_S) / 10)
+        self._intake = intake
+        self._jobs = jobs
+        self._outcomes = outcomes
+        self._counters = counters
+        self._due = 0.0
+        self._log = structlog.get_logger("hub")
+
+    def tick(self, now: float) -> None:
+        """Remove a batch of what is too old."""
+        if now < self._due:
+            return
+        self._due = now + self._sweep_s
+        try:
+            self._store.sweep(self._retention_s)
+            if self._retention_s is None:
+                return
+            old = self._store.expired(self._retention_s, _BATCH)
+            if old:
+                self._store.remove(old)
+                self._counters.add("removed", "retention", len(old))
+                self._log.info("removed after the retention", captures=len(old))
+        except StoreError as error:
+            self._log.error("not removed", reason=str(error))
+            return
+        if len(old) == _BATCH:
+            self._due = now
+
+    def receive(self, peer: bytes, message: _Request) -> Iterator[Output]:
+        """Do what an operator asks for."""
+        match message:
+            case messages.ListDead(request=request, after=after):
+                yield send(peer, messages.DeadLetters(
+                    request=request, letters=tuple(self._store.dead_letters(after, _PAGE))))
+            case messages.RetryDead():
+                yield from self._retry(peer, message)
+            case messages.DropDead():
+                yield from self._drop(peer, message)
+            case messages.Purge():
+                yield from self._purge(peer, message)
+
+    def _retry(self, peer: bytes, message: messages.RetryDead) -> Iterator[Output]:
+        capture_id, request = message.capture_id, message.request
+        stored = self._store.find(capture_id)
+        if stored is None:
+            yield send(peer, messages.CaptureUnknown(request=request, capture_id=capture_id))
+        elif stored.state is CaptureState.ACCEPTED:  # a repeat
+            yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
+        elif advance(stored.state, CaptureEvent.RETRIED) is None:
+            yield _no_dead_letter(peer, message, stored.state)
+        else:
+            self._store.frame(capture_id)  # without it, the dead letter stays as it is
+            self._store.reopen(capture_id, attempts_left=True)
+            self._jobs.add(capture_id)
+            self._log.info("dead letter retried", capture_id=capture_id)
+            yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
+
+    def _drop(self, peer: bytes, message: messages.DropDead) -> Iterator[Output]:
+        stored = self._store.find(message.capture_id)
+        if stored is None:
+            yield send(peer, messages.CaptureUnknown(
+                request=message.request, capture_id=message.capture_id))
+        elif stored.state is not CaptureState.DEAD:
+            yield _no_dead_letter(peer, message, stored.state)
+        else:
+            yield from self._remove([message.capture_id])
+            yield send(peer, messages.Removed(request=message.request, removed=1, left=False))
+
+    def _purge(self, peer: bytes, message: messages.Purge) -> Iterator[Output]:
+        if message.capture_id is not None:
+            known = self._store.find(message.capture_id)
+            going = [message.capture_id] if known else []
+        else:
+            going = self._store.accepted_before(message.before, _BATCH)
+        if message.before is None:
+            yield from self._intake.purge(message.capture_id)
+        yield from self._remove(going)
+        left = len(going) == _BATCH
+        if message.everything and not left:
+            self._store.clear_quarantine()
+        yield send(peer, messages.Removed(
+            request=message.request, removed=len(going), left=left))
+
+    def _remove(self, capture_ids: Sequence[str]) -> Iterator[Output]:
+        if not capture_ids:
+            return
+        try:
+            self._store.remove(capture_ids)
+        finally:  # where files resist, the captures are gone all the same
+            self._jobs.forget([one for one in capture_ids if self._store.find(one) is None])
+        self._counters.add("removed", "operator", len(capture_ids))
+        self._log.info("removed by an operator", captures=len(capture_ids))
+        yield from self._outcomes.removed(capture_ids)
+
+
+def _no_dead_letter(
+    peer: bytes, message: messages.RetryDead | messages.DropDead, state: CaptureState
+) -> Output:
+    return send(peer, messages.RequestFailed(
+        request=message.request,
+        message=f"capture {message.capture_id} is {state}, no dead letter"))

@@ -1,0 +1,117 @@
+"""The hub's last part: outcomes are published, and given to whoever asks."""
+
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+
+from denseface.service.errors import DamagedFaceError
+from denseface.service.protocol import messages
+from denseface.service.protocol.outputs import Output, Publish, Send, Topic, send
+from denseface.service.protocol.wire import Packet
+from denseface.service.storage.base import Store
+
+__all__ = ["Outcomes"]
+
+_MAX_WAITERS = 1000
+_MAX_WAITERS_OF_ONE = 100
+"""So that nobody takes all the places."""
+
+
+@dataclass(frozen=True)
+class _Waiter:
+    capture_id: str
+    deadline: float
+
+
+class Outcomes:
+    """What ended, and who waits for what has not."""
+
+    def __init__(self, store: Store, remake: Callable[[DamagedFaceError, bool], None]) -> None:
+        """Publish and give; `remake` takes up a damaged face, True where it was kept before."""
+        self._store = store
+        self._remake = remake
+        self._waiters: dict[tuple[bytes, int], _Waiter] = {}
+        """By client and request."""
+
+    def concluded(self, capture_id: str) -> Iterator[Output]:
+        """Publish the outcome of a capture and answer those who wait for it."""
+        try:
+            packet = self._store.outcome(capture_id)
+        except DamagedFaceError as error:
+            self._remake(error, False)
+            return
+        if packet:
+            yield Publish(Topic.FACES, packet)
+            for peer, request, _ in self._take_waiters([capture_id]):
+                yield _answer(peer, request, packet)
+
+    def _has_place(self, peer: bytes) -> bool:
+        own = sum(one == peer for one, _ in self._waiters)
+        return len(self._waiters) < _MAX_WAITERS and own < _MAX_WAITERS_OF_ONE
+
+    def removed(self, capture_ids: Collection[str]) -> Iterator[Output]:
+        """Answer those who wait for captures that are gone."""
+        for peer, request, capture_id in self._take_waiters(capture_ids):
+            yield send(peer, messages.CaptureUnknown(request=request, capture_id=capture_id))
+
+    def _take_waiters(self, capture_ids: Collection[str]) -> list[tuple[bytes, int, str]]:
+        waiting = [(*key, waiter.capture_id) for key, waiter in self._waiters.items()
+                   if waiter.capture_id in capture_ids]
+        for peer, request, _ in waiting:
+            del self._waiters[peer, request]
+        return waiting
+
+    def get_face(self, now: float, peer: bytes, message: messages.GetFace) -> Iterator[Output]:
+        """Give an outcome, or note that someone waits for it."""
+        capture_id, request = message.capture_id, message.request
+        try:
+            packet = self._store.outcome(capture_id)
+        except DamagedFaceError as error:
+            self._remake(error, True)
+            packet = None
+        if packet:
+            yield _answer(peer, request, packet)
+        elif self._store.find(capture_id) is None:
+            yield send(peer, messages.CaptureUnknown(request=request, capture_id=capture_id))
+        elif (peer, request) in self._waiters:
+            return  # a repeat: its wait does not begin anew
+        elif message.wait_s > 0 and self._has_place(peer):
+            self._waiters[peer, request] = _Waiter(capture_id, now + message.wait_s)
+        else:
+            yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
+
+    def get_next(self, peer: bytes, message: messages.GetNext) -> Iterator[Output]:
+        """Give the first outcome after a sequence number that is whole."""
+        if packet := self._next(message.after):
+            yield _answer(peer, message.request, packet)
+        else:
+            yield send(peer, messages.NothingNewer(
+                request=message.request, epoch=self._store.epoch,
+                sequence=self._store.last_sequence()))
+
+    def _next(self, after: int) -> Packet | None:
+        while True:
+            try:
+                return self._store.outcome_after(after)
+            except DamagedFaceError as error:
+                self._remake(error, True)
+
+    def find_start(self, peer: bytes, message: messages.FindStart) -> Iterator[Output]:
+        """Give the number after which the outcomes come that are asked for."""
+        if message.since is not None:
+            sequence = self._store.before_time(message.since)
+        else:
+            sequence = self._store.before_last(message.last or 1)
+        yield send(peer, messages.StartAt(
+            request=message.request, epoch=self._store.epoch, sequence=sequence))
+
+    def tick(self, now: float) -> Iterator[Output]:
+        """Answer those who waited long enough."""
+        for peer, request in [key for key, one in self._waiters.items() if now >= one.deadline]:
+            waiter = self._waiters.pop((peer, request))
+            yield send(peer, messages.CapturePending(
+                request=request, capture_id=waiter.capture_id))
+
+
+def _answer(peer: bytes, request: int, packet: Packet) -> Send:
+    message = packet.message.model_copy(update={"request": request})
+    return Send(peer, Packet(message, packet.arrays))

@@ -1,0 +1,222 @@
+"""The hub's first half: a press becomes a frame that is safe on the disk, or is refused."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import structlog
+
+from denseface.recon.settings import Settings
+from denseface.service.errors import ServiceError, StoreError
+from denseface.service.hub.peers import Roster
+from denseface.service.protocol import messages
+from denseface.service.protocol.outputs import Output, send
+from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
+from denseface.service.protocol.wire import Packet
+from denseface.service.runtime.failpoints import failpoint
+from denseface.service.settings import ServiceSettings
+from denseface.service.storage.base import Store
+from denseface.service.storage.writer import Writer, Written
+
+__all__ = ["Intake"]
+
+_MIB = 2**20
+_REFUSALS = 1000
+_MOST_KEEPING = 32
+"""Frames that may wait for the disk, which are in memory meanwhile; beyond it a press is refused.
+"""
+
+
+@dataclass
+class _Press:
+    """A press whose frame is not yet on the disk, so it is lost with the hub."""
+
+    sensor: bytes
+    deadline: float
+    key: str
+    """Fingerprint of the first presser's key; empty where it needed none."""
+    pressers: dict[bytes, int] = field(default_factory=dict)
+    """The last request of each client that pressed this id."""
+    giver: bytes | None = None
+    """The sensor whose frame is being written; None where none came."""
+
+
+class Intake:
+    """Presses that wait for their frame, or for their frame to be safe."""
+
+    def __init__(
+        self, store: Store, writer: Writer, roster: Roster, settings: ServiceSettings,
+        recon: Settings, recon_hash: str, accepted: Callable[[str], None], all_here: float,
+    ) -> None:
+        """Take presses; `accepted` is told of each frame that is safe.
+
+        Until the time `all_here`, sensors may not have had time to say that they are there.
+        """
+        self._store = store
+        self._writer = writer
+        self._accepted = accepted
+        self._all_here = all_here
+        self._roster = roster
+        self._settings = settings
+        self._recon = recon
+        self._recon_hash = recon_hash
+        self._presses: dict[str, _Press] = {}
+        self._refused: dict[tuple[bytes, str, int], messages.PressRefused] = {}
+        """How the last requests were refused, so that a repeat of one gets the same answer."""
+        self._log = structlog.get_logger("hub")
+
+    def __len__(self) -> int:
+        return len(self._presses)
+
+    def press(
+        self, now: float, peer: bytes, message: messages.Press, queued: int, key: str = ""
+    ) -> Iterator[Output]:
+        """Ask a sensor for a frame, unless this id is known already."""
+        capture_id, request = message.capture_id, message.request
+        if refused := self._refused.get((peer, capture_id, request)):
+            # A repeat that was under way when the client had its answer: it has told its user.
+            yield send(peer, refused)
+            return
+        state = self._state(capture_id)
+        if state in (CaptureState.PRESSED, CaptureState.KEEPING):
+            self._presses[capture_id].pressers[peer] = request
+            return
+        if state is not None:
+            yield send(peer, messages.PressAccepted(request=request, capture_id=capture_id))
+            return
+        sensor = self._roster.sensor()
+        if sensor is None and now < self._all_here:
+            return  # the client repeats it in a moment
+        obstacle = self._obstacle(queued)
+        if sensor is None or obstacle:
+            reason, why = obstacle or ("no_sensor", "no sensor is connected")
+            self._log.warning("press refused", capture_id=capture_id, reason=why)
+            yield self._refusal(peer, messages.PressRefused(
+                request=request, capture_id=capture_id, reason=reason, message=why))
+            return
+        self._log.info("pressed", capture_id=capture_id, sensor=sensor.name)
+        deadline = now + self._settings.take_timeout_s
+        self._presses[capture_id] = _Press(sensor.peer, deadline, key, {peer: request})
+        yield send(sensor.peer, messages.Take(capture_id=capture_id))
+
+    def _obstacle(self, queued: int) -> tuple[messages.PressReason, str] | None:
+        if queued + len(self) >= self._settings.queue:
+            return "queue", f"{self._settings.queue} frames wait for a worker already"
+        if sum(press.giver is not None for press in self._presses.values()) >= _MOST_KEEPING:
+            return "disk", f"{_MOST_KEEPING} frames wait for the disk already"
+        try:
+            free = self._store.free_bytes() // _MIB
+        except StoreError as error:
+            return "disk", str(error)
+        if free < self._settings.reserve_mib:
+            return "disk", (
+                f"no room on the disk ({free} MiB free, {self._settings.reserve_mib} MiB are "
+                "to stay free for the faces of what was accepted)")
+        return None
+
+    def frame(self, peer: bytes, message: messages.Frame, packet: Packet) -> Iterator[Output]:
+        """Begin to keep a frame; what comes of it is said by `written`."""
+        failpoint("hub.frame.received")
+        capture_id = message.capture_id
+        state = self._state(capture_id)
+        if state is CaptureState.KEEPING:  # a repeat; it is answered when the first is safe
+            return
+        if advance(state, CaptureEvent.RECEIVED) is None:
+            yield send(peer, messages.FrameAccepted(capture_id=capture_id) if state else
+                       messages.FrameRefused(capture_id=capture_id, message="nobody waits for it"))
+            return
+        press = self._presses[capture_id]
+        press.giver = peer
+        try:
+            draft = self._store.frame_draft(packet, self._recon, self._recon_hash, press.key)
+        except StoreError as error:
+            yield from self._not_kept(capture_id, error)
+            return
+        self._writer.start(draft)
+
+    def written(self, frames: Sequence[Written]) -> Iterator[Output]:
+        """Say that frames are safe, or not: to the sensor and to all who pressed."""
+        for one in frames:
+            if isinstance(one.error, ServiceError):
+                yield from self._not_kept(one.draft.capture_id, one.error)
+            elif one.error:
+                raise one.error
+        good = [one for one in frames if one.error is None]
+        try:
+            if len(good) > 1:  # one sync of the database for all
+                self._store.accept(good)
+                for one in good:
+                    yield from self._kept(one.draft.capture_id)
+                return
+        except StoreError as error:
+            self._log.warning("frames are kept one by one", reason=str(error))
+        for one in good:
+            try:
+                self._store.accept([one])
+            except StoreError as error:
+                one.draft.discard()
+                yield from self._not_kept(one.draft.capture_id, error)
+            else:
+                yield from self._kept(one.draft.capture_id)
+
+    def _kept(self, capture_id: str) -> Iterator[Output]:
+        self._log.info("accepted", capture_id=capture_id)
+        press = self._presses.pop(capture_id)
+        self._accepted(capture_id)
+        if press.giver is not None:
+            yield send(press.giver, messages.FrameAccepted(capture_id=capture_id))
+        for presser, request in press.pressers.items():
+            yield send(presser, messages.PressAccepted(request=request, capture_id=capture_id))
+
+    def _not_kept(self, capture_id: str, error: Exception) -> Iterator[Output]:
+        giver = self._presses[capture_id].giver
+        if giver is not None:
+            yield send(giver, messages.FrameRefused(capture_id=capture_id, message=str(error)))
+        yield from self._refuse(capture_id, "disk", str(error))
+
+    def no_frame(self, message: messages.FrameFailed) -> Iterator[Output]:
+        """Refuse a press for which the sensor has no frame."""
+        if self._state(message.capture_id) is CaptureState.PRESSED:
+            yield from self._refuse(message.capture_id, "sensor", message.message)
+
+    def _refuse(
+        self, capture_id: str, reason: messages.PressReason, why: str
+    ) -> Iterator[Output]:
+        """Tell all who pressed that there is no capture."""
+        if press := self._presses.pop(capture_id, None):
+            self._log.warning("press refused", capture_id=capture_id, reason=why)
+            for presser, request in press.pressers.items():
+                yield self._refusal(presser, messages.PressRefused(
+                    request=request, capture_id=capture_id, reason=reason, message=why))
+
+    def _refusal(self, peer: bytes, refused: messages.PressRefused) -> Output:
+        self._refused[peer, refused.capture_id, refused.request] = refused
+        if len(self._refused) > _REFUSALS:
+            del self._refused[next(iter(self._refused))]
+        return send(peer, refused)
+
+    def purge(self, capture_id: str | None) -> Iterator[Output]:
+        """Refuse one press, or all where None, whose frame is no longer wanted."""
+        for waiting in [capture_id] if capture_id else list(self._presses):
+            yield from self._refuse(waiting, "purged", "purged by an operator")
+
+    def sensor_gone(self, peer: bytes, reason: str) -> Iterator[Output]:
+        """Refuse what a sensor that went away was asked for."""
+        for capture_id in [key for key, press in self._presses.items()
+                           if press.sensor == peer and press.giver is None]:
+            yield from self._refuse(
+                capture_id, "sensor_gone", f"the sensor went away ({reason})")
+
+    def tick(self, now: float) -> Iterator[Output]:
+        """Refuse what took too long."""
+        late = [key for key, press in self._presses.items()
+                if now >= press.deadline and press.giver is None]
+        for capture_id in late:
+            limit = self._settings.take_timeout_s
+            yield from self._refuse(
+                capture_id, "timeout", f"no frame from the sensor in {limit:g} s")
+
+    def _state(self, capture_id: str) -> CaptureState | None:
+        if press := self._presses.get(capture_id):
+            return CaptureState.PRESSED if press.giver is None else CaptureState.KEEPING
+        stored = self._store.find(capture_id)
+        return stored.state if stored else None

@@ -1,0 +1,60 @@
+"""The hub's viewfinder: small pictures of what the sensor sees, while somebody looks.
+
+The hub asks for one at a time and no sooner than the last one came, so that a preview never waits
+in a queue; a press goes first. Nothing of it is kept.
+"""
+
+import secrets
+from collections.abc import Iterator
+
+from denseface.service.hub.peers import Roster
+from denseface.service.protocol import messages
+from denseface.service.protocol.outputs import Output, Publish, Topic, send
+from denseface.service.protocol.wire import Packet
+
+__all__ = ["PERIOD_S", "Viewfinder"]
+
+PERIOD_S = 0.1
+"""Shortest time between two previews, seconds."""
+
+
+class Viewfinder:
+    """Asks the sensor for previews and publishes them.
+
+    Parameters
+    ----------
+    patience_s : time after which one that did not come is asked for again, seconds
+    """
+
+    def __init__(self, roster: Roster, patience_s: float) -> None:
+        self._roster = roster
+        self._patience_s = patience_s
+        self._epoch = secrets.token_hex(8)
+        self._sequence = 0
+        self._asked: bytes | None = None
+        """The sensor that owes one."""
+        self._asked_at = float("-inf")
+        self.wanted = False
+        """Somebody looks."""
+
+    def ask(self, now: float, *, busy: bool) -> Iterator[Output]:
+        """Ask for one where it is time to; not while a press waits for its frame."""
+        sensor = self._roster.sensor()
+        pause = PERIOD_S if self._asked is None else self._patience_s
+        if not self.wanted or busy or sensor is None or now - self._asked_at < pause:
+            return
+        self._asked, self._asked_at = sensor.peer, now
+        yield send(sensor.peer, messages.TakePreview())
+
+    def receive(
+        self, peer: bytes, message: messages.PreviewFrame, packet: Packet
+    ) -> Iterator[Output]:
+        """Publish one that was asked for."""
+        if peer != self._asked:
+            return
+        self._asked = None
+        if self.wanted:
+            self._sequence += 1
+            yield Publish(Topic.PREVIEW, Packet(messages.Preview(
+                epoch=self._epoch, sequence=self._sequence, preview=message.preview),
+                packet.arrays))

@@ -1,0 +1,96 @@
+"""Faces that came and are not yet safe: being written, or refused by the disk."""
+
+from collections.abc import Iterator, Sequence
+
+import structlog
+
+from denseface.service.errors import StoreError
+from denseface.service.protocol.wire import Packet
+from denseface.service.storage.base import Store
+from denseface.service.storage.records import Draft
+from denseface.service.storage.writer import Writer, Written
+
+__all__ = ["Faces"]
+
+_MOST_UNKEPT = 16
+"""Faces in memory; beyond it no work is begun, and one that the disk refuses is let go."""
+
+
+class Faces:
+    """Captures that are CONCLUDING."""
+
+    def __init__(self, store: Store, writer: Writer) -> None:
+        self._store = store
+        self._writer = writer
+        self._unkept: dict[str, Draft] = {}
+        self._refused: dict[str, bool] = {}
+        """Those that the disk refused, in order; True where one is being written again."""
+
+    def __len__(self) -> int:
+        return len(self._unkept)
+
+    def __contains__(self, capture_id: str) -> bool:
+        return capture_id in self._unkept
+
+    def keep(self, result: Packet) -> None:
+        """Begin to write a face; StoreError where it is of no use."""
+        draft = self._store.face_draft(result)
+        self._unkept[draft.capture_id] = draft
+        self._writer.start(draft)
+
+    def caught_up(self) -> bool:
+        """Begin anew to write what the disk refused; True where there is room for more faces.
+
+        Raises
+        ------
+        StoreError
+            Where the store cannot be read.
+        """
+        for capture_id, again in self._refused.items():
+            if not again:
+                self.keep(self._unkept[capture_id].packet)  # its retention begins now
+                self._refused[capture_id] = True
+        return not self._refused and len(self._unkept) < _MOST_UNKEPT
+
+    def written(self, faces: Sequence[Written]) -> list[tuple[str, Exception | None]]:
+        """Give their rows to faces that were written, in order, and say of each what came of it.
+
+        One that the disk refused stays, unless there are too many.
+        """
+        return list(self._written(faces))
+
+    def _written(self, faces: Sequence[Written]) -> Iterator[tuple[str, Exception | None]]:
+        for one in faces:
+            if one.error:
+                yield one.draft.capture_id, self._not_kept(one.draft.capture_id, one.error)
+        good = [one for one in faces if one.error is None]
+        try:
+            if len(good) > 1:  # one sync of the database for all
+                self._store.finish(good)
+                for one in good:
+                    yield self._kept(one)
+                return
+        except StoreError as error:
+            structlog.get_logger("hub").warning("faces are kept one by one", reason=str(error))
+        for one in good:
+            try:
+                self._store.finish([one])
+            except StoreError as error:
+                yield one.draft.capture_id, self._not_kept(one.draft.capture_id, error)
+            else:
+                yield self._kept(one)
+
+    def drop(self, capture_id: str) -> None:
+        """Forget a capture that was removed; its face must not be under way."""
+        self._unkept.pop(capture_id, None)
+        self._refused.pop(capture_id, None)
+
+    def _kept(self, written: Written) -> tuple[str, None]:
+        self.drop(written.draft.capture_id)
+        return written.draft.capture_id, None
+
+    def _not_kept(self, capture_id: str, error: Exception) -> Exception:
+        self._refused[capture_id] = False
+        if not isinstance(error, StoreError) or len(self._refused) > _MOST_UNKEPT:
+            self.drop(capture_id)
+        return error

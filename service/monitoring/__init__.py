@@ -1,0 +1,1 @@
+"""Counts, times and health, and how they are shown."""

@@ -1,0 +1,81 @@
+"""Whether the service would make a face of a press now."""
+
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from denseface.service.monitoring.board import Board
+from denseface.service.settings import ServiceSettings
+
+__all__ = ["Health", "unwritable"]
+
+_STALL_S = 5.0
+_MIB = 2**20
+
+
+class Health:
+    """Judges what the board shows; for any thread.
+
+    Parameters
+    ----------
+    unwritable : says why nothing can be written, None where it can
+    clock : seconds, the board's
+    """
+
+    def __init__(
+        self, board: Board, settings: ServiceSettings, unwritable: Callable[[], str | None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._board = board
+        self._settings = settings
+        self._unwritable = unwritable
+        self._clock = clock
+        self._stall_s = max(_STALL_S, settings.silence_s)
+
+    def report(self) -> tuple[bool, dict[str, Any]]:
+        """Say whether all is well, and what is missing."""
+        missing = list(self._missing())
+        status = self._board.picture.status if self._board.picture else None
+        return not missing, {
+            "healthy": not missing, "missing": missing,
+            "version": status.hub_version if status else None,
+            "sensors": len(status.sensors) if status else 0,
+            "workers": len(status.workers) if status else 0}
+
+    def _missing(self) -> list[str]:
+        picture, found = self._board.picture, []
+        if picture is None:
+            found.append("hub: has not said how it is yet")
+        elif (silence := self._clock() - picture.taken) > self._stall_s:
+            found.append(f"hub: has not said how it is for {silence:.0f} s")
+        if why := self._unwritable():
+            found.append(f"store: {why}")
+        if picture is None:
+            return found
+        status, reserve = picture.status, self._settings.reserve_mib
+        if status.free_bytes is None:
+            found.append("disk: its free room is not known")
+        elif status.free_bytes < reserve * _MIB:
+            found.append(f"disk: {status.free_bytes // _MIB} MiB free, {reserve} MiB are to stay "
+                         "free")
+        if not status.sensors:
+            found.append("sensor: none is alive")
+        if not status.workers:
+            found.append("worker: none is alive")
+        return found
+
+
+def unwritable(folder: Path) -> str | None:
+    """Write a little into a folder, without leaving a file; say why where that fails."""
+    try:
+        # It has no name where the file system knows O_TMPFILE, and loses it at once elsewhere.
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(4096))
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        return f"{folder}: {error.strerror or error}"
+    return None

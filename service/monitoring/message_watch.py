@@ -1,0 +1,121 @@
+"""Looks on at what goes into the hub and comes out, counts it and takes the times.
+
+The hub's state machine knows nothing of it: every stage of a capture shows in its messages.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from denseface.service.monitoring.counters import Counters
+from denseface.service.monitoring.latencies import Latencies
+from denseface.service.protocol import messages
+from denseface.service.protocol.outputs import Output, Publish, Send
+from denseface.service.protocol.wire import Packet
+
+__all__ = ["Watch"]
+
+_MOST = 10_000
+"""Captures whose times are followed; beyond it the oldest is let go of."""
+
+
+@dataclass
+class _Times:
+    pressed: float | None = None
+    accepted: float | None = None
+    dispatched: float | None = None
+
+
+class Watch:
+    """Counts what `service.monitoring.prometheus` has names for.
+
+    Times are those of the hub's clock, after it has done what a message asked for.
+    """
+
+    def __init__(self, counters: Counters, latencies: Latencies) -> None:
+        self._counters = counters
+        self._latencies = latencies
+        self._captures: dict[str, _Times] = {}
+        self._refused: dict[tuple[bytes, str, int], None] = {}
+        """Presses that were told so: a repeat is told again."""
+
+    def saw(self, now: float, packet: Packet | None, outputs: Sequence[Output]) -> None:
+        """Take note of a message and of all that it brought about; of no message at a tick.
+
+        Parameters
+        ----------
+        now : seconds, after the fact
+        """
+        if packet and isinstance(packet.message, messages.Result | messages.JobFailed):
+            self._ended(now, packet.message.capture_id)
+        refused: dict[str, messages.PressRefused] = {}
+        for output in outputs:
+            message = output.packet.message
+            match message:
+                case messages.Take(capture_id=capture_id):
+                    self._follow(capture_id).pressed = now
+                case messages.PressRefused(capture_id=capture_id) if isinstance(output, Send):
+                    told = output.peer, capture_id, message.request
+                    if told not in self._refused:
+                        refused[capture_id] = message
+                        self._remember(told)
+                case messages.FrameAccepted(capture_id=capture_id):
+                    self._accepted(now, capture_id)
+                case messages.Job(capture_id=capture_id, attempt=attempt):
+                    self._dispatched(now, capture_id, attempt)
+                case messages.FaceDone() | messages.CaptureFailed():
+                    if isinstance(output, Publish):
+                        self._published(now, message)
+                    elif packet and isinstance(packet.message, messages.GetNext):
+                        self._counters.add("fetched")
+                case messages.Preview():
+                    self._counters.add("previews")
+        for one in refused.values():  # once, however many pressed
+            self._captures.pop(one.capture_id, None)
+            self._counters.add("press_refused", one.reason)
+
+    def _remember(self, told: tuple[bytes, str, int]) -> None:
+        self._refused[told] = None
+        if len(self._refused) > _MOST:
+            del self._refused[next(iter(self._refused))]
+
+    def _follow(self, capture_id: str) -> _Times:
+        times = self._captures.pop(capture_id, None) or _Times()
+        self._captures[capture_id] = times
+        if len(self._captures) > _MOST:
+            del self._captures[next(iter(self._captures))]
+        return times
+
+    def _accepted(self, now: float, capture_id: str) -> None:
+        times = self._captures.get(capture_id)
+        if times is None or times.pressed is None or times.accepted is not None:
+            return  # a repeat
+        times.accepted = now
+        self._counters.add("accepted")
+        self._latencies.observe("press_to_accepted", now - times.pressed)
+
+    def _dispatched(self, now: float, capture_id: str, attempt: int) -> None:
+        times = self._follow(capture_id)
+        times.dispatched = now
+        if attempt > 1:
+            self._counters.add("redelivered")
+        elif times.accepted is not None:
+            self._latencies.observe("accepted_to_dispatched", now - times.accepted)
+
+    def _ended(self, now: float, capture_id: str) -> None:
+        times = self._captures.get(capture_id)
+        if times and times.dispatched is not None:
+            self._latencies.observe("dispatched_to_result", now - times.dispatched)
+            times.dispatched = None
+
+    def _published(
+        self, now: float, message: messages.FaceDone | messages.CaptureFailed
+    ) -> None:
+        times = self._captures.pop(message.capture_id, None)
+        if times and times.pressed is not None:
+            self._latencies.observe("press_to_published", now - times.pressed)
+        if isinstance(message, messages.CaptureFailed):
+            self._counters.add("dead" if message.dead else "failed")
+            return
+        self._counters.add("done")
+        for stage, taken_ms in message.face.report.timings_ms.items():
+            self._latencies.observe(f"recon_{stage}", taken_ms / 1000)

@@ -1,0 +1,106 @@
+"""The hub's figures as Prometheus metrics."""
+
+from collections.abc import Iterator
+from itertools import accumulate
+
+from prometheus_client import CollectorRegistry, ProcessCollector, generate_latest
+from prometheus_client.core import (
+    CounterMetricFamily,
+    GaugeMetricFamily,
+    HistogramMetricFamily,
+    Metric,
+)
+from prometheus_client.registry import Collector
+
+from denseface.service.monitoring.board import Board, Picture
+from denseface.service.monitoring.latencies import BUCKETS_S, Histogram
+
+__all__ = ["COUNTERS", "Metrics"]
+
+COUNTERS: dict[str, tuple[str, str | None, str]] = {
+    "accepted": ("accepted", None, "Frames that are safe on the disk."),
+    "press_refused": ("presses_refused", "reason", "Presses that led to no capture."),
+    "done": ("done", None, "Faces published."),
+    "failed": ("failed", None, "Captures published as without a face."),
+    "dead": ("dead", None, "Captures given up after repeated attempts."),
+    "redelivered": ("redelivered", None, "Jobs given out again."),
+    "removed": ("removed", "by", "Captures removed."),
+    "refused": ("refused", "reason", "Connections and messages that were not let in."),
+    "drops": ("publication_drops", "topic",
+              "Publications at which a subscriber's queue was found full."),
+    "fetched": ("fetched", None, "Outcomes that subscribers asked for instead of hearing them."),
+    "previews": ("previews", None, "Previews published."),
+}
+"""Name in `Counters` -> name of the metric, its label, what it says."""
+
+_PREFIX = "denseface_"
+
+
+class Metrics(Collector):
+    """Renders what the board shows; for any thread."""
+
+    def __init__(self, board: Board) -> None:
+        self._board = board
+        self._registry = CollectorRegistry(auto_describe=False)
+        self._registry.register(self)
+        ProcessCollector(registry=self._registry)
+
+    def render(self) -> bytes:
+        """Give all metrics in Prometheus' text format."""
+        return generate_latest(self._registry)
+
+    def collect(self) -> Iterator[Metric]:
+        """Give the families; none before the hub's first status."""
+        picture = self._board.picture
+        if picture is not None:
+            yield from _counters(picture)
+            yield from _gauges(picture)
+            yield _latencies(picture.stages)
+
+
+def _counters(picture: Picture) -> Iterator[Metric]:
+    for name, (metric, label, text) in COUNTERS.items():
+        found = {one: count for known, one, count in picture.counts if known == name}
+        family = CounterMetricFamily(_PREFIX + metric, text, labels=[label] if label else [])
+        if label is None:
+            family.add_metric([], sum(found.values()))
+        for one, count in found.items() if label else ():
+            family.add_metric([one], count)
+        yield family
+
+
+def _gauges(picture: Picture) -> Iterator[Metric]:
+    status = picture.status
+    yield _family("in_flight", "Captures without an outcome.", "state", {
+        "pressed": status.pressed, "queued": status.queued, "working": status.working})
+    yield _family("kept_captures", "Captures kept in the data folder.", "state", {
+        "done": status.done, "failed": status.failed, "dead": status.dead})
+    yield _family("subscriptions", "Subscriptions.", "topic", picture.subscriptions)
+    yield _one("sensors", "Sensors alive.", len(status.sensors))
+    yield _one("workers", "Workers alive.", len(status.workers))
+    if status.free_bytes is not None:
+        yield _one("disk_free_bytes", "Room left on the data folder's disk.", status.free_bytes)
+    if status.kept_bytes is not None:
+        yield _one("kept_bytes", "Size of the files kept.", status.kept_bytes)
+    yield _family("build", "Always 1.", "version", {status.hub_version: 1})
+
+
+def _one(name: str, text: str, value: int) -> Metric:
+    return GaugeMetricFamily(_PREFIX + name, text, value=value)
+
+
+def _family(name: str, text: str, label: str, values: dict[str, int]) -> Metric:
+    family = GaugeMetricFamily(_PREFIX + name, text, labels=[label])
+    for one, value in values.items():
+        family.add_metric([one], value)
+    return family
+
+
+def _latencies(stages: dict[str, Histogram]) -> Metric:
+    family = HistogramMetricFamily(
+        _PREFIX + "latency_seconds", "How long each stage took.", labels=["stage"])
+    for stage, one in stages.items():
+        ends = [*map(str, BUCKETS_S), "+Inf"]
+        family.add_metric([stage], list(zip(ends, accumulate(one.counts), strict=True)),
+                          sum_value=one.total_s)
+    return family

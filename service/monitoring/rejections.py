@@ -1,0 +1,59 @@
+"""What was not let through: counted by reason, logged with who it was, but not without end."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import structlog
+
+from denseface.service.monitoring.counters import Counters
+
+__all__ = ["Refusals"]
+
+_BURST = 5.0
+_PER_S = 0.2
+"""Lines that one reason may log at once, and for each second after: garbage may not fill a disk."""
+
+
+@dataclass
+class _Allowance:
+    lines: float = _BURST
+    since: float = 0.0
+    unsaid: int = 0
+
+
+class Refusals:
+    """Counts under the name `refused`, with the reason as label."""
+
+    def __init__(
+        self, counters: Counters, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._counters = counters
+        self._clock = clock
+        self._allowances: dict[str, _Allowance] = {}
+        self._log = structlog.get_logger("hub")
+
+    def counts(self) -> dict[str, int]:
+        """Give the number of refusals by reason."""
+        return self._counters.labels("refused")
+
+    def note(self, reason: str, **who: object) -> None:
+        """Count a refusal and, if there were not too many, log it.
+
+        Parameters
+        ----------
+        reason : one of a fixed set
+        who : key name, address and what else is known
+        """
+        self._counters.add("refused", reason)
+        now = self._clock()
+        one = self._allowances.setdefault(reason, _Allowance(since=now))
+        one.lines = min(_BURST, one.lines + (now - one.since) * _PER_S)
+        one.since = now
+        if one.lines < 1:
+            one.unsaid += 1
+            return
+        one.lines -= 1
+        more = {"more_unsaid": one.unsaid} if one.unsaid else {}
+        one.unsaid = 0
+        self._log.warning("refused", reason=reason, **who, **more)

@@ -1,0 +1,1 @@
+"""The messages as data: what they hold and how they are written on the wire."""

@@ -1,0 +1,130 @@
+"""A dense cloud in a third of its bytes.
+
+What follows from the rest is left out: x and y from a point's place on the grid, a normal's length
+and its side. Normals are kept to 0.003 degrees and `sigma` to 0.05 %, far finer than either is
+known; points, colours and places as they are.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from denseface.recon.face import DenseCloud
+
+__all__ = ["PackedCloud", "pack", "unpack", "warm_packing"]
+
+_UNIT = 32767
+"""What stands for a normal's component of 1."""
+_SIGMA_MM = 1e-4, 65e3
+"""What a float16 holds with all its digits."""
+
+
+@dataclass(frozen=True, eq=False)
+class PackedCloud:
+    """A `DenseCloud` as it is sent and kept.
+
+    Attributes
+    ----------
+    support : (rows, ceil(columns / 8)) uint8, one bit for each place on the grid, the highest
+        first: 1 where there is a point. Points are in this order.
+    x, y : (columns,), (rows,) float32, mm; of a column or row without points any number
+    z : (n,) float32, mm
+    colors : (n, 3) uint8, RGB
+    normals : (n, 2) int16, x and y of the unit normal, times 32767; z is negative
+    sigma : (n,) float16, mm
+    grid_shape, grid_step_mm : as of the cloud
+
+    Raises
+    ------
+    ValueError
+        Where a coordinate is not finite, sigma not positive, or there are not as many points as
+        places with one.
+    """
+
+    support: NDArray[np.uint8]
+    x: NDArray[np.float32]
+    y: NDArray[np.float32]
+    z: NDArray[np.float32]
+    colors: NDArray[np.uint8]
+    normals: NDArray[np.int16]
+    sigma: NDArray[np.float16]
+    grid_shape: tuple[int, int]
+    grid_step_mm: float
+
+    def __post_init__(self) -> None:
+        for name in ("x", "y", "z"):
+            if not np.isfinite(getattr(self, name)).all():
+                raise ValueError(f"{name} must be finite")
+        bits = self.sigma.view(np.uint16)  # in the order of the numbers, infinity above them all
+        if len(bits) and not 0 < bits.min() <= bits.max() < _INFINITE:
+            raise ValueError("sigma must be positive and finite")
+        beyond = -self.grid_shape[1] % 8
+        if self.support.size and (self.support[:, -1] & ((1 << beyond) - 1)).any():
+            raise ValueError(f"support must lie on the {self.grid_shape} grid")
+        places = int(np.bitwise_count(self.support).sum())
+        if places != len(self.z):
+            raise ValueError(f"support has {places} places for {len(self.z)} points")
+
+
+_INFINITE = int(np.array(np.inf, np.float16).view(np.uint16))
+
+
+def pack(cloud: DenseCloud) -> PackedCloud:
+    """Pack a cloud.
+
+    Raises
+    ------
+    ValueError
+        Where a point is not at its place on a grid, they are not sorted, a normal points away from
+        the camera, or sigma is beyond what 16 bits hold in full (0.0001 to 65,000 mm).
+    """
+    # numba takes most of a second: who unpacks shall not wait
+    from denseface.service.protocol import _packing_kernels
+
+    rows, columns = cloud.grid_shape
+    done, support, x, y, z, normals = _packing_kernels.pack(
+        cloud.points, cloud.normals, cloud.cells, rows, columns, _UNIT)
+    if done < len(cloud):
+        raise ValueError(f"point {done} is not at its place on a grid, not behind the one before, "
+                         "or its normal points away from the camera")
+    least, most = _SIGMA_MM
+    if len(cloud) and not least <= cloud.sigma.min() <= cloud.sigma.max() <= most:
+        raise ValueError(f"sigma must be within {least} and {most:.0f} mm")
+    sigma = _packing_kernels.halved(cloud.sigma.view(np.uint32)).view(np.float16)
+    return PackedCloud(support, x, y, z, cloud.colors, normals, sigma,
+                       (int(rows), int(columns)), float(cloud.grid_step_mm))
+
+
+def unpack(packed: PackedCloud) -> DenseCloud:
+    """Give the cloud back, its normals of unit length again."""
+    rows, columns = packed.grid_shape
+    n = len(packed.z)
+    on = np.unpackbits(packed.support, axis=1, count=columns).view(np.bool_)
+    each = np.bitwise_count(packed.support).sum(axis=1, dtype=np.intp)
+    cells = np.empty((n, 2), np.int32)
+    cells[:, 0] = np.repeat(np.arange(rows, dtype=np.int32), each)
+    cells[:, 1] = np.broadcast_to(np.arange(columns, dtype=np.int32), on.shape)[on]
+    points = np.empty((n, 3), np.float32)
+    points[:, 0] = np.broadcast_to(packed.x, on.shape)[on]
+    points[:, 1] = np.repeat(packed.y, each)
+    points[:, 2] = packed.z
+    across = packed.normals * np.float32(1 / _UNIT)
+    rest = 1 - across[:, 0] ** 2 - across[:, 1] ** 2
+    beyond = rest < 0  # rounded up, at right angles to the view
+    if beyond.any():
+        across[beyond] /= np.sqrt(1 - rest[beyond])[:, None]
+        rest[beyond] = 0
+    normals = np.empty((n, 3), np.float32)
+    normals[:, :2] = across
+    normals[:, 2] = -np.sqrt(rest)
+    return DenseCloud(points, packed.colors, normals, packed.sigma.astype(np.float32), cells,
+                      packed.grid_shape, packed.grid_step_mm)
+
+
+def warm_packing() -> None:
+    """Load or compile what `pack` runs, which the first face would otherwise wait for."""
+    one = np.zeros(1, np.float32)
+    pack(DenseCloud(
+        np.zeros((1, 3), np.float32), np.zeros((1, 3), np.uint8),
+        np.array([[0, 0, -1]], np.float32), one + 1, np.zeros((1, 2), np.int32), (1, 1), 1.0))

@@ -1,0 +1,229 @@
+"""Frames and faces as they travel: a header that fixes every shape, then raw arrays.
+
+The header alone decides which arrays follow and how large each is (`layout`), so nothing that the
+other side says of its buffers needs to be believed.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, Self
+
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, FailFast, Field, model_validator
+
+from denseface.capture import Calibration, CaptureError, RgbdFrame
+from denseface.recon.face import Face, PointCloud, Report
+from denseface.service.errors import LocalProtocolError, RemoteProtocolError
+from denseface.service.protocol.packing import PackedCloud, pack, unpack
+
+__all__ = ["MAX_ARRAY_BYTES", "MAX_PAYLOAD_BYTES", "MAX_PREVIEW_SIDE", "ArrayInfo", "Arrays",
+           "FaceHeader", "FrameHeader", "Payload", "PreviewHeader"]
+
+MAX_ARRAY_BYTES = 32 * 2**20
+"""Largest single array; also MAXMSGSIZE of every socket."""
+MAX_PAYLOAD_BYTES = 96 * 2**20
+"""Largest sum of a message's arrays."""
+MAX_PREVIEW_SIDE = 320
+"""Longest side of a preview, pixels."""
+_SEED_BYTES, _POINT_BYTES = 15, 39
+"""Of a point of either cloud in memory."""
+
+Arrays = Mapping[str, NDArray[Any]]
+
+_Count = Annotated[int, Field(gt=0, le=2**24)]
+_Side = Annotated[int, Field(ge=1, le=MAX_PREVIEW_SIDE)]
+_Int64 = Annotated[int, Field(ge=-(2**63), lt=2**63)]
+_DType = Literal["<u2", "|u1", "<f4", "<i2", "<f2"]
+_ITEM_BYTES = {"<u2": 2, "|u1": 1, "<f4": 4, "<i2": 2, "<f2": 2}
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+@dataclass(frozen=True)
+class ArrayInfo:
+    """One raw buffer: little-endian, C order."""
+
+    # No model: one is made for each array of each message, which takes a model five times as long.
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    name: Annotated[str, Field(max_length=32)]
+    dtype: _DType
+    shape: Annotated[tuple[Annotated[int, Field(ge=0, le=2**31)], ...], Field(max_length=3)]
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the buffer."""
+        return _ITEM_BYTES[self.dtype] * math.prod(self.shape)
+
+
+class _PayloadHeader(_Model):
+    arrays: Annotated[tuple[ArrayInfo, ...], Field(max_length=16), FailFast()] = ()
+    """The buffers that follow, in order; filled in from `layout` where not given."""
+
+    def layout(self) -> tuple[ArrayInfo, ...]:
+        """Give the arrays that this header must be followed by."""
+        raise NotImplementedError
+
+    @model_validator(mode="after")
+    def _checked(self) -> Self:
+        expected = self.layout()
+        if not self.arrays:
+            object.__setattr__(self, "arrays", expected)
+        elif self.arrays != expected:
+            raise ValueError(f"arrays must be {_names(expected)}, found {_names(self.arrays)}")
+        sizes = [info.nbytes for info in expected]
+        for info, size in zip(expected, sizes, strict=True):
+            if size > MAX_ARRAY_BYTES:
+                raise ValueError(
+                    f"array {info.name} has {size} bytes, at most {MAX_ARRAY_BYTES} allowed")
+        total = sum(sizes)
+        if total > MAX_PAYLOAD_BYTES:
+            raise ValueError(f"arrays have {total} bytes, at most {MAX_PAYLOAD_BYTES} allowed")
+        return self
+
+
+class FrameHeader(_PayloadHeader):
+    """All of an `RgbdFrame` but its images."""
+
+    calibration: Calibration
+    depth_timestamp_us: _Int64
+    color_timestamp_us: _Int64
+    registered: bool = False
+    calibration_origin: Annotated[str, Field(max_length=4096)] = "unspecified"
+
+    def layout(self) -> tuple[ArrayInfo, ...]:
+        """Give depth and colour, as large as the calibration says."""
+        color = self.calibration.color
+        depth = color if self.registered else self.calibration.depth
+        return (_info("depth", "<u2", depth.height, depth.width),
+                _info("color", "|u1", color.height, color.width, 3))
+
+    @classmethod
+    def of(cls, frame: RgbdFrame) -> tuple[Self, Arrays]:
+        """Take a frame apart."""
+        header = cls(
+            calibration=frame.calibration, depth_timestamp_us=frame.depth_timestamp_us,
+            color_timestamp_us=frame.color_timestamp_us, registered=frame.registered,
+            calibration_origin=frame.calibration_origin)
+        return header, {"depth": frame.depth, "color": frame.color}
+
+    def join(self, arrays: Arrays) -> RgbdFrame:
+        """Put the frame together again.
+
+        Raises
+        ------
+        RemoteProtocolError
+            Where header and arrays do not make a frame.
+        """
+        try:
+            return RgbdFrame(
+                arrays["depth"], arrays["color"], self.depth_timestamp_us, self.color_timestamp_us,
+                self.calibration, self.registered, calibration_origin=self.calibration_origin)
+        except (CaptureError, KeyError) as error:
+            raise RemoteProtocolError(f"frame: {error}") from error
+
+
+class FaceHeader(_PayloadHeader):
+    """All of a `Face` but its points."""
+
+    report: Report
+    initial_points: _Count
+    dense_points: _Count
+    grid_shape: tuple[_Count, _Count]
+    grid_step_mm: Annotated[float, Field(gt=0)]
+
+    def layout(self) -> tuple[ArrayInfo, ...]:
+        """Give both clouds, the dense one packed, as large as counts and grid say."""
+        n, m = self.initial_points, self.dense_points
+        rows, columns = self.grid_shape
+        return (_info("initial_points", "<f4", n, 3), _info("initial_colors", "|u1", n, 3),
+                _info("dense_support", "|u1", rows, -(-columns // 8)),
+                _info("dense_x", "<f4", columns), _info("dense_y", "<f4", rows),
+                _info("dense_z", "<f4", m), _info("dense_colors", "|u1", m, 3),
+                _info("dense_normals", "<i2", m, 2), _info("dense_sigma", "<f2", m))
+
+    @model_validator(mode="after")
+    def _unpacks(self) -> Self:
+        """Check what becomes of it in memory, several times as large."""
+        rows, columns = self.grid_shape
+        if rows * columns > MAX_ARRAY_BYTES:
+            raise ValueError(f"the grid has {rows} x {columns} places, "
+                             f"at most {MAX_ARRAY_BYTES} allowed")
+        size = _SEED_BYTES * self.initial_points + _POINT_BYTES * self.dense_points
+        if size > MAX_PAYLOAD_BYTES:
+            raise ValueError(f"both clouds have {size} bytes, at most {MAX_PAYLOAD_BYTES} allowed")
+        return self
+
+    @classmethod
+    def of(cls, face: Face) -> tuple[Self, Arrays]:
+        """Take a face apart.
+
+        Raises
+        ------
+        LocalProtocolError
+            Where its dense cloud cannot be packed: `service.protocol.packing.pack`.
+        """
+        initial = face.initial
+        try:
+            dense = pack(face.dense)
+        except ValueError as error:
+            raise LocalProtocolError(f"face: {error}") from error
+        header = cls(
+            report=face.report, initial_points=len(initial), dense_points=len(dense.z),
+            grid_shape=dense.grid_shape, grid_step_mm=dense.grid_step_mm)
+        return header, {
+            "initial_points": initial.points, "initial_colors": initial.colors,
+            "dense_support": dense.support, "dense_x": dense.x, "dense_y": dense.y,
+            "dense_z": dense.z, "dense_colors": dense.colors, "dense_normals": dense.normals,
+            "dense_sigma": dense.sigma}
+
+    def check(self, arrays: Arrays) -> None:
+        """Make sure that `join` would give a face, for a fraction of its time; raises as it."""
+        self._clouds(arrays)
+
+    def join(self, arrays: Arrays) -> Face:
+        """Put the face together again.
+
+        Raises
+        ------
+        RemoteProtocolError
+            Where header and arrays do not make a face, or a coordinate is not finite.
+        """
+        initial, dense = self._clouds(arrays)
+        return Face(initial, unpack(dense), self.report)
+
+    def _clouds(self, arrays: Arrays) -> tuple[PointCloud, PackedCloud]:
+        try:
+            return PointCloud(arrays["initial_points"], arrays["initial_colors"]), PackedCloud(
+                arrays["dense_support"], arrays["dense_x"], arrays["dense_y"], arrays["dense_z"],
+                arrays["dense_colors"], arrays["dense_normals"], arrays["dense_sigma"],
+                self.grid_shape, self.grid_step_mm)
+        except (ValueError, KeyError) as error:
+            raise RemoteProtocolError(f"face: {error}") from error
+
+
+class PreviewHeader(_PayloadHeader):
+    """A small picture of what the sensor sees."""
+
+    width: _Side
+    height: _Side
+    timestamp_us: _Int64
+    """Of the colour image that it was made of."""
+
+    def layout(self) -> tuple[ArrayInfo, ...]:
+        """Give the picture."""
+        return (_info("image", "|u1", self.height, self.width, 3),)
+
+
+Payload = FrameHeader | FaceHeader | PreviewHeader
+
+
+def _info(name: str, dtype: _DType, *shape: int) -> ArrayInfo:
+    return ArrayInfo(name, dtype, shape)
+
+
+def _names(infos: tuple[ArrayInfo, ...]) -> str:
+    return ", ".join(f"{info.name} {info.dtype} {list(info.shape)}" for info in infos)

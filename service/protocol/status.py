@@ -1,0 +1,64 @@
+"""The message that says how the service is."""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from denseface.service.protocol.message_base import BaseAnswer, Name, Names, Number, Token
+
+__all__ = ["Latency", "Status"]
+
+_TimeS = Annotated[float, Field(ge=0)]
+_Counts = Annotated[dict[Name, Number], Field(default_factory=dict, max_length=64)]
+
+
+class Latency(BaseModel):
+    """How long one stage took since the hub started, estimated from its histogram."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
+
+    count: Number
+    median_s: _TimeS
+    p99_s: _TimeS
+
+
+class Status(BaseAnswer):
+    """Published on topic `status` at every heartbeat.
+
+    The one message that may gain fields within a version: fields that a reader does not know, it
+    passes over; what is missing from an older hub has its default.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
+
+    kind: Literal["status"] = "status"
+    epoch: Token
+    sequence: Number
+    """Of the last outcome."""
+    hub_version: Name
+    sensors: Names
+    workers: Names
+    pressed: Number
+    """Presses that wait for their frame."""
+    queued: Number
+    working: Number
+    done: Number
+    failed: Number
+    dead: Number
+    refused: _Counts
+    """Connections and messages that were not let in since the hub started, by reason."""
+    presses_refused: _Counts
+    """Since the hub started, by reason."""
+    since_start: _Counts
+    """What happened how often since the hub started: `accepted`, `redelivered` and others."""
+    latencies: Annotated[dict[Name, Latency], Field(default_factory=dict, max_length=64)]
+    """By stage."""
+    free_bytes: Number | None = None
+    """Room left on the disk."""
+    kept_bytes: Number | None = None
+    """Size of the files kept."""
+
+    @property
+    def ready(self) -> bool:
+        """A press now would become a face."""
+        return bool(self.sensors) and bool(self.workers)

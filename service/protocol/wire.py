@@ -1,0 +1,141 @@
+"""How a message is written on the wire.
+
+A message is a list of buffers: a JSON header (one of `service.protocol.messages`), then the raw
+arrays that the header describes. `encode` and `decode_*` are pure functions;
+`docs/wire.md` says the same in prose.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, TypeAdapter, ValidationError
+
+from denseface.service.errors import LocalProtocolError, RemoteProtocolError
+from denseface.service.protocol.messages import FromHub, Message, ToHub
+from denseface.service.protocol.payload import Arrays
+
+__all__ = ["MAX_HEADER_BYTES", "MAX_HEADER_BYTES_TO_HUB", "MAX_PARTS", "Buffer", "Packet",
+           "decode_from_hub", "decode_kept", "decode_to_hub", "encode"]
+
+MAX_HEADER_BYTES = 256 * 1024
+MAX_HEADER_BYTES_TO_HUB = 64 * 1024
+"""A quarter: what the hub takes it must be able to write, and `1e15` is written with 18 bytes."""
+MAX_PARTS = 1 + 16
+
+Buffer = bytes | memoryview
+"""One part of a message."""
+
+_TO_HUB: TypeAdapter[ToHub] = TypeAdapter(Annotated[ToHub, Field(discriminator="kind")])
+_FROM_HUB: TypeAdapter[FromHub] = TypeAdapter(Annotated[FromHub, Field(discriminator="kind")])
+
+
+@dataclass(frozen=True)
+class Packet:
+    """A message and the arrays that its header announces."""
+
+    message: Message
+    arrays: Arrays = field(default_factory=dict)
+
+
+def encode(packet: Packet) -> list[Buffer]:
+    """Write a message: bytes for the header, views of the arrays' memory behind it.
+
+    Raises
+    ------
+    LocalProtocolError
+        Where the arrays are not those that the header states, or the header is too long.
+    """
+    message, arrays = packet.message, packet.arrays
+    header = message.model_dump_json().encode()
+    if len(header) > MAX_HEADER_BYTES:
+        raise LocalProtocolError(
+            f"{message.kind}: header has {len(header)} bytes, at most {MAX_HEADER_BYTES} allowed")
+    infos = message.payload.arrays if message.payload else ()
+    if set(arrays) != {info.name for info in infos}:
+        raise LocalProtocolError(
+            f"{message.kind}: arrays {sorted(arrays)} given, "
+            f"{sorted(info.name for info in infos)} expected")
+    for info in infos:
+        array = arrays[info.name]
+        if array.dtype != np.dtype(info.dtype) or array.shape != info.shape:
+            raise LocalProtocolError(
+                f"{message.kind}: {info.name} is {array.dtype} {list(array.shape)}, "
+                f"the header says {info.dtype} {list(info.shape)}")
+    return [header, *(_raw(arrays[info.name].astype(info.dtype, copy=False)) for info in infos)]
+
+
+def _raw(array: NDArray[Any]) -> memoryview:
+    return np.ascontiguousarray(array).reshape(-1).view(np.uint8).data
+
+
+def decode_to_hub(parts: Sequence[Buffer]) -> Packet:
+    """Read a message that the hub may receive.
+
+    Parameters
+    ----------
+    parts : header, then one buffer for each array; arrays of the result are read-only views
+
+    Raises
+    ------
+    RemoteProtocolError
+        Where a limit, a field, a dtype, a shape or a size is not as it must be.
+    """
+    return _decode(parts, _TO_HUB, MAX_HEADER_BYTES_TO_HUB)
+
+
+def decode_kept(parts: Sequence[Buffer]) -> Packet:
+    """Read again what `encode` wrote of a message that the hub received; as `decode_to_hub`."""
+    return _decode(parts, _TO_HUB, MAX_HEADER_BYTES)
+
+
+def decode_from_hub(parts: Sequence[Buffer]) -> Packet:
+    """Read a message that only the hub may send; otherwise as `decode_to_hub`."""
+    return _decode(parts, _FROM_HUB, MAX_HEADER_BYTES)
+
+
+def _decode(
+    parts: Sequence[Buffer], adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub], most: int
+) -> Packet:
+    if not 1 <= len(parts) <= MAX_PARTS:
+        raise RemoteProtocolError(f"message has {len(parts)} parts, 1 to {MAX_PARTS} expected",
+                                  "oversized" if parts else "truncated")
+    header, *buffers = parts
+    if len(header) > most:
+        raise RemoteProtocolError(
+            f"header has {len(header)} bytes, at most {most} allowed", "oversized")
+    message = _header(bytes(header), adapter)
+    infos = message.payload.arrays if message.payload else ()
+    if len(buffers) != len(infos):
+        raise RemoteProtocolError(
+            f"{message.kind}: {len(buffers)} arrays follow, {len(infos)} announced", "truncated")
+    for info, buffer in zip(infos, buffers, strict=True):
+        if len(buffer) != info.nbytes:
+            raise RemoteProtocolError(
+                f"{message.kind}: {info.name} has {len(buffer)} bytes, {info.nbytes} announced",
+                "truncated")
+    return Packet(message, {
+        info.name: np.frombuffer(memoryview(buffer).toreadonly(), info.dtype).reshape(info.shape)
+        for info, buffer in zip(infos, buffers, strict=True)})
+
+
+def _header(header: bytes, adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub]) -> ToHub | FromHub:
+    try:
+        with np.errstate(all="ignore"):  # absurd calibrations overflow before they are refused
+            message = adapter.validate_json(header)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False, include_context=False)[0]
+        where = ".".join(str(part) for part in first["loc"]) or "header"
+        reason = "version" if first["loc"][-1:] == ("version",) else "malformed"
+        raise RemoteProtocolError(
+            _printable(f"{where}: {first['msg']}"[:500]), reason) from error
+    if "version" not in message.model_fields_set:
+        raise RemoteProtocolError(f"{message.kind}: no version given", "version")
+    return message
+
+
+def _printable(text: str) -> str:
+    """Escape what could forge a line of a log or command a terminal."""
+    return "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)

@@ -1,0 +1,1 @@
+"""A process's plumbing: logging, signals, threads, limits, files; knows no messages."""

@@ -1,0 +1,128 @@
+"""Places where a test lets a process die, hang or find its disk full. For tests alone.
+
+Nothing happens at any of them unless the environment asks for it.
+`DENSEFACE_FAILPOINTS` is a list with commas of `NAME=ACTION`, or `NAME=ACTION@N` for the N-th time
+alone. `DENSEFACE_FAILPOINTS_TOKENS` may name a folder: then a failpoint acts only where a file of
+its name is there, which it removes first, so it acts once, whoever starts the process again.
+"""
+
+import errno
+import os
+import signal
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import structlog
+
+from denseface.service.errors import SettingsError
+
+__all__ = ["ACTIONS", "NAMES", "TOKENS", "VARIABLE", "arm", "failpoint"]
+
+VARIABLE = "DENSEFACE_FAILPOINTS"
+TOKENS = "DENSEFACE_FAILPOINTS_TOKENS"
+
+NAMES = (
+    "hub.take.sent", "capture.take.received", "capture.frame.taken", "capture.frame.sent",
+    "hub.frame.received", "hub.frame.written", "hub.frame.synced", "hub.frame.renamed",
+    "hub.frame.named", "hub.frame.stored", "hub.frame.acknowledged", "hub.press.acknowledged",
+    "hub.attempt.counted", "hub.job.sent",
+    "worker.job.received", "worker.job.computing", "worker.job.computed", "worker.result.sent",
+    "hub.result.received", "hub.face.written", "hub.face.synced", "hub.face.renamed",
+    "hub.face.named", "hub.outcome.stored", "hub.outcome.publishing", "hub.outcome.published",
+)
+"""Every step of a capture's life, in order."""
+
+ACTIONS = ("kill", "stop", "hang", "raise:ENOSPC", "raise:EIO")
+"""SIGKILL or SIGSTOP to this process; the thread waits for ever; an OSError as from the disk."""
+
+_DISK = ("written", "synced", "renamed")
+"""Last word of the failpoints that may raise."""
+
+
+@dataclass
+class _Failpoint:
+    action: str
+    only: int | None
+    """Which time alone; where None, each time."""
+    passed: int = 0
+
+
+_armed: dict[str, _Failpoint] = {}
+_tokens: list[Path] = []
+_lock = threading.Lock()
+
+
+def arm(environment: Mapping[str, str]) -> None:
+    """Read the environment once, at the start of a process, and warn where something is set.
+
+    Raises
+    ------
+    SettingsError
+        Where a failpoint or an action is unknown.
+    """
+    _armed.clear()
+    _tokens.clear()
+    text = environment.get(VARIABLE, "")
+    if not text:
+        return
+    for entry in text.split(","):
+        name, _, what = entry.partition("=")
+        action, at, number = what.partition("@")
+        if name not in NAMES:
+            raise SettingsError(f"{VARIABLE}: no failpoint {name!r}, expected one of "
+                                f"{', '.join(NAMES)}")
+        possible = [one for one in ACTIONS
+                    if not one.startswith("raise") or name.endswith(_DISK)]
+        if action not in possible:
+            raise SettingsError(f"{VARIABLE}: {name} cannot {action!r}, expected one of "
+                                f"{', '.join(possible)}")
+        if at and not (number.isdecimal() and int(number) > 0):
+            raise SettingsError(f"{VARIABLE}: {name}={what}: expected a number from 1 after @")
+        _armed[name] = _Failpoint(action, int(number) if at else None)
+    if folder := environment.get(TOKENS):
+        _tokens.append(Path(folder))
+    structlog.get_logger("failpoints").warning(
+        "failpoints are set: this process is to fail", failpoints=text)
+
+
+def failpoint(name: str) -> None:
+    """Do nothing, unless a test wants this process to fail here.
+
+    Raises
+    ------
+    OSError
+        Where that is how it is to fail.
+    """
+    if _armed:
+        _pass(name)
+
+
+def _pass(name: str) -> None:
+    armed = _armed.get(name)
+    if armed is None:
+        return
+    with _lock:
+        armed.passed += 1
+        if armed.only not in (None, armed.passed) or not _spend(name):
+            return
+    match armed.action.split(":"):
+        case ["kill"]:
+            os.kill(os.getpid(), signal.SIGKILL)
+        case ["stop"]:
+            os.kill(os.getpid(), signal.SIGSTOP)
+        case ["hang"]:
+            threading.Event().wait()
+        case [_, which]:
+            number = getattr(errno, which)
+            raise OSError(number, os.strerror(number), f"failpoint {name}")
+
+
+def _spend(name: str) -> bool:
+    for folder in _tokens:
+        try:
+            (folder / name).unlink()
+        except FileNotFoundError:
+            return False
+    return True

@@ -1,0 +1,1 @@
+"""Keys, the allow-list, and which role may say what."""

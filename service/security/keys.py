@@ -1,0 +1,196 @@
+"""CURVE keys in files of mode 0600: what `denseface keys` writes and every process reads.
+
+`NAME.secret` holds a pair, `NAME.public` its public half, which is what goes to another machine,
+and `allowed/NAME` (see `service.security.allow_list`) the public half of someone who may come in.
+"""
+
+import os
+import re
+import stat
+import struct
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Self
+
+import zmq
+import zmq.utils.z85
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from denseface.service.errors import KeyFileError
+from denseface.service.settings import private_folder
+from denseface.service.storage.record_file import write_atomically
+
+__all__ = ["HUB", "KeyPair", "check_key", "check_name", "fingerprint", "new_pair", "read_pair",
+           "read_private_text", "read_public", "write_private"]
+
+HUB = "hub"
+"""Name of the hub's own pair."""
+
+_MAX_BYTES = 4096
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+_Z85 = re.compile(r"[0-9A-Za-z.\-:+=^!/*?&<>()\[\]{}@%$#]{40}")
+
+
+class _File(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str
+    public_key: str
+    secret_key: str | None = None
+
+
+@dataclass(frozen=True)
+class KeyPair:
+    """A CURVE pair, each half 40 characters of Z85."""
+
+    public: str
+    secret: str
+
+    @classmethod
+    def made(cls) -> Self:
+        """Make a new one."""
+        public, secret = zmq.curve_keypair()
+        return cls(public.decode(), secret.decode())
+
+    def __repr__(self) -> str:
+        """Show the public half alone: the other may not reach a log."""
+        return f"KeyPair({self.public!r})"
+
+
+def fingerprint(public: str) -> str:
+    """Name a public key in 16 hexadecimal digits."""
+    return sha256(public.encode()).hexdigest()[:16]
+
+
+def check_name(name: str) -> str:
+    """Give a key's name back.
+
+    Raises
+    ------
+    KeyFileError
+        Where it could not be a file's name.
+    """
+    if not _NAME.fullmatch(name):
+        raise KeyFileError(f"key name {name!r}: expected letters, digits, - and _, at most 64")
+    return name
+
+
+def check_key(path: Path, key: str) -> str:
+    """Give a key back that a file held.
+
+    Raises
+    ------
+    KeyFileError
+        Where it is none.
+    """
+    if not _is_key(key):
+        raise KeyFileError(f"{path}: its key is not 40 characters of Z85")
+    return key
+
+
+def _is_key(text: str) -> bool:
+    if not _Z85.fullmatch(text):
+        return False
+    try:
+        return len(zmq.utils.z85.decode(text)) == 32
+    except struct.error:  # five of them can say more than four bytes hold
+        return False
+
+
+def new_pair(folder: Path, name: str) -> tuple[Path, Path]:
+    """Make a pair and give its files, secret and public.
+
+    Raises
+    ------
+    KeyFileError, SettingsError
+        Where there is one of that name, or the folder cannot be written.
+    """
+    private_folder(folder)
+    secret, public = (folder / f"{check_name(name)}.{kind}" for kind in ("secret", "public"))
+    for path in (secret, public):
+        if path.exists():
+            raise KeyFileError(f"{path}: exists; remove it or choose another name")
+    pair = KeyPair.made()
+    write_private(secret, _File(name=name, public_key=pair.public, secret_key=pair.secret))
+    write_private(public, _File(name=name, public_key=pair.public))
+    return secret, public
+
+
+def write_private(path: Path, contents: BaseModel) -> None:
+    """Write a file of mode 0600, whole or not at all.
+
+    Raises
+    ------
+    KeyFileError
+        Where it cannot be written.
+    """
+    text = contents.model_dump_json(indent=2, exclude_none=True) + "\n"
+    try:
+        write_atomically(path, [text.encode()], mode=0o600)
+    except OSError as error:
+        raise KeyFileError(f"{path}: {error.strerror or error}") from error
+
+
+def read_pair(path: Path) -> KeyPair:
+    """Read one's own pair.
+
+    Raises
+    ------
+    KeyFileError
+        Where it is none, or others than its owner may read it.
+    """
+    file = _parse(path, read_private_text(path, 0o077))
+    if file.secret_key is None:
+        raise KeyFileError(f"{path}: holds a public key, expected the file NAME.secret")
+    check_key(path, file.secret_key)
+    if zmq.curve_public(file.secret_key.encode()).decode() != file.public_key:
+        raise KeyFileError(f"{path}: its public and its secret key do not belong together")
+    return KeyPair(file.public_key, file.secret_key)
+
+
+def read_public(given: Path | str) -> str:
+    """Read a public key: the 40 characters themselves, or a file that holds it.
+
+    Raises
+    ------
+    KeyFileError
+        Where it is neither.
+    """
+    if _is_key(str(given)):
+        return str(given)
+    path = Path(given)
+    file = _parse(path, read_private_text(path, 0))
+    return check_key(path, file.public_key)
+
+
+def read_private_text(path: Path, forbidden: int) -> bytes:
+    """Read a small file unless others have one of the `forbidden` permissions.
+
+    Raises
+    ------
+    KeyFileError
+        Where it is no regular file, too long, not ours or open to others.
+    """
+    try:
+        with path.open("rb") as file:
+            found = os.fstat(file.fileno())
+            text = file.read(_MAX_BYTES + 1) if stat.S_ISREG(found.st_mode) else b""
+    except OSError as error:
+        raise KeyFileError(f"{path}: {error.strerror or error}") from error
+    if not stat.S_ISREG(found.st_mode) or len(text) > _MAX_BYTES:
+        raise KeyFileError(f"{path}: expected a key file of at most {_MAX_BYTES} bytes")
+    if forbidden and found.st_uid != os.getuid():
+        raise KeyFileError(f"{path}: belongs to user {found.st_uid}, expected {os.getuid()}")
+    if found.st_mode & forbidden:
+        raise KeyFileError(
+            f"{path}: others may use this key (mode {found.st_mode & 0o777:o}): expected 600, "
+            "and if others had access make a new key")
+    return text
+
+
+def _parse(path: Path, text: bytes) -> _File:
+    try:
+        return _File.model_validate_json(text)
+    except ValidationError as error:
+        raise KeyFileError(f"{path}: not a key file of `denseface keys`") from error

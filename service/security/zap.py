@@ -1,0 +1,81 @@
+"""Decides which keys may connect: ZeroMQ's authentication protocol (RFC 27), in the hub's own loop.
+
+There is no thread that could die unseen: the hub and its authenticator live and end together. And
+while no authenticator answers, `ZAP_ENFORCE_DOMAIN` makes libzmq refuse every connection.
+"""
+
+from collections.abc import Callable
+
+import zmq
+import zmq.utils.z85
+
+from denseface.service.monitoring.rejections import Refusals
+from denseface.service.security.allow_list import Allowed, Keyring
+
+__all__ = ["DOMAIN", "TOPICS_DOMAIN", "Authenticator"]
+
+DOMAIN, TOPICS_DOMAIN = b"denseface", b"denseface.topics"
+"""Of the sockets for messages and of those for publications."""
+
+_ENDPOINT = "inproc://zeromq.zap.01"
+_VERSION = b"1.0"
+_BURST = 64
+
+
+class Authenticator:
+    """Answers, for all sockets of this context, whether a key may connect.
+
+    Parameters
+    ----------
+    admits : says whether an allowed key may connect to the sockets of a domain
+    """
+
+    def __init__(
+        self, context: "zmq.Context[zmq.Socket[bytes]]", keyring: Keyring, refusals: Refusals,
+        admits: Callable[[Allowed, bytes], bool],
+    ) -> None:
+        self._keyring = keyring
+        self._refusals = refusals
+        self._admits = admits
+        # A ROUTER: one question that goes wrong does not block the next, as with a REP.
+        self.socket = context.socket(zmq.ROUTER)
+        self.socket.set(zmq.LINGER, 0)
+        self.socket.bind(_ENDPOINT)
+
+    def answer(self) -> None:
+        """Answer what was asked."""
+        for _ in range(_BURST):
+            try:
+                asked = self.socket.recv_multipart(zmq.DONTWAIT)
+            except zmq.Again:
+                return
+            envelope, request = asked[:2], asked[2:]
+            user = self._user(request)
+            status = [b"200", b"OK", user.public.encode()] if user else [b"400", b"refused", b""]
+            number = request[1] if len(request) > 1 else b""
+            self.socket.send_multipart([*envelope, _VERSION, number, *status, b""])
+
+    def close(self) -> None:
+        """Let nobody in any more."""
+        self.socket.close()
+
+    def _user(self, request: list[bytes]) -> Allowed | None:
+        if len(request) != 7 or request[0] != _VERSION:
+            self._refusals.note("handshake", detail="not a request of ZAP 1.0")
+            return None
+        _, _, domain, address, _, mechanism, key = request
+        where = address.decode("ascii", "replace")
+        if mechanism != b"CURVE" or len(key) != 32:
+            self._refusals.note(
+                "handshake", address=where, detail=f"mechanism {mechanism[:16]!r}, not CURVE")
+            return None
+        public = zmq.utils.z85.encode(key).decode()
+        user = self._keyring.get(public)
+        if user is None:
+            self._refusals.note("unknown key", address=where, key=public)
+            return None
+        if not self._admits(user, domain):
+            self._refusals.note(
+                "role", address=where, key=user.name, detail="no topic for its roles")
+            return None
+        return user

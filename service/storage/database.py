@@ -1,0 +1,217 @@
+"""The rows of the data folder: SQLite, checked when it is opened, every error named."""
+
+import secrets
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import structlog
+
+from denseface.service.errors import DamagedDatabaseError, DiskFullError, StoreError
+
+__all__ = ["Database"]
+
+_VERSION = 3
+_ABSURD = 2**53
+_BUSY_S = 1.0
+"""Longest wait for someone who looks into the database with a tool, seconds."""
+
+# The checks let `integrity_check` see a flipped bit in what the hub acts upon.
+_SCHEMA = f"""
+CREATE TABLE meta (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
+CREATE TABLE captures (
+    position INTEGER PRIMARY KEY AUTOINCREMENT,
+    capture_id TEXT NOT NULL UNIQUE
+        CHECK (length(capture_id) BETWEEN 1 AND 64 AND capture_id NOT GLOB '*[^A-Za-z0-9_-]*'),
+    state TEXT NOT NULL CHECK (state IN ('accepted', 'done', 'failed', 'dead', 'removed')),
+    settings_hash TEXT NOT NULL CHECK (settings_hash NOT GLOB '*[^0-9a-f]*'),
+    attempts INTEGER NOT NULL DEFAULT 0 CHECK (attempts >= 0),
+    frame_sha256 TEXT NOT NULL
+        CHECK (length(frame_sha256) = 64 AND frame_sha256 NOT GLOB '*[^0-9a-f]*'),
+    accepted_at TEXT NOT NULL CHECK (datetime(accepted_at) IS NOT NULL),
+    pressed_by TEXT NOT NULL CHECK (pressed_by NOT GLOB '*[^0-9a-f]*')
+) STRICT;
+CREATE TABLE outcomes (
+    sequence INTEGER PRIMARY KEY AUTOINCREMENT,
+    capture_id TEXT NOT NULL UNIQUE REFERENCES captures (capture_id),
+    face_sha256 TEXT CHECK (length(face_sha256) = 64 AND face_sha256 NOT GLOB '*[^0-9a-f]*'),
+    error TEXT,
+    message TEXT,
+    dead INTEGER NOT NULL CHECK (dead IN (0, 1)),
+    finished_at TEXT NOT NULL CHECK (datetime(finished_at) IS NOT NULL),
+    finished_age_s REAL NOT NULL,
+    CHECK ((face_sha256 IS NULL) = (error IS NOT NULL AND message IS NOT NULL))
+) STRICT;
+PRAGMA user_version = {_VERSION};
+"""
+
+
+class Database:
+    """`captures.sqlite3`, open.
+
+    Raises
+    ------
+    DamagedDatabaseError
+        Where it is malformed, is none, or is of another version.
+    StoreError
+        Where it cannot be opened.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        log = path.with_name(f"{path.name}-wal")
+        self.left_open = log.exists() and log.stat().st_size > 0
+        """The last hub was killed: of its last rows, some may be lost."""
+        with self._named():
+            self._connection = sqlite3.connect(path, isolation_level=None, timeout=_BUSY_S)
+        try:
+            with self._named():
+                self._open()
+        except BaseException:
+            self._connection.close()
+            raise
+
+    def _open(self) -> None:
+        connection = self._connection
+        connection.row_factory = sqlite3.Row
+        connection.text_factory = lambda text: text.decode(errors="replace")
+        connection.executescript(
+            "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON;"
+            "PRAGMA secure_delete=ON")
+        if connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0:
+            connection.executescript(f"BEGIN; {_SCHEMA} COMMIT")
+        (version,) = connection.execute("PRAGMA user_version").fetchone()
+        if version != _VERSION:
+            raise DamagedDatabaseError(
+                f"{self.path}: is of version {version}, {_VERSION} expected")
+        found = [row[0] for row in connection.execute("PRAGMA integrity_check(3)")]
+        if found != ["ok"]:
+            reason = " ".join("; ".join(found).split())
+            raise DamagedDatabaseError(f"{self.path}: {reason}"[:500])
+        last, highest = connection.execute(
+            "SELECT coalesce((SELECT seq FROM sqlite_sequence WHERE name = 'outcomes'), 0),"
+            " coalesce((SELECT max(sequence) FROM outcomes), 0)").fetchone()
+        if not highest <= last < _ABSURD:
+            raise DamagedDatabaseError(f"{self.path}: the last number is {last}, found {highest}")
+        connection.execute(
+            "INSERT OR IGNORE INTO meta VALUES ('epoch', ?)", (secrets.token_hex(8),))
+
+    @property
+    def changes(self) -> int:
+        """How many rows were changed since this was opened."""
+        return self._connection.total_changes
+
+    def close(self) -> None:
+        """Close; harmless when repeated."""
+        self._connection.close()
+
+    @contextmanager
+    def transaction(self, *, synced: bool = True) -> Iterator[sqlite3.Connection]:
+        """All that is done within is durable at the end, or none of it.
+
+        Without `synced` it outlives this process at once and a power cut from the next
+        transaction on.
+
+        Raises
+        ------
+        DiskFullError
+            Where there is no room.
+        DamagedDatabaseError
+            Where the database turns out to be malformed.
+        StoreError
+            Where it fails otherwise.
+        """
+        with self._named(), self._synchronous(synced=synced):
+            self._connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield self._connection
+                self._connection.execute("COMMIT")
+            except BaseException:
+                if self._connection.in_transaction:
+                    with suppress(sqlite3.Error):
+                        self._connection.execute("ROLLBACK")
+                raise
+
+    @contextmanager
+    def _synchronous(self, *, synced: bool) -> Iterator[None]:
+        if synced:  # as it was opened
+            yield
+            return
+        self._connection.execute("PRAGMA synchronous=NORMAL")
+        try:
+            yield
+        finally:
+            self._connection.execute("PRAGMA synchronous=FULL")
+
+    def all(
+        self, statement: str, *values: str | float | None, synced: bool = True
+    ) -> list[sqlite3.Row]:
+        """Run one statement that changes something, durably, and give its rows."""
+        with self.transaction(synced=synced) as connection:
+            return connection.execute(statement, values).fetchall()
+
+    def rows(self, statement: str, *values: str | float | None) -> list[sqlite3.Row]:
+        """Run one statement that only reads and give its rows."""
+        with self._named():
+            return self._connection.execute(statement, values).fetchall()
+
+    def ids(self, statement: str, *values: str | float | None) -> list[str]:
+        """Run one statement that only reads and give the captures that it names."""
+        return [row["capture_id"] for row in self.rows(statement, *values)]
+
+    def one(self, statement: str, *values: str | float | None) -> sqlite3.Row | None:
+        """Run one statement that only reads and give its first row."""
+        with self._named():
+            cursor = self._connection.execute(statement, values)
+            row: sqlite3.Row | None = cursor.fetchone()
+            cursor.close()  # else it would go on reading an old state
+        return row
+
+    def meta(self, name: str) -> str | None:
+        """Give a value that was set by name."""
+        row = self.one("SELECT value FROM meta WHERE name = ?", name)
+        return row["value"] if row else None
+
+    def set_meta(self, name: str, value: str) -> None:
+        """Keep a value by name."""
+        self.all("INSERT INTO meta VALUES (?, ?)"
+                 " ON CONFLICT (name) DO UPDATE SET value = excluded.value", name, value)
+
+    def jump(self, numbers: int) -> None:
+        """Leave out sequence numbers."""
+        with self.transaction() as connection:
+            connection.execute(
+                "INSERT INTO sqlite_sequence SELECT 'outcomes', 0 WHERE NOT EXISTS"
+                " (SELECT * FROM sqlite_sequence WHERE name = 'outcomes')")
+            connection.execute(
+                "UPDATE sqlite_sequence SET seq = seq + ? WHERE name = 'outcomes'", (numbers,))
+
+    def truncate_log(self) -> None:
+        """Empty the write-ahead log, so that what was deleted is in it no more."""
+        row = self.one("PRAGMA wal_checkpoint(TRUNCATE)")
+        if row is None or row[0]:
+            structlog.get_logger("store").warning(
+                "the write-ahead log could not be emptied: someone reads the database",
+                file=self.path.name)
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.Error as error:
+            raise _named_error(self.path, error) from error
+        except UnicodeDecodeError as error:  # a name in SQLite's own message is damaged
+            raise DamagedDatabaseError(f"{self.path.name}: malformed") from error
+
+
+def _named_error(path: Path, error: sqlite3.Error) -> StoreError | DamagedDatabaseError:
+    code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)
+    reason = f"{path.name}: {error}"
+    if code & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB) or code in (
+            sqlite3.SQLITE_IOERR_READ, sqlite3.SQLITE_IOERR_SHORT_READ,
+            sqlite3.SQLITE_IOERR_CORRUPTFS):
+        return DamagedDatabaseError(reason)
+    if code & 0xFF == sqlite3.SQLITE_FULL:
+        return DiskFullError(f"no room on the disk ({reason})")
+    return StoreError(reason)

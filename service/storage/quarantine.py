@@ -1,0 +1,90 @@
+"""Where damaged files go: out of the way, with a report beside each, for someone to look at."""
+
+import json
+from collections.abc import Collection
+from contextlib import suppress
+from pathlib import Path
+
+import structlog
+
+from denseface.service.settings import private_folder
+from denseface.service.storage.record_file import write_atomically
+from denseface.service.storage.store_clock import Account, stamp
+
+__all__ = ["Quarantine"]
+
+
+class Quarantine:
+    """The folder `quarantine/`: `TIME.NAME` and its report, `TIME.NAME.json`.
+
+    A damaged frame is still a picture of someone: it goes with its capture, or after the
+    retention, like all that is kept.
+    """
+
+    def __init__(self, folder: Path, account: Account) -> None:
+        self._folder = private_folder(folder)
+        self._account = account
+        self._log = structlog.get_logger("store")
+
+    def take(self, path: Path, reason: str, capture_id: str | None = None) -> None:
+        """Move a file here; one that is gone or cannot be moved is reported only."""
+        self._log.error("damaged", file=path.name, capture_id=capture_id, reason=reason)
+        if not path.exists():
+            return
+        moment = stamp(self._account.wall()).replace(":", "")
+        moved = self._folder / f"{moment}.{path.name}"
+        report = moved.with_name(f"{moved.name}.json")
+        try:
+            write_atomically(report, [json.dumps({
+                "file": str(path), "capture_id": capture_id, "reason": reason, "found": moment,
+                "age_s": self._account.now()}, indent=2).encode()])
+            path.replace(moved)
+        except OSError as error:
+            with suppress(OSError):
+                report.unlink(missing_ok=True)
+            self._log.warning("not quarantined", file=path.name, reason=str(error))
+        else:
+            self._log.warning("quarantined", file=path.name, moved_to=str(moved))
+
+    def remove(self, capture_ids: Collection[str]) -> None:
+        """Remove what belongs to captures; OSError where a file cannot be removed."""
+        for report in self._reports():
+            if _read(report).get("capture_id") in capture_ids:
+                _remove(report)
+
+    def remove_older(self, retention_s: float) -> int:
+        """Remove what is here for longer and give the number; OSError as `remove`."""
+        before = self._account.now() - retention_s
+        old = [report for report in self._reports() if _age_s(report) <= before]
+        for report in old:
+            _remove(report)
+        return len(old)
+
+    def clear(self) -> int:
+        """Remove all and give the number; OSError as `remove`."""
+        files = [path for path in self._folder.iterdir() if path.is_file()]
+        for path in files:
+            path.unlink()
+        return len([path for path in files if path.suffix != ".json"])
+
+    def _reports(self) -> list[Path]:
+        return list(self._folder.glob("*.json"))
+
+
+def _read(report: Path) -> dict[str, object]:
+    try:
+        found = json.loads(report.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _age_s(report: Path) -> float:
+    """Give the age of the store when a file came here; 0, very old, where nobody knows."""
+    found = _read(report).get("age_s")
+    return float(found) if isinstance(found, int | float) else 0.0
+
+
+def _remove(report: Path) -> None:
+    report.with_suffix("").unlink(missing_ok=True)
+    report.unlink(missing_ok=True)

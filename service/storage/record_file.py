@@ -1,0 +1,186 @@
+"""Files that are whole or not there: several byte strings under one checksum.
+
+Layout: the magic line, the checksum (32 bytes), the index, which is the number of parts (uint32)
+and the length of each (uint64), then the parts. The checksum is the SHA-256 of the index and of the
+CRC-32 of each part (uint32). All numbers are little-endian.
+
+It shall find damage, which takes no cryptography: a CRC-32 misses no one or two wrong bits in a
+part, no run of wrong bits up to 32 long, and anything else once in 2**32. The SHA-256 of the parts
+themselves was a fifth of all that the hub computes for a capture.
+"""
+
+import errno
+import hashlib
+import os
+import struct
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from denseface.service.errors import CorruptFileError, DiskFullError, StoreError
+from denseface.service.runtime.failpoints import failpoint
+from denseface.service.storage.direct import write_direct
+
+__all__ = ["naming", "read_parts", "store_error", "sync_folder", "write_atomically", "write_parts"]
+
+_MAGIC = b"denseface spool 3\n"
+_BEFORE = b"denseface spool 2\n"
+"""The same with the SHA-256 of index and parts as checksum: read, no more written."""
+_DIGEST_BYTES = hashlib.sha256().digest_size
+_MOST_BYTES = 128 * 2**20
+"""Of a file that is read: more than any message."""
+
+
+def write_atomically(
+    path: Path, chunks: Sequence[bytes | memoryview], *, durable: bool = True, named: bool = True,
+    direct: bool = False, mode: int = 0o666, steps: str = "",
+) -> None:
+    """Write a file so that `path` is ever either the old contents or all of the new.
+
+    With `durable`, it is on the disk, and with `named` so is its name, when this returns; without,
+    that is left to `sync_folder`. With `direct` it does not pass through the page cache where that
+    can be had. `mode`, less the umask, is that of the file. `steps` begins the names of this
+    write's failpoints.
+
+    Raises
+    ------
+    OSError
+        As from the system; nothing half-written stays, though all of it may.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+        with os.fdopen(os.open(temporary, flags, mode), "wb") as file:
+            if not (direct and write_direct(file.fileno(), chunks)):
+                for chunk in chunks:
+                    file.write(chunk)
+                file.flush()
+            failpoint(f"{steps}.written")
+            if durable:
+                os.fsync(file.fileno())
+                failpoint(f"{steps}.synced")
+        temporary.replace(path)
+        failpoint(f"{steps}.renamed")
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise
+    if durable and named:
+        sync_folder(path.parent)
+
+
+def write_parts(
+    path: Path, parts: Sequence[bytes | memoryview], *, named: bool = True,
+    direct: bool = False, steps: str = "",
+) -> str:
+    """Write parts durably and give their checksum, hexadecimal; the rest as `write_atomically`.
+
+    Raises
+    ------
+    DiskFullError
+        Where there is no room.
+    StoreError
+        Where the file cannot be written for another reason.
+    """
+    index = struct.pack(f"<I{len(parts)}Q", len(parts), *map(len, parts))
+    digest = _checksum(index, parts)
+    try:
+        write_atomically(
+            path, [_MAGIC, digest, index, *parts], named=named, direct=direct, mode=0o600,
+            steps=steps)
+    except OSError as error:
+        raise store_error(path, error) from error
+    return digest.hex()
+
+
+def _checksum(index: bytes, parts: Sequence[bytes | memoryview]) -> bytes:
+    sums = struct.pack(f"<{len(parts)}I", *map(zlib.crc32, parts))
+    return hashlib.sha256(index + sums).digest()
+
+
+def read_parts(path: Path, checksum: str | None = None) -> tuple[list[memoryview], str]:
+    """Read what `write_parts` wrote and give it with its checksum.
+
+    Parameters
+    ----------
+    checksum : that it must have; where None, the one that the file itself states
+
+    Raises
+    ------
+    CorruptFileError
+        Where the file is missing, cannot be read or is not what had the checksum.
+    StoreError
+        Where this process has no means to read anything now.
+    """
+    try:
+        with path.open("rb") as file:
+            # Not more than there is: the memory for it would be fetched anew each time.
+            size = min(os.fstat(file.fileno()).st_size, _MOST_BYTES) + 1
+            data = memoryview(file.read(size))
+    except OSError as error:
+        passing = error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
+        raise (StoreError if passing else CorruptFileError)(
+            f"{path}: {error.strerror or error}") from error
+    if len(data) > _MOST_BYTES:
+        raise CorruptFileError(f"{path}: has more than {_MOST_BYTES} bytes")
+    start = len(_MAGIC) + _DIGEST_BYTES
+    magic, stated, body = data[:len(_MAGIC)], bytes(data[len(_MAGIC):start]).hex(), data[start:]
+    parts = _split(body)
+    if magic == _BEFORE:
+        found = hashlib.sha256(body).hexdigest()
+    elif magic == _MAGIC and parts is not None:
+        found = _checksum(bytes(body[:len(body) - sum(map(len, parts))]), parts).hex()
+    else:
+        found = ""
+    if not found or found != stated or found != (checksum or found):
+        raise CorruptFileError(
+            f"{path}: contents do not have the checksum {(checksum or stated)[:12]}...")
+    if parts is None:
+        raise CorruptFileError(f"{path}: its parts are not those that its index names")
+    return parts, found
+
+
+def _split(data: memoryview) -> list[memoryview] | None:
+    """Give the parts behind their index; None where they do not fill the data exactly."""
+    try:
+        (count,) = struct.unpack_from("<I", data)
+        lengths = struct.unpack_from(f"<{count}Q", data, 4)
+    except struct.error:
+        return None
+    start = 4 + 8 * count
+    if start + sum(lengths) != len(data):
+        return None
+    parts = []
+    for length in lengths:
+        parts.append(data[start:start + length])
+        start += length
+    return parts
+
+
+def store_error(path: Path, error: OSError) -> StoreError:
+    """Say in one line why a file could not be written."""
+    reason = f"{path}: {error.strerror or error}"
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return DiskFullError(f"no room on the disk ({reason})")
+    if error.errno == errno.EIO:
+        return StoreError(f"the disk fails ({reason})")
+    return StoreError(reason)
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Say of what the system refuses within where it was; raises StoreError."""
+    try:
+        yield
+    except OSError as error:
+        raise store_error(path, error) from error
+
+
+def sync_folder(folder: Path) -> None:
+    """Put the names in a folder on the disk; OSError where that fails."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,132 @@
+"""What a frame's and a face's file hold: all that the database knows of them, and more.
+
+The first part says when and with which settings; then comes the message as it arrived. So the
+database can be made again from the files alone.
+"""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from denseface.service.errors import CorruptFileError, ProtocolError
+from denseface.service.protocol.messages import Frame, Result
+from denseface.service.protocol.payload import Arrays
+from denseface.service.protocol.wire import Packet, encode
+from denseface.service.storage.former import decode_former
+from denseface.service.storage.record_file import read_parts, write_parts
+
+__all__ = ["Draft", "FaceAbout", "FrameAbout", "KeptFace", "KeptFrame", "read_face",
+           "read_frame"]
+
+_Time = Annotated[str, Field(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}\+00:00$")]
+
+
+class _About(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    accepted_at: _Time
+    clock: str
+    """The store's account of its age when this was written."""
+
+
+class FrameAbout(_About):
+    """What a frame does not say of itself."""
+
+    settings: str
+    """Of the reconstruction, JSON."""
+    settings_hash: Annotated[str, Field(pattern=r"^[0-9a-f]{1,64}$")]
+    pressed_by: Annotated[str, Field(pattern=r"^[0-9a-f]{0,16}$")] = ""
+    """Fingerprint of the key that pressed; empty where none was needed."""
+
+
+class FaceAbout(_About):
+    """What a face does not say of itself."""
+
+    finished_at: _Time
+
+
+@dataclass(frozen=True)
+class KeptFrame:
+    """A frame's file."""
+
+    message: Frame
+    arrays: Arrays
+    about: FrameAbout
+    checksum: str
+
+
+@dataclass(frozen=True)
+class KeptFace:
+    """A face's file."""
+
+    message: Result
+    arrays: Arrays
+    about: FaceAbout
+    checksum: str
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A frame or a face before it is on the disk: its file comes first, then its row."""
+
+    capture_id: str
+    path: Path
+    about: FrameAbout | FaceAbout
+    packet: Packet
+
+    @property
+    def steps(self) -> str:
+        """How the names of its failpoints begin."""
+        return "hub.frame" if isinstance(self.about, FrameAbout) else "hub.face"
+
+    def write(self) -> str:
+        """Write the file, whose name is not yet durable, and give its checksum.
+
+        Raises as `write_parts`.
+        """
+        return write_parts(
+            self.path, [self.about.model_dump_json().encode(), *encode(self.packet)],
+            named=False, direct=True, steps=self.steps)
+
+    def discard(self) -> None:
+        """Remove the file; where it resists, it is taken in at the next start."""
+        with suppress(OSError):
+            self.path.unlink(missing_ok=True)
+
+
+def read_frame(path: Path, checksum: str | None = None) -> KeptFrame:
+    """Read a frame.
+
+    Raises
+    ------
+    CorruptFileError, StoreError
+        As `read_parts`; the first also where the contents are whole and no frame.
+    """
+    packet, about, found = _read(path, checksum, FrameAbout)
+    if not isinstance(packet.message, Frame):
+        raise CorruptFileError(f"{path}: holds a {packet.message.kind}, a frame expected")
+    return KeptFrame(packet.message, packet.arrays, about, found)
+
+
+def read_face(path: Path, checksum: str | None = None) -> KeptFace:
+    """Read a face; errors as `read_frame`."""
+    packet, about, found = _read(path, checksum, FaceAbout)
+    if not isinstance(packet.message, Result):
+        raise CorruptFileError(f"{path}: holds a {packet.message.kind}, a result expected")
+    return KeptFace(packet.message, packet.arrays, about, found)
+
+
+_A = TypeVar("_A", bound=_About)
+
+
+def _read(path: Path, checksum: str | None, kind: type[_A]) -> tuple[Packet, _A, str]:
+    parts, found = read_parts(path, checksum)
+    try:
+        about = kind.model_validate_json(bytes(parts[0]) if parts else b"")
+        return decode_former(parts[1:]), about, found
+    except (ProtocolError, ValidationError) as error:
+        # Whole, so written by another version.
+        raise CorruptFileError(f"{path}: {error}") from error

@@ -1,0 +1,1 @@
+"""ZeroMQ sockets: where the hub listens, and how the others connect."""

@@ -1,0 +1,115 @@
+"""Addresses: the hub's own, and the one for publications that follows from it."""
+
+import socket
+from ipaddress import ip_address
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from denseface.service.errors import AddressError, HubRunningError
+from denseface.service.settings import private_folder, runtime_folder
+
+__all__ = ["check_bindable", "check_connectable", "is_local", "publications_of", "socket_file"]
+
+_MAX_SOCKET_PATH = 107 - len(".publications")
+_PUBLICATIONS = ".publications"
+
+
+def socket_file(address: str) -> Path | None:
+    """Give the file of an `ipc://` address, None for `tcp://`.
+
+    Raises
+    ------
+    AddressError
+        Where the address is neither, or its path or port is impossible.
+    """
+    if address.startswith("ipc://"):
+        path = Path(address.removeprefix("ipc://"))
+        if not path.is_absolute() or len(str(path)) > _MAX_SOCKET_PATH:
+            raise AddressError(
+                f"{address}: an ipc address is ipc:// and an absolute path of at most "
+                f"{_MAX_SOCKET_PATH} bytes")
+        return path
+    _host_and_port(address)
+    return None
+
+
+def publications_of(address: str) -> str:
+    """Give where the hub of this address publishes: the next port, or a file beside.
+
+    Raises
+    ------
+    AddressError
+        As `socket_file`.
+    """
+    if socket_file(address):
+        return address + _PUBLICATIONS
+    host, port = _host_and_port(address)
+    return f"tcp://{f'[{host}]' if ':' in host else host}:{port + 1}"
+
+
+def is_local(address: str) -> bool:
+    """Say whether an address is open to this machine alone: `ipc`, or a loopback TCP address.
+
+    Raises
+    ------
+    AddressError
+        As `socket_file`.
+    """
+    if socket_file(address):
+        return True
+    try:
+        return ip_address(_host_and_port(address)[0]).is_loopback
+    except ValueError:
+        return False
+
+
+def check_bindable(address: str) -> None:
+    """Make an `ipc` address's folder, and refuse an address that another hub serves.
+
+    Raises
+    ------
+    AddressError
+        As `socket_file`.
+    HubRunningError
+        Where a hub answers there already: binding would silently take its place.
+    """
+    path = socket_file(address)
+    if path is None:
+        return
+    private_folder(path.parent)
+    with socket.socket(socket.AF_UNIX) as probe:
+        try:
+            probe.connect(str(path))
+        except OSError:
+            return
+    raise HubRunningError(f"{address}: another hub is listening there")
+
+
+def check_connectable(address: str) -> None:
+    """Refuse a malformed address, and a default one where somebody else might be the hub.
+
+    The folder of the default address is made if it is not there: in a temporary folder anyone
+    could make it meanwhile, and be sent faces.
+
+    Raises
+    ------
+    AddressError
+        As `socket_file`.
+    SettingsError
+        Where the folder is not this user's.
+    """
+    path = socket_file(address)
+    if path and path.parent == runtime_folder():
+        private_folder(path.parent)
+
+
+def _host_and_port(address: str) -> tuple[str, int]:
+    try:
+        parts = urlsplit(address)
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        host = port = None
+    # The port after it is the publications'.
+    if not host or not port or port == 65535 or address.partition("://")[0] != "tcp" or parts.path:
+        raise AddressError(f"{address}: expected ipc://PATH or tcp://HOST:PORT")
+    return host, port

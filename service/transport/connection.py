@@ -1,0 +1,144 @@
+"""What a client shows at a guarded door, and why a hub does not let it in."""
+
+import errno
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Self
+
+import zmq
+from zmq.utils.monitor import parse_monitor_message
+
+from denseface.service.errors import KeyFileError, KeyRefusedError
+from denseface.service.security.keys import KeyPair, read_pair, read_public
+from denseface.service.settings import ServiceSettings
+from denseface.service.transport.sockets import open_socket
+
+__all__ = ["Credentials", "Knock", "connect"]
+
+_SURE = 3
+"""Handshakes that break off in a row until it is said why: a hub may have ended in one."""
+_REDIAL_S = 2.0
+"""Time until a daemon that was refused knocks again, seconds: it may be allowed meanwhile."""
+_E = zmq.Event
+_EVENTS = (_E.HANDSHAKE_SUCCEEDED | _E.HANDSHAKE_FAILED_AUTH | _E.HANDSHAKE_FAILED_PROTOCOL
+           | _E.HANDSHAKE_FAILED_NO_DETAIL)
+
+
+@dataclass(frozen=True)
+class Credentials:
+    """One's own pair and the hub's public key."""
+
+    pair: KeyPair
+    hub: str
+
+    @classmethod
+    def of(cls, settings: ServiceSettings) -> Self | None:
+        """Read the keys that the settings name; None where they name none.
+
+        The local door, a socket file, wants no keys: there is nothing to read for it.
+
+        Raises
+        ------
+        KeyFileError
+            Where a file cannot be used, or one of the two is missing.
+        """
+        key, hub = settings.key, settings.hub_key
+        if settings.address.startswith("ipc://") or (key is None and hub is None):
+            return None
+        if key is None or hub is None:
+            missing = "--hub-key FILE, the hub's public one" if key else "--key FILE, your own"
+            raise KeyFileError(f"{settings.address}: one key without the other: expected {missing}")
+        return cls(read_pair(key), read_public(hub))
+
+    def show(self, socket: "zmq.Socket[bytes]") -> None:
+        """Have a socket use them when it connects."""
+        socket.set(zmq.CURVE_SERVERKEY, self.hub.encode())
+        socket.set(zmq.CURVE_PUBLICKEY, self.pair.public.encode())
+        socket.set(zmq.CURVE_SECRETKEY, self.pair.secret.encode())
+
+
+class Knock:
+    """Listens to how a socket's connections begin and remembers why the last one did not."""
+
+    def __init__(self, socket: "zmq.Socket[bytes]", address: str, keys: Credentials | None) -> None:
+        self._socket = socket
+        self._address = address
+        self._keys = keys
+        self._monitor = socket.get_monitor_socket(int(_EVENTS))
+        self._broken_off = 0
+        self._redial_at: float | None = None
+        self.refused: KeyRefusedError | None = None
+        """Why the hub does not let us in; None where it did, or is not there."""
+
+    def read(self) -> bool:
+        """Take note of what happened; True where it is a new refusal."""
+        before = str(self.refused)
+        while self._monitor.poll(0):
+            said = parse_monitor_message(self._monitor.recv_multipart())
+            self._note(zmq.Event(said["event"]), said["value"])
+        if self._redial_at is not None and time.monotonic() >= self._redial_at:
+            self._redial()
+        return self.refused is not None and str(self.refused) != before
+
+    def check(self) -> None:
+        """Raise why the hub does not let us in; the next call begins anew."""
+        self.read()
+        if self.refused:
+            refused, self.refused = self.refused, None
+            self._redial()
+            raise refused
+
+    def close(self) -> None:
+        """Listen no more; to be called before the socket is closed."""
+        if not self._socket.closed:
+            self._socket.disable_monitor()
+        self._monitor.close(linger=0)
+
+    def _note(self, event: zmq.Event, value: int) -> None:
+        if event is _E.HANDSHAKE_SUCCEEDED:
+            self.refused, self._broken_off, self._redial_at = None, 0, None
+            return
+        if event is _E.HANDSHAKE_FAILED_AUTH:
+            self.refused = KeyRefusedError(
+                f"{self._address}: the hub does not let this key in: it was not allowed there for "
+                "this, or revoked")
+        elif event is _E.HANDSHAKE_FAILED_PROTOCOL:
+            self.refused = self._mismatch()
+        else:
+            self._broken_off += value in (errno.EPIPE, errno.ECONNRESET)
+            if self._broken_off >= _SURE:
+                self.refused = self._mismatch()
+            return
+        # libzmq takes these two for final and would not try again.
+        self._redial_at = time.monotonic() + _REDIAL_S
+
+    def _redial(self) -> None:
+        self._redial_at = None
+        self._broken_off = 0
+        with suppress(zmq.ZMQError):
+            self._socket.disconnect(self._address)
+        self._socket.connect(self._address)
+
+    def _mismatch(self) -> KeyRefusedError:
+        if self._keys is None:
+            return KeyRefusedError(
+                f"{self._address}: the hub asks for a key there: expected --key and --hub-key")
+        return KeyRefusedError(
+            f"{self._address}: the handshake fails: --hub-key is not the key of the hub there, or "
+            "it listens there without keys")
+
+
+def connect(
+    context: "zmq.Context[zmq.Socket[bytes]]", kind: int, address: str, keys: Credentials | None
+) -> "tuple[zmq.Socket[bytes], Knock]":
+    """Open a socket toward the hub, which may come later."""
+    socket = open_socket(context, kind, address)
+    if kind == zmq.DEALER:
+        # Nothing is queued for a hub that is not there: it would arrive stale.
+        socket.set(zmq.IMMEDIATE, 1)
+    if keys:
+        keys.show(socket)
+    knock = Knock(socket, address, keys)
+    socket.connect(address)
+    return socket, knock

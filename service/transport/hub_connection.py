@@ -1,0 +1,99 @@
+"""A daemon's connection to the hub: messages, heartbeats, waiting."""
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from types import TracebackType
+from typing import Any, Self
+
+import structlog
+import zmq
+
+from denseface.service.errors import ProtocolError
+from denseface.service.protocol.messages import Denied, Goodbye, Heartbeat, ToHub
+from denseface.service.protocol.payload import Arrays
+from denseface.service.protocol.wire import Packet, decode_from_hub, encode
+from denseface.service.runtime.background import Background
+from denseface.service.runtime.signals import StopSignal
+from denseface.service.settings import ServiceSettings
+from denseface.service.transport.addresses import check_connectable
+from denseface.service.transport.connection import Credentials, connect
+from denseface.service.transport.sockets import send_parts
+
+__all__ = ["HubLink"]
+
+_RETRY_S = 0.1
+"""Time between two tries to reach a hub that is not there, seconds."""
+
+
+class HubLink:
+    """Sends heartbeats by itself while `packets` waits."""
+
+    def __init__(self, settings: ServiceSettings, name: str) -> None:
+        check_connectable(settings.address)
+        keys = Credentials.of(settings)
+        self._heartbeat_s = settings.heartbeat_s
+        self._log = structlog.get_logger(name)
+        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._socket, self._knock = connect(
+            self._context, zmq.DEALER, settings.address, keys)
+        self._denied = ""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if error is None:
+            self.send(Goodbye())
+        self._context.destroy()
+
+    def send(self, message: ToHub, arrays: Arrays | None = None) -> bool:
+        """Send without waiting; False where the hub is not there."""
+        return send_parts(self._socket, encode(Packet(message, arrays or {})))
+
+    def packets(
+        self, stop: StopSignal, wake: Background[Any], holding: Callable[[], str | None]
+    ) -> Iterator[Packet | None]:
+        """Give what the hub sends, and None at every heartbeat and when a call of `wake` ended.
+
+        Parameters
+        ----------
+        stop : ends the iteration
+        holding : gives the capture that this process works on
+        """
+        poller = zmq.Poller()
+        for one in (self._socket, stop, wake):
+            poller.register(one, zmq.POLLIN)
+        due = 0.0
+        while not stop:
+            if (now := time.monotonic()) >= due:
+                sent = self.send(Heartbeat(holding=holding()))
+                due = now + (self._heartbeat_s if sent else min(_RETRY_S, self._heartbeat_s))
+                if self._knock.read():
+                    self._log.error("not let in", reason=str(self._knock.refused))
+                yield None
+            ready = dict(poller.poll(max(0, math.ceil((due - time.monotonic()) * 1000))))
+            if stop.fileno() in ready:
+                stop.drain()
+            elif self._socket in ready:
+                try:
+                    packet = decode_from_hub(
+                        [part.buffer for part in self._socket.recv_multipart(copy=False)])
+                except ProtocolError as error:
+                    self._log.warning("message dropped", reason=str(error))
+                    continue
+                if isinstance(packet.message, Denied):
+                    self._say_denied(packet.message.message)
+                else:
+                    yield packet
+            elif wake.fileno() in ready:
+                wake.drain()
+                yield None
+
+    def _say_denied(self, reason: str) -> None:
+        if reason != self._denied:  # once, not at every heartbeat
+            self._log.error("denied", reason=reason)
+            self._denied = reason

@@ -1,0 +1,107 @@
+"""ZeroMQ sockets with every limit set."""
+
+from collections.abc import Sequence
+
+import zmq
+
+from denseface.service.errors import RemoteProtocolError
+from denseface.service.protocol.payload import MAX_ARRAY_BYTES
+from denseface.service.protocol.wire import Buffer
+
+__all__ = ["TooLongError", "open_socket", "publish_parts", "receive_parts", "send_parts"]
+
+_HIGH_WATER_MARK = 16
+"""Messages that may wait in one direction for one peer, some of many megabytes; beyond it they
+are dropped, and asked for again."""
+_LINGER_MS = 500
+"""How long a closing socket tries to deliver its last messages."""
+_RECONNECT_MS, _RECONNECT_MAX_MS = 50, 500
+
+
+class TooLongError(RemoteProtocolError):
+    """A message had more parts or bytes than it may; all of it was dropped.
+
+    Attributes
+    ----------
+    first : its first part, with what libzmq knows of the sender
+    """
+
+    def __init__(self, message: str, first: zmq.Frame) -> None:
+        super().__init__(message, "oversized")
+        self.first = first
+
+
+def open_socket(
+    context: "zmq.Context[zmq.Socket[bytes]]", kind: int, address: str
+) -> "zmq.Socket[bytes]":
+    """Make a socket for an address, with high-water marks, linger and the largest part set."""
+    socket = context.socket(kind)
+    if address.startswith("tcp://["):
+        socket.set(zmq.IPV6, 1)
+    socket.set(zmq.SNDHWM, _HIGH_WATER_MARK)
+    socket.set(zmq.RCVHWM, _HIGH_WATER_MARK)
+    socket.set(zmq.LINGER, _LINGER_MS)
+    socket.set(zmq.MAXMSGSIZE, MAX_ARRAY_BYTES)
+    socket.set(zmq.RECONNECT_IVL, _RECONNECT_MS)
+    socket.set(zmq.RECONNECT_IVL_MAX, _RECONNECT_MAX_MS)
+    return socket
+
+
+def send_parts(socket: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bool:
+    """Send without waiting; False where nobody can take it now.
+
+    Large parts are not copied: nobody may change them afterwards.
+    """
+    try:
+        socket.send_multipart(parts, flags=zmq.DONTWAIT, copy=False)
+    except zmq.Again:
+        return False
+    return True
+
+
+def publish_parts(publisher: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bool:
+    """Send to all subscribers of an XPUB; False where the queue of one at least was found full.
+
+    It went to the others all the same. Until half of a full queue is taken libzmq passes over it
+    unseen, so what is counted is how often a subscriber fell behind, not how much it missed.
+    """
+    # Has libzmq take note of what was read meanwhile. It does not look at every sending: it would
+    # take a subscriber that keeps up for one that does not, and pass over one that has caught up.
+    publisher.get(zmq.EVENTS)
+    publisher.set(zmq.XPUB_NODROP, 1)
+    try:
+        publisher.send_multipart(parts, flags=zmq.DONTWAIT, copy=False)
+    except zmq.Again:
+        publisher.set(zmq.XPUB_NODROP, 0)
+        publisher.send_multipart(parts, flags=zmq.DONTWAIT, copy=False)
+        return False
+    return True
+
+
+def receive_parts(
+    socket: "zmq.Socket[bytes]", most: int, most_bytes: int
+) -> tuple[zmq.Frame, list[zmq.Frame]]:
+    """Receive without waiting: the first part with its properties, and those that follow it.
+
+    A message is taken part by part and kept only as far as it may go.
+
+    Raises
+    ------
+    zmq.Again
+        Where there is none.
+    TooLongError
+        Where more than `most` parts or `most_bytes` bytes follow the first.
+    """
+    first = frame = socket.recv(zmq.DONTWAIT, copy=False, track=False)
+    parts: list[zmq.Frame] = []
+    count = size = 0
+    while frame.more:
+        frame = socket.recv(zmq.DONTWAIT, copy=False, track=False)
+        count += 1
+        size += len(frame)
+        if count <= most and size <= most_bytes:
+            parts.append(frame)
+    if count > most or size > most_bytes:
+        raise TooLongError(
+            f"{count} parts with {size} bytes, at most {most} with {most_bytes} allowed", first)
+    return first, parts

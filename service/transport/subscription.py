@@ -1,0 +1,56 @@
+"""A subscription's socket, and what may be heard on it without waiting."""
+
+import zmq
+
+from denseface.service.errors import ProtocolError
+from denseface.service.protocol.outputs import Topic
+from denseface.service.protocol.payload import MAX_PAYLOAD_BYTES
+from denseface.service.protocol.wire import MAX_HEADER_BYTES, MAX_PARTS, Packet, decode_from_hub
+from denseface.service.transport.connection import Credentials, connect
+from denseface.service.transport.sockets import receive_parts
+
+__all__ = ["LOOK_S", "Ear"]
+
+LOOK_S = 1.0
+"""Time between two looks whether the hub still lets us in, seconds."""
+
+
+class Ear:
+    """Subscribes to topics of the publications at an address."""
+
+    def __init__(
+        self, context: "zmq.Context[zmq.Socket[bytes]]", address: str, keys: Credentials | None,
+        topics: tuple[Topic, ...],
+    ) -> None:
+        self.socket, self.knock = connect(context, zmq.SUB, address, keys)
+        for topic in topics:
+            self.socket.subscribe(topic)
+
+    def close(self) -> None:
+        """Hear no more; harmless when repeated."""
+        if not self.socket.closed:
+            self.knock.close()
+            self.socket.close(linger=0)
+
+    def receive(self) -> Packet | None:
+        """Give what has come; None where it is garbled.
+
+        Raises
+        ------
+        zmq.Again
+            Nothing has come.
+        """
+        try:
+            _, parts = receive_parts(self.socket, MAX_PARTS, MAX_HEADER_BYTES + MAX_PAYLOAD_BYTES)
+            return decode_from_hub([part.buffer for part in parts])
+        except ProtocolError:
+            return None
+
+    def newest(self) -> Packet | None:
+        """Give the last of what has come, pass over the rest; raises as `receive`."""
+        packet = self.receive()
+        try:
+            while True:
+                packet = self.receive()
+        except zmq.Again:
+            return packet

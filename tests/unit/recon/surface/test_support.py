@@ -1,0 +1,142 @@
+"""Where a surface is supported: over the seeds and the holes they enclose."""
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+from denseface.recon.propagation._image_kernels import above
+from denseface.recon.surface.support import Support
+from tests.unit.recon.shapes import disc_seeds
+
+
+def supported(points, spacing, step=None):
+    """The grid's points with support, (k, 2), those without, and their distance to a seed."""
+    xs, ys, support = Support.of(points, spacing).on_grid(step or spacing / np.sqrt(10))
+    grid = np.stack(np.meshgrid(xs, ys), axis=-1)
+    return grid[support], grid[~support]
+
+
+def to_seed(grid, points):
+    return np.asarray(cKDTree(points[:, :2]).query(grid)[0])
+
+
+@settings(deadline=None, max_examples=25)
+@given(spacing=st.floats(0.8, 4), radius=st.floats(10, 25), hole=st.floats(0, 0.6),
+       x=st.floats(-300, 300), y=st.floats(-300, 300), seed=st.integers(0, 99))
+def test_covers_seeds_and_holes_but_no_rim(spacing, radius, hole, x, y, seed):
+    """Radius in spacings, hole as a share of it."""
+    radius, hole = radius * spacing, hole * radius * spacing
+    points = disc_seeds(spacing, radius, hole, seed=seed) + np.float32((x, y, 0))
+    inside, outside = supported(points, spacing)
+    middle = np.hypot(*(inside - (x, y)).T)
+    # Nothing past the rim: at most half a spacing beyond the outermost seeds.
+    assert middle.max() <= radius + 0.5 * spacing
+    assert to_seed(inside[middle > hole + spacing], points).max() <= 1.4 * spacing
+    # The hole is filled, and nothing else is left out but the rim itself.
+    assert np.hypot(*(outside - (x, y)).T).min() > radius - 1.5 * spacing
+
+
+def test_a_bay_open_to_the_outside_is_no_hole():
+    points = disc_seeds(1.0, 30)
+    bay = (points[:, 0] > 0) & (np.abs(points[:, 1]) < 6)
+    inside, _ = supported(points[~bay], 1.0)
+    assert not ((inside[:, 0] > 5) & (np.abs(inside[:, 1]) < 4.5)).any()
+
+
+def test_two_parts_are_not_joined():
+    parts = [disc_seeds(1.0, 12) + np.float32((x, 0, 0)) for x in (-15, 15)]
+    inside, _ = supported(np.concatenate(parts), 1.0)
+    assert not (np.abs(inside[:, 0]) < 2).any()
+    assert (inside[:, 0] < -3).sum() > 3000
+    assert (inside[:, 0] > 3).sum() > 3000
+
+
+def roundness(points):
+    """Perimeter squared over area, 1 for a circle."""
+    support = Support.of(points, 1.0).on_grid(0.3)[2].astype(np.uint8)
+    outlines, _ = cv2.findContours(support, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    perimeter = sum(cv2.arcLength(outline, True) for outline in outlines)
+    return perimeter**2 / (4 * np.pi * support.sum())
+
+
+def test_frayed_edges_are_evened_out():
+    points = disc_seeds(1.0, 25, jitter=0)
+    far, turn = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
+    frayed = points[(far < 22) | (np.sin(40 * turn) > 0)]
+    assert roundness(points) < 1.2
+    assert roundness(frayed) < 1.5
+    inside, _ = supported(frayed, 1.0)
+    assert to_seed(inside, frayed).max() < 2.2
+    assert np.hypot(*inside.T).max() <= 25.4
+
+
+def test_broad_bites_and_spurs_of_an_edge_are_evened_out():
+    """An edge that is frayed over several pixels at once, by two spacings either way."""
+    points = disc_seeds(1.0, 32, jitter=0)
+    far, turn = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
+    frayed = points[far < 28 + 2 * np.sign(np.sin(30 * turn))]
+    inside, outside = supported(frayed, 1.0)
+    assert roundness(frayed) < 1.2
+    assert np.hypot(*inside.T).max() < 29
+    assert np.hypot(*outside.T).min() > 27
+
+
+@pytest.mark.parametrize("sides", [(7, 8), (3, 17), (2, 26)])
+def test_few_seeds_still_have_support(sides):
+    x, y = np.meshgrid(*(np.arange(side, dtype=np.float32) for side in sides))
+    points = np.stack([x, y, 700 + 0 * x], axis=-1).reshape(-1, 3)
+    inside, _ = supported(points, 1.0)
+    assert len(inside) > 0.5 * 10 * len(points)
+    middle = np.array([np.median(x), np.median(y)])
+    assert np.hypot(*(inside - middle).T).min() < 0.3
+    assert to_seed(inside, points).max() < 1.2
+
+
+def test_the_grid_is_regular_and_its_border_empty():
+    points = disc_seeds(1.5, 20)
+    xs, ys, support = Support.of(points, 1.5).on_grid(0.5)
+    np.testing.assert_allclose(np.diff(xs), 0.5)
+    np.testing.assert_allclose(np.diff(ys), 0.5)
+    assert support.shape == (len(ys), len(xs))
+    assert not support[[0, -1]].any()
+    assert not support[:, [0, -1]].any()
+
+
+def test_both_grids_agree_and_the_area_is_that_of_the_disc():
+    support = Support.of(disc_seeds(1.3, 40), 1.3)
+    _, _, inside = support.on_grid(0.4)
+    area = inside.sum() * 0.4**2
+    assert support.area == pytest.approx(area, rel=0.02)
+    assert area == pytest.approx(np.pi * 40**2, rel=0.05)
+    columns, rows = support.places(support.xs, support.ys)
+    np.testing.assert_array_equal(
+        support.inside, above(support.margin, rows, columns, 0.0))
+
+
+def test_what_is_left_out_ends_half_way_to_the_next_point():
+    support = Support.of(disc_seeds(1.0, 20), 1.0)
+    left_out = np.zeros(support.inside.shape, bool)
+    middle = np.argmin(np.abs(support.ys)), np.argmin(np.abs(support.xs))
+    left_out[middle[0] - 2:middle[0] + 3, middle[1] - 2:middle[1] + 3] = True
+    without = support.without(left_out)
+    np.testing.assert_array_equal(without.inside, support.inside & ~left_out)
+    step = 0.02
+    _, _, inside = without.on_grid(step)
+    _, _, before = support.on_grid(step)
+    gone = np.argwhere(before & ~inside) * step
+    np.testing.assert_allclose(np.ptp(gone, axis=0), 5 * support.step, atol=0.1)
+
+
+def test_what_is_near_a_seed():
+    """To half a point of the grid each way, by which a seed may be beside its point."""
+    points = disc_seeds(2.0, 20.0, 10.0)
+    found = Support.of(points, 2.0)
+    away = to_seed(np.stack(np.meshgrid(found.xs, found.ys), axis=-1), points)
+    near = found.near_seeds(3.0)
+    beside = found.step / np.sqrt(2)
+    assert near[away < 3 - 2 * beside].all()
+    assert not near[away > 3 + beside].any()
+    assert 0 < near.mean() < 1

@@ -1,0 +1,250 @@
+"""Both clients against a made-up hub: the asyncio one as the blocking one."""
+
+import asyncio
+import threading
+from contextlib import aclosing
+
+import numpy as np
+import psutil
+import pytest
+
+import denseface
+from denseface.service.client.aio import AsyncClient
+from denseface.service.client.blocking import Client
+from denseface.service.errors import (
+    ClientClosedError,
+    ClientTimeoutError,
+    LocalProtocolError,
+    PressRefusedError,
+    UnknownCaptureError,
+)
+from denseface.service.protocol.outputs import Topic
+from tests.unit.service.fake_hub import fake_hub
+from tests.waiting import until
+
+
+@pytest.fixture
+def hub():
+    with fake_hub() as hub:
+        yield hub
+
+
+def run(main):
+    """Run a coroutine; what asyncio has to complain of is an error."""
+    complaints = []
+
+    async def watched():
+        asyncio.get_running_loop().set_exception_handler(lambda _, what: complaints.append(what))
+        return await asyncio.wait_for(main, 60)
+
+    result = asyncio.run(watched())
+    assert complaints == []
+    return result
+
+
+async def waited(hub, true):
+    await asyncio.to_thread(hub.wait, true)
+
+
+def test_press_get_status(hub):
+    async def main():
+        async with AsyncClient(hub.address) as client:
+            assert await client.press("a") == "a"
+            hub.conclude("a")
+            face = await client.get("a")
+            assert (await client.status()).sensors == ("s",)
+            return face
+
+    with Client(hub.address) as client:
+        awaited = run(main())
+        assert client.press("a") == "a"
+        np.testing.assert_array_equal(client.get("a").dense.points, awaited.dense.points)
+
+
+def test_errors_are_those_of_the_blocking_client(hub):
+    async def main():
+        async with AsyncClient(hub.address) as client:
+            with pytest.raises(UnknownCaptureError):
+                await client.get("never")
+            with pytest.raises(LocalProtocolError, match="capture id"):
+                await client.press("../x")
+            hub.refuse = "no room"
+            with pytest.raises(PressRefusedError, match="press refused: no room") as refused:
+                await client.press()
+            assert refused.value.reason == "disk"
+            hub.deaf = {"get_status"}
+            with pytest.raises(ClientTimeoutError, match=r"no answer from the hub within 0\.1 s"):
+                await client.status(timeout=0.1)
+
+    run(main())
+
+
+def test_calls_share_a_client_and_the_last_may_be_answered_first(hub):
+    async def main():
+        async with AsyncClient(hub.address) as client:
+            hub.deaf = {"press"}
+            client._resend_s = 0.1
+            slow = asyncio.ensure_future(client.press("a"))
+            await waited(hub, lambda: "press" in hub.heard)
+            assert (await client.status()).sequence == 0
+            assert not slow.done()
+            hub.deaf = set()
+            assert await slow == "a"
+            assert await asyncio.gather(*(client.press(f"p{n}") for n in range(20))) == [
+                f"p{n}" for n in range(20)]
+
+    run(main())
+
+
+def test_what_is_missed_is_fetched(hub):
+    async def main():
+        hub.conclude("a1")
+        async with AsyncClient(hub.address) as client:
+            published = client.published(after=0, timeout=20)
+            assert (await anext(published)).capture_id == "a1"
+            await waited(hub, lambda: hub.subscribers(Topic.FACES) == 1)
+            hub.conclude("a2", published=False)
+            hub.conclude("a3")
+            assert [(await anext(published)).capture_id for _ in range(2)] == ["a2", "a3"]
+            hub.garble(Topic.FACES)
+            hub.conclude("a4", published=False)
+            assert (await anext(published)).capture_id == "a4"
+            await published.aclose()
+            await waited(hub, lambda: hub.subscribers(Topic.FACES) == 0)
+
+    run(main())
+
+
+def test_faces_alone(hub):
+    async def main():
+        hub.conclude("a")
+        async with AsyncClient(hub.address) as client, aclosing(client.faces(after=0)) as faces:
+            assert len((await anext(faces)).dense) > 0
+            with pytest.raises(LocalProtocolError, match="at most one"):
+                await anext(client.faces(after=0, last=1))
+
+    run(main())
+
+
+def test_silence_is_a_time_out(hub):
+    async def main():
+        async with AsyncClient(hub.address) as client:
+            for following in (client.published(timeout=0.1), client.previews(timeout=0.1)):
+                with pytest.raises(ClientTimeoutError, match="nothing was published"):
+                    await anext(following)
+
+    run(main())
+
+
+def test_previews_are_always_the_newest(hub):
+    async def main():
+        async with AsyncClient(hub.address) as client, aclosing(client.previews()) as previews:
+            first = asyncio.ensure_future(anext(previews))
+            await waited(hub, lambda: hub.subscribers(Topic.PREVIEW) == 1)
+            hub.garble(Topic.PREVIEW)
+            hub.preview(1)
+            shown = await first
+            assert (shown.sequence, shown.timestamp_us, shown.image.shape) == (1, 1, (1, 2, 3))
+            for number in range(2, 6):
+                hub.preview(number)
+            found = []
+            while not found or found[-1] != 5:
+                found.append((await anext(previews)).sequence)
+            assert found == sorted(set(found))
+
+    run(main())
+
+
+def test_the_blocking_client_s_previews_pass_over_what_is_old(hub):
+    with Client(hub.address) as client:
+        previews = client.previews(timeout=20)
+        started = threading.Thread(target=lambda: (
+            hub.wait(lambda: hub.subscribers(Topic.PREVIEW) == 1), hub.preview(1)))
+        started.start()
+        assert next(previews).sequence == 1
+        started.join()
+        hub.preview(2)
+        assert next(previews).image.tolist() == [[[2, 2, 2], [2, 2, 2]]]
+        previews.close()
+        hub.wait(lambda: hub.subscribers(Topic.PREVIEW) == 0)
+        with pytest.raises(ClientTimeoutError):
+            next(client.previews(timeout=0.05))
+
+
+def test_a_call_that_is_cancelled_leaves_the_client_as_it_was(hub):
+    async def main():
+        async with AsyncClient(hub.address) as client:
+            hub.deaf = {"press"}
+            with pytest.raises(TimeoutError):
+                async with asyncio.timeout(0.2):
+                    await client.press("a")
+            call = asyncio.ensure_future(client.press("b"))
+            await waited(hub, lambda: hub.heard.count("press") >= 2)
+            call.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await call
+            assert client._waiting == {}
+            assert client._watched is None
+            hub.deaf = set()
+            assert await client.press("c") == "c"
+
+    run(main())
+
+
+def test_an_iteration_that_is_cancelled_ends_its_subscription(hub):
+    async def main():
+        async with AsyncClient(hub.address) as client:
+            for following in (client.published, client.previews):
+                async with aclosing(following()) as one:
+                    with pytest.raises(TimeoutError):
+                        async with asyncio.timeout(0.2):
+                            await anext(one)
+                await waited(hub, lambda: hub.subscribers(Topic.FACES) == 0
+                             and hub.subscribers(Topic.PREVIEW) == 0)
+            assert client._signs == {}
+
+    run(main())
+
+
+def test_a_closed_client_ends_calls_and_iterations(hub):
+    async def main():
+        client = AsyncClient(hub.address)
+        hub.deaf = {"press"}
+        call = asyncio.ensure_future(client.press("a"))
+        looks = asyncio.ensure_future(anext(client.previews(), "over"))
+        await waited(hub, lambda: "press" in hub.heard
+                     and hub.subscribers(Topic.PREVIEW) == 1)
+        client.close()
+        client.close()
+        with pytest.raises(ClientClosedError):
+            await call
+        assert await looks == "over"
+        with pytest.raises(ClientClosedError):
+            await client.status()
+        assert await anext(client.published(), "over") == "over"
+
+    run(main())
+    with Client(hub.address) as client:
+        client.close()
+        with pytest.raises(ClientClosedError):
+            client.status()
+
+
+def test_no_descriptor_is_left_open(hub):
+    async def once():
+        async with AsyncClient(hub.address) as client:
+            with pytest.raises(TimeoutError):
+                async with asyncio.timeout(0.05):
+                    await anext(client.previews())
+            await client.status()
+
+    run(once())
+    before = psutil.Process().num_fds()
+    for _ in range(5):
+        run(once())
+    # libzmq closes what the hub's side of a connection had a moment later.
+    until(lambda: psutil.Process().num_fds() < before + 5)
+
+
+def test_it_is_part_of_the_public_face():
+    assert denseface.AsyncClient is AsyncClient

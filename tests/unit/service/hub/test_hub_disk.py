@@ -1,0 +1,106 @@
+"""The hub on a disk that is full or fails."""
+
+import pytest
+
+from denseface.recon.settings import Settings
+from denseface.service.errors import StoreError
+from denseface.service.hub.hub import Hub
+from denseface.service.protocol import messages
+from denseface.service.storage.folder_store import FolderStore
+from tests.unit.service.hub.test_hub import CLIENT, SETTINGS, WORKER, Bench, kinds
+
+
+@pytest.fixture
+def bench(tmp_path):
+    with FolderStore(tmp_path / "data") as store:
+        yield Bench(Hub(store, SETTINGS, Settings()), store)
+
+
+def test_a_store_that_fails_answers_the_request(bench, monkeypatch):
+    def broken(_):
+        raise StoreError("disk on fire")
+
+    monkeypatch.setattr(bench.store, "outcome", broken)
+    (answer,) = bench.say(CLIENT, messages.GetFace(request=3, capture_id="a"))
+    assert (answer[1].kind, answer[1].message) == ("request_failed", "disk on fire")
+
+
+def test_a_result_waits_for_room(bench, monkeypatch):
+    def full(_):
+        raise StoreError("No space left on device")
+
+    bench.accepted("a", "b")
+    bench.worker()
+    monkeypatch.setattr(bench.store, "finish", full)
+    bench.result()
+    assert bench.worker(credit=1) == []
+    assert bench.wait(1.1) == []
+    assert bench.published == []
+    monkeypatch.undo()
+    assert kinds(bench.wait(1.1)) == [(WORKER, "job")]
+    (published,) = bench.published
+    assert (published.kind, published.capture_id) == ("face_done", "a")
+    assert bench.store.find("a").attempts == 1
+
+
+def test_a_failure_that_cannot_be_kept_is_told_again(bench, monkeypatch):
+    def full(*_, **__):
+        raise StoreError("No space left on device")
+
+    bench.accepted("a")
+    bench.worker()
+    monkeypatch.setattr(bench.store, "fail", full)
+    bench.stumble(final=True)
+    monkeypatch.undo()
+    assert kinds(bench.worker(credit=1)) == [(WORKER, "job")]
+    bench.stumble(final=True)
+    assert [message.kind for message in bench.published] == ["capture_failed"]
+
+
+def test_a_disk_that_is_nearly_full_refuses_the_press(bench):
+    full = Bench(Hub(bench.store, SETTINGS.model_copy(update={"reserve_mib": 2**30}), Settings()),
+                 bench.store)
+    full.sensor()
+    (answer,) = full.press()
+    assert answer[1].kind == "press_refused"
+    assert "no room on the disk" in answer[1].message
+
+
+def test_a_disk_that_does_not_answer_refuses_the_press(bench, monkeypatch):
+    def fails():
+        raise StoreError("the disk fails")
+
+    monkeypatch.setattr(bench.store, "free_bytes", fails)
+    bench.sensor()
+    assert bench.press()[0][1].message == "the disk fails"
+
+
+def test_a_disk_that_damages_every_face_uses_up_the_attempts(bench, monkeypatch):
+    real = bench.store.finish
+
+    def damaging(packet):
+        real(packet)
+        for path in bench.store._layout.faces.iterdir():
+            path.write_bytes(b"damaged")
+
+    monkeypatch.setattr(bench.store, "finish", damaging)
+    bench.accepted("a")
+    for credit in range(SETTINGS.attempts):
+        assert kinds(bench.worker(credit=credit)) == [(WORKER, "job")]
+        bench.result()  # published from memory
+        assert bench.published[-1].kind == "face_done"
+        bench.say(CLIENT, messages.GetNext(request=1, after=0))  # read from the disk
+    assert len(bench.published) == SETTINGS.attempts + 1
+    assert (bench.published[-1].dead, bench.published[-1].error) == (True, "CorruptFileError")
+
+
+def test_a_face_that_was_read_once_and_then_damaged_has_all_attempts_again(bench):
+    bench.accepted("a")
+    bench.worker()
+    bench.result()
+    ask = messages.GetNext(request=1, after=0)
+    assert [one.kind for _, one in bench.say(CLIENT, ask)] == ["face_done"]
+    for path in bench.store._layout.faces.iterdir():
+        path.write_bytes(b"damaged")
+    bench.say(CLIENT, ask)
+    assert bench.store.find("a").attempts == 0

@@ -1,0 +1,157 @@
+"""The HTTP server: answers, and does not mind slow or garbled clients."""
+
+import errno
+import http.client
+import json
+import socket
+import threading
+from contextlib import ExitStack, suppress
+
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+
+from denseface.service.errors import AddressError
+from denseface.service.monitoring.http_server import ScrapeServer
+from denseface.service.runtime.loopback import loopback_place
+
+
+class Asked:
+    """What the server asks when it is asked."""
+
+    def __init__(self):
+        self.well = True
+
+    def health(self):
+        return self.well, {"missing": [] if self.well else ["worker"]}
+
+
+@pytest.fixture
+def asked():
+    return Asked()
+
+
+@pytest.fixture
+def server(asked):
+    with ScrapeServer(("127.0.0.1", 0), lambda: b"figures 1\n", asked.health) as server:
+        yield server
+
+
+def place(server):
+    host, _, port = server.url.removeprefix("http://").rpartition(":")
+    return host, int(port)
+
+
+def get(server, path):
+    connection = http.client.HTTPConnection(*place(server), timeout=10)
+    try:
+        connection.request("GET", path)
+        answer = connection.getresponse()
+        return answer.status, answer.getheader("Content-Type"), answer.read()
+    finally:
+        connection.close()
+
+
+def raw(server, data):
+    found = b""
+    with socket.create_connection(place(server), timeout=10) as one, \
+            suppress(BrokenPipeError, ConnectionResetError):  # it may hang up at any time
+        try:
+            one.sendall(data)
+            one.shutdown(socket.SHUT_WR)
+        except OSError as error:
+            assert error.errno in (errno.ENOTCONN, errno.EPIPE, errno.ECONNRESET)  # noqa: PT017
+        while more := one.recv(4096):
+            found += more
+    return found
+
+
+def test_the_metrics_and_the_health(server, asked):
+    status, kind, body = get(server, "/metrics")
+    assert (status, body) == (200, b"figures 1\n")
+    assert kind.startswith("text/plain; version=")
+    assert get(server, "/healthz")[::2] == (200, b'{"missing": []}\n')
+    asked.well = False
+    status, kind, body = get(server, "/healthz?verbose=1")
+    assert (status, kind, json.loads(body)) == (503, "application/json", {"missing": ["worker"]})
+    assert get(server, "/")[0] == 404
+
+
+def test_other_verbs_are_not_known(server):
+    assert b"501" in raw(server, b"POST /metrics HTTP/1.0\r\n\r\n").splitlines()[0]
+
+
+@given(st.binary(max_size=200))
+@hypothesis_settings(deadline=None, max_examples=40)
+def test_garbage_ends_the_connection_alone(data):
+    with ScrapeServer(("127.0.0.1", 0), lambda: b"figures 1\n", Asked().health) as server:
+        raw(server, data)
+        assert get(server, "/metrics")[0] == 200
+
+
+def test_garbage_and_endless_requests_leave_no_trace(server, capfd):
+    for data in (b"", b"\r\n", b"\0" * 1000, b"GET /metrics HTTP/9.9\r\n\r\n",
+                 b"GET /" + b"x" * 100_000, b"GET / HTTP/1.0\r\n" + b"a: b\r\n" * 10_000):
+        raw(server, data)
+    assert get(server, "/metrics")[0] == 200
+    assert capfd.readouterr() == ("", "")
+
+
+def test_slow_clients_are_cut_off_and_hold_nobody_up(server):
+    with ExitStack() as stack:
+        slow = [stack.enter_context(socket.create_connection(place(server), timeout=10))
+                for _ in range(3)]
+        for one in slow:
+            one.sendall(b"GET /metr")
+        assert get(server, "/metrics")[0] == 200
+        for one in slow:
+            assert one.recv(100) == b""
+
+
+def test_a_client_that_sends_a_byte_now_and_then_is_cut_off_too(server):
+    with socket.create_connection(place(server), timeout=10) as one:
+        one.settimeout(0.02)
+        for _ in range(500):
+            try:
+                one.sendall(b"x")
+                if one.recv(1) == b"":
+                    break
+            except TimeoutError:
+                continue
+            except OSError:
+                break
+        else:
+            pytest.fail("still connected")
+
+
+def test_more_clients_than_there_is_room_for_are_turned_away(server):
+    with ExitStack() as stack:
+        many = [stack.enter_context(socket.create_connection(place(server), timeout=10))
+                for _ in range(30)]
+        assert threading.active_count() < 20
+        for one in many:
+            one.settimeout(10)
+            with suppress(ConnectionResetError):
+                assert one.recv(100) == b""
+    assert get(server, "/metrics")[0] == 200
+
+
+def test_a_port_in_use_is_one_line(server):
+    with pytest.raises(AddressError, match=r"^--metrics 127.0.0.1:\d+: Address already in use$"):
+        ScrapeServer(place(server), bytes, Asked().health)
+
+
+@pytest.mark.parametrize(("given", "place"), [
+    ("9400", ("127.0.0.1", 9400)), ("0", ("127.0.0.1", 0)), ("127.0.0.5:1", ("127.0.0.5", 1)),
+    ("[::1]:9400", ("::1", 9400)), ("off", None), (None, None)])
+def test_places(given, place):
+    assert loopback_place(given) == place
+
+
+@pytest.mark.parametrize("given", [
+    "0.0.0.0:9400", "192.168.1.1:9400", "[::]:9400", "localhost:1", "65536", "-1", "x", "", ":1",
+    "١", "127.0.0.1:", "127.0.0.1"])
+def test_other_places_are_refused(given):
+    with pytest.raises(ValueError, match="this machine alone"):
+        loopback_place(given)

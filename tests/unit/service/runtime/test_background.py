@@ -1,0 +1,83 @@
+"""Calls in a thread, one at a time and one behind it."""
+
+import threading
+import time
+
+import pytest
+
+from denseface.service.runtime.background import Background
+
+
+@pytest.fixture
+def calls():
+    with Background("test") as background:
+        yield background
+
+
+def test_the_call_that_waits_begins_when_the_one_before_ends(calls):
+    first, second = threading.Event(), threading.Event()
+    calls.start(lambda: first.wait(20) and "first")
+    calls.start(lambda: second.set() or "second")
+    with pytest.raises(RuntimeError, match="waits already"):
+        calls.start(lambda: "third")
+    assert not second.is_set()
+    first.set()
+    assert second.wait(20)  # though nobody took the first
+    assert calls.take() == "first"
+    assert calls
+    assert calls.take() == "second"
+    assert not calls
+
+
+def test_a_call_that_waits_can_be_withdrawn_one_that_has_begun_cannot(calls):
+    gate, begun = threading.Event(), threading.Event()
+    calls.start(lambda: begun.set() or gate.wait(20))
+    assert begun.wait(20)
+    assert not calls.withdraw()
+    calls.start(lambda: pytest.fail("was withdrawn"))
+    assert calls.withdraw()
+    gate.set()
+    assert calls.take()
+    assert not calls.withdraw()
+
+
+def test_a_call_that_has_begun_by_itself_cannot_be_withdrawn(calls):
+    gate, begun = threading.Event(), threading.Event()
+    calls.start(lambda: "first")
+    calls.start(lambda: begun.set() or gate.wait(20))
+    assert begun.wait(20)
+    assert not calls.withdraw()
+    gate.set()
+    assert calls.take() == "first"
+    assert calls.take() is True
+
+
+def test_the_time_is_that_of_the_call_under_way(calls):
+    assert calls.elapsed_s == 0
+    gates, begun = [threading.Event(), threading.Event()], [threading.Event(), threading.Event()]
+    for number in range(2):
+        calls.start(lambda number=number: begun[number].set() or gates[number].wait(20))
+    assert begun[0].wait(20)
+    before = calls.elapsed_s
+    while calls.elapsed_s < 2 * before + 0.01:
+        pass
+    since = time.monotonic() - calls.elapsed_s
+    gates[0].set()
+    assert begun[1].wait(20)
+    assert time.monotonic() - calls.elapsed_s > since + 0.01
+    gates[1].set()
+    assert calls.take()
+    assert calls.take()
+
+
+def test_what_a_call_raises_is_raised_by_take_and_the_next_goes_on(calls):
+    def fails():
+        raise ValueError("no")
+
+    calls.start(fails)
+    calls.start(lambda: "fine")
+    with pytest.raises(ValueError, match="no"):
+        calls.take()
+    assert calls.take() == "fine"
+    with pytest.raises(RuntimeError, match="no call"):
+        calls.take()

@@ -1,0 +1,118 @@
+"""The log: lines that a program can read, without image data."""
+
+import json
+import logging
+import math
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+import structlog
+from hypothesis import given
+from hypothesis import strategies as st
+from structlog.dev import ConsoleRenderer
+
+from denseface.service.runtime.logging import _plain, configure
+
+
+def lines(text):
+    """Read JSON as strictly as the standard says it."""
+    def strict(word):
+        raise ValueError(word)
+
+    return [json.loads(line, parse_constant=strict) for line in text.splitlines()]
+
+
+@pytest.fixture(autouse=True)
+def _as_before(monkeypatch):
+    for module, name in ((sys, "excepthook"), (sys, "unraisablehook"), (threading, "excepthook")):
+        monkeypatch.setattr(module, name, getattr(module, name))
+    before = logging.root.handlers[:]
+    yield
+    logging.root.handlers[:] = before
+
+
+@pytest.mark.parametrize("how", ["json", "text"])
+def test_arrays_and_bytes_are_never_written(how, capsys):
+    configure(how, "test")
+    image = np.full((4, 5, 3), 123, np.uint8)
+    structlog.get_logger("x").info(
+        "taken", image=image, raw=image.tobytes(), view=memoryview(image), both=[image, b"secret"],
+        inside={"color": image, "n": 3}, scalar=np.uint8(7))
+    text = capsys.readouterr().err
+    assert "123" not in text
+    assert "secret" not in text
+    assert "uint8 [4, 5, 3]" in text
+    assert "60 bytes" in text
+
+
+@given(st.text(), st.sampled_from(["info", "warning", "error", "critical"]), st.dictionaries(
+    st.from_regex("[a-z_]+", fullmatch=True).filter(lambda key: key not in {
+        "timestamp", "level", "event", "logger", "logger_name", "stack", "exception", "exc_info"}),
+    st.text() | st.integers() | st.floats() | st.none() | st.booleans() | st.lists(st.text())))
+def test_a_line_is_as_structlog_writes_it(event, level, values):
+    entry = values | {"timestamp": "2026-01-31T12:00:00Z", "level": level, "event": event}
+    assert _plain(None, "", entry.copy()) == ConsoleRenderer(colors=False)(None, "", entry.copy())
+
+
+def test_an_error_in_text_has_its_traceback(capsys):
+    configure("text", "test")
+    try:
+        raise ValueError("two\nlines")  # noqa: TRY301
+    except ValueError:
+        structlog.get_logger("x").exception("failed", capture_id="a")
+    text = capsys.readouterr().err
+    assert "[error    ] failed                         capture_id=a process=test\n" in text
+    assert "ValueError: two\nlines" in text
+
+
+def test_every_line_is_json_whatever_is_in_it(capsys):
+    configure("json", "test")
+    log = structlog.get_logger("x")
+    log.info("new\nline", value=math.nan, other=math.inf, thing=object(), text="\x1b[0m\udc80")
+    try:
+        raise ValueError("two\nlines")  # noqa: TRY301
+    except ValueError:
+        log.exception("failed")
+    first, second = lines(capsys.readouterr().err)
+    assert (first["process"], first["level"], first["event"]) == ("test", "info", "new\nline")
+    assert (first["value"], first["other"]) == ("nan", "inf")
+    assert "two\nlines" in second["exception"]
+
+
+def test_what_python_and_libraries_say_is_json_too():
+    code = """if True:
+        import logging, threading, warnings
+        from denseface.service.runtime.logging import configure
+        configure("json", "test")
+        warnings.warn("old")
+        logging.getLogger("library").error("broken %s", "pipe")
+        def fail(): raise OSError("in a thread")
+        thread = threading.Thread(target=fail); thread.start(); thread.join()
+        class Bad:
+            def __del__(self): raise OSError("in del")
+        Bad()
+        raise RuntimeError("at last")
+    """
+    ended = subprocess.run([sys.executable, "-W", "always", "-c", code], check=False,
+                           capture_output=True, text=True, timeout=60)
+    found = lines(ended.stderr)
+    assert ended.returncode == 1
+    assert [one["event"] for one in found] == [
+        "old", "broken pipe", "uncaught", "uncaught", "uncaught"]
+    assert found[0]["category"] == "UserWarning"
+    for one, text in zip(found[2:], ("in a thread", "in del", "at last"), strict=True):
+        assert text in one["exception"]
+        assert (one["process"], one["level"]) == ("test", "critical")
+
+
+def test_a_daemon_that_cannot_start_says_so_in_json(tmp_path):
+    ended = subprocess.run(
+        [sys.executable, "-m", "denseface", "hub", "--address", "nowhere", "--data", str(tmp_path),
+         "--log", "json"], check=False, capture_output=True, text=True, timeout=60)
+    (line,) = lines(ended.stderr)
+    assert ended.returncode == 2
+    assert (line["event"], line["process"]) == ("ended", "hub")
+    assert "nowhere" in line["reason"]

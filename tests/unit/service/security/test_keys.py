@@ -1,0 +1,176 @@
+"""Key files and the allow-list."""
+
+import errno
+import json
+import os
+
+import pytest
+
+from denseface.service.cli import main
+from denseface.service.errors import KeyFileError
+from denseface.service.security.allow_list import Keyring, Role, allow, revoke
+from denseface.service.security.keys import KeyPair, new_pair, read_pair, read_public
+
+ROLES = frozenset({Role.WORKER})
+
+
+@pytest.fixture
+def keys(tmp_path):
+    return tmp_path / "keys"
+
+
+def test_a_pair_is_private_and_read_back(keys):
+    secret, public = new_pair(keys, "hub")
+    assert keys.stat().st_mode & 0o777 == 0o700
+    assert {path.stat().st_mode & 0o777 for path in (secret, public)} == {0o600}
+    pair = read_pair(secret)
+    assert read_public(public) == pair.public == read_public(pair.public)
+    assert pair.secret not in public.read_text()
+    assert pair.secret not in repr(pair)
+    with pytest.raises(KeyFileError, match=r"hub\.secret: exists"):
+        new_pair(keys, "hub")
+
+
+@pytest.mark.parametrize("mode", [0o640, 0o604, 0o622])
+def test_a_secret_that_others_can_read_is_refused(keys, mode):
+    secret, _ = new_pair(keys, "hub")
+    secret.chmod(mode)
+    with pytest.raises(KeyFileError, match=rf"hub\.secret.*mode {mode:o}"):
+        read_pair(secret)
+
+
+@pytest.mark.parametrize("name", ["", "../x", ".x", "a b", "x" * 65, "a/b"])
+def test_a_name_is_a_file_s(keys, name):
+    with pytest.raises(KeyFileError, match="key name"):
+        new_pair(keys, name)
+    with pytest.raises(KeyFileError, match="key name"):
+        allow(keys, name, KeyPair.made().public, ROLES)
+    with pytest.raises(KeyFileError, match="key name"):
+        revoke(keys, name)
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    (b"", "not a key file"), (b"\0" * 10, "not a key file"), (b"x" * 5000, "at most 4096 bytes"),
+    (b'{"name": "a", "public_key": "short"}', "40 characters"),
+    (b'{"name": "a", "public_key": "' + b"1" * 40 + b'", "more": 1}', "not a key file")])
+def test_what_is_no_key_is_named(tmp_path, text, message):
+    path = tmp_path / "other"
+    path.write_bytes(text)
+    with pytest.raises(KeyFileError, match=message):
+        read_public(path)
+
+
+def test_the_halves_of_two_pairs_are_none(keys):
+    secret, _ = new_pair(keys, "a")
+    text = json.loads(secret.read_text())
+    secret.write_text(json.dumps(text | {"public_key": KeyPair.made().public}))
+    with pytest.raises(KeyFileError, match="do not belong together"):
+        read_pair(secret)
+    _, public = new_pair(keys, "b")
+    with pytest.raises(KeyFileError, match=r"b\.public: holds a public key"):
+        read_pair(public)
+
+
+def test_a_folder_is_no_key(tmp_path):
+    with pytest.raises(KeyFileError):
+        read_public(tmp_path)
+
+
+def test_the_list_is_live(keys):
+    ring = Keyring(keys)
+    assert (len(ring), ring.refresh()) == (0, False)
+    one = allow(keys, "a", KeyPair.made().public, ROLES)
+    assert ring.refresh()
+    assert not ring.refresh()
+    assert ring.get(one.public) == one
+    assert ring.holds(one.token)
+    more = allow(keys, "a", one.public, ROLES | {Role.PRESSER})
+    assert ring.refresh()
+    assert (ring.holds(one.token), ring.holds(more.token)) == (False, True)
+    revoke(keys, "a")
+    assert ring.refresh()
+    assert (ring.get(one.public), ring.holds(more.token), len(ring)) == (None, False, 0)
+    with pytest.raises(KeyFileError, match="no key of that name"):
+        revoke(keys, "a")
+
+
+def test_a_name_and_a_key_belong_together(keys):
+    one, other = KeyPair.made().public, KeyPair.made().public
+    allow(keys, "a", one, ROLES)
+    with pytest.raises(KeyFileError, match="in use: a"):
+        allow(keys, "b", one, ROLES)
+    with pytest.raises(KeyFileError, match="in use: a"):
+        allow(keys, "a", other, ROLES)
+
+
+@pytest.mark.parametrize("damage", [
+    lambda path: path.write_text("{}"),
+    lambda path: path.write_text(path.read_text().replace("worker", "king")),
+    lambda path: path.write_bytes(os.urandom(100)),
+    lambda path: path.chmod(0o622),
+    lambda path: path.rename(path.with_name("a b")),
+    lambda path: (path.unlink(), path.mkdir()),
+    lambda path: (path.unlink(), path.symlink_to("nothing")),
+])
+def test_a_damaged_file_keeps_its_key_out_and_no_other(keys, damage):
+    one, other = (allow(keys, name, KeyPair.made().public, ROLES) for name in "ab")
+    ring = Keyring(keys)
+    assert len(ring) == 2
+    damage(keys / "allowed" / "a")
+    assert ring.refresh()
+    assert (ring.get(one.public), ring.get(other.public)) == (None, other)
+
+
+def test_a_folder_that_went_lets_nobody_in(keys):
+    one = allow(keys, "a", KeyPair.made().public, ROLES)
+    ring = Keyring(keys)
+    (keys / "allowed").rename(keys / "gone")
+    assert ring.refresh()
+    assert not ring.holds(one.token)
+
+
+@pytest.mark.parametrize("where", [
+    "pathlib.Path.iterdir", "denseface.service.security.allow_list.read_private_text"])
+def test_a_want_of_descriptors_revokes_nobody(keys, monkeypatch, where):
+    one = allow(keys, "a", KeyPair.made().public, ROLES)
+    ring = Keyring(keys)
+
+    def none_left(*_):
+        error = OSError(errno.EMFILE, "Too many open files")
+        raise (error if "iterdir" in where else KeyFileError("a")) from error
+
+    with monkeypatch.context() as patched:
+        patched.setattr(where, none_left)
+        revoke(keys, "a")
+        other = KeyPair.made().public
+        if "iterdir" not in where:
+            monkeypatch.undo()
+            other = allow(keys, "b", other, ROLES).public
+            patched.setattr(where, none_left)
+        assert not ring.refresh()
+        assert ring.holds(one.token)
+    assert ring.refresh()
+    assert not ring.holds(one.token)
+    assert (ring.get(other) is None) is ("iterdir" in where)
+
+
+def test_the_commands(keys, capsys):
+    def run(*arguments):
+        status = main(["keys", *map(str, arguments), "--keys", str(keys)])
+        return status, *capsys.readouterr()
+
+    status, out, _ = run("new", "kiosk")
+    public = read_public(keys / "kiosk.public")
+    assert status == 0
+    assert public in out
+    assert read_pair(keys / "kiosk.secret").secret not in out
+    assert run("allow", "front", keys / "kiosk.public", "presser", "subscriber")[0] == 0
+    ring = Keyring(keys)
+    listed = run("list")[1]
+    assert listed.split() == ["front", ring.get(public).fingerprint, "presser,", "subscriber"]
+    assert run("revoke", "front")[:2] == (0, "front may come in no more\n")
+    assert run("list")[1] == ""
+    status, _, error = run("revoke", "front")
+    assert (status, len(error.splitlines())) == (2, 1)
+    status, _, error = run("allow", "x", keys / "none.public", "worker")
+    assert (status, len(error.splitlines())) == (2, 1)

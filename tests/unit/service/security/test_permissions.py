@@ -1,0 +1,93 @@
+"""Who may say what."""
+
+from typing import get_args
+
+import pytest
+
+from denseface.recon.settings import Settings
+from denseface.service.monitoring.counters import Counters
+from denseface.service.monitoring.rejections import Refusals
+from denseface.service.protocol import messages
+from denseface.service.protocol.outputs import Topic
+from denseface.service.protocol.payload import FrameHeader
+from denseface.service.security.allow_list import Role
+from denseface.service.security.permissions import EVERY_ROLE, KINDS, TOPICS, missing_role
+from tests.unit.service.faces import small_frame
+
+FRAME, _ = FrameHeader.of(small_frame())
+SAID = [
+    messages.Press(request=1, capture_id="a"),
+    messages.GetFace(request=1, capture_id="a"),
+    messages.GetNext(request=1, after=0),
+    messages.GetStatus(request=1),
+    messages.FindStart(request=1, last=1),
+    messages.ListDead(request=1, after=0),
+    messages.RetryDead(request=1, capture_id="a"),
+    messages.DropDead(request=1, capture_id="a"),
+    messages.Purge(request=1, everything=True),
+    messages.SensorReady(name="s", source="x"),
+    messages.Frame(capture_id="a", frame=FRAME),
+    messages.WorkerReady(name="w", credit=0),
+    messages.JobFailed(capture_id="a", settings_hash="0", frame_sha256="0" * 64,
+                       error="E", message="m", final=True),
+    messages.Heartbeat(),
+]
+MAY = {
+    Role.SENSOR: {"get_status", "sensor_ready", "frame", "heartbeat"},
+    Role.WORKER: {"get_status", "worker_ready", "job_failed", "heartbeat"},
+    Role.PRESSER: {"get_status", "press"},
+    Role.SUBSCRIBER: {"get_status", "get_face", "get_next", "find_start"},
+    Role.OPERATOR: {"get_status", "list_dead", "retry_dead", "drop_dead", "purge"},
+}
+
+
+@pytest.mark.parametrize("role", Role)
+def test_a_role_may_say_this_and_nothing_else(role):
+    may = {one.kind for one in SAID if missing_role(frozenset({role}), one) is None}
+    assert may == MAY[role]
+
+
+def test_every_kind_and_every_topic_has_its_roles():
+    kinds = {one.model_fields["kind"].default for one in get_args(messages.ToHub)}
+    assert set(KINDS) == kinds
+    assert set(TOPICS) == set(Topic)
+    assert all(roles and roles <= EVERY_ROLE for roles in [*KINDS.values(), *TOPICS.values()])
+
+
+def test_no_worker_sensor_or_presser_reads_faces():
+    for roles in (TOPICS[Topic.FACES], KINDS["get_next"], KINDS["get_face"]):
+        assert not roles & {Role.WORKER, Role.SENSOR, Role.PRESSER}
+
+
+def test_several_roles_add_up():
+    both = frozenset({Role.PRESSER, Role.SUBSCRIBER})
+    assert [missing_role(both, one) for one in SAID[:4]] == [None] * 4
+
+
+def test_what_the_hub_says_is_for_nobody_to_say():
+    job = messages.Job(
+        capture_id="a", attempt=1, settings=Settings(), settings_hash="0",
+        frame_sha256="0" * 64, frame=FRAME)
+    assert missing_role(EVERY_ROLE, job)
+
+
+@pytest.mark.parametrize(("role", "own", "may"), [
+    (Role.PRESSER, True, True), (Role.PRESSER, False, False), (Role.WORKER, True, False)])
+def test_a_presser_gets_what_it_pressed(role, own, may):
+    lacks = missing_role(frozenset({role}), SAID[1], own=own)
+    assert (lacks is None) is may
+    assert may or lacks == "get_face needs the role subscriber"
+
+
+def test_refusals_are_all_counted_and_not_all_logged(capsys):
+    counters, now = Counters(), [0.0]
+    refusals = Refusals(counters, lambda: now[0])
+    for _ in range(1000):
+        refusals.note("role", key="a")
+    refusals.note("malformed", key="b")
+    now[0] = 60.0
+    refusals.note("role", key="a")
+    logged = [line for line in capsys.readouterr().out.splitlines() if "refused" in line]
+    assert len(logged) == 7
+    assert "more_unsaid=995" in logged[-1]
+    assert counters.labels("refused") == {"malformed": 1, "role": 1001}

@@ -1,0 +1,210 @@
+"""The data folder."""
+
+import hashlib
+import os
+import stat
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from denseface.recon.settings import Settings
+from denseface.service.errors import CorruptFileError, HubRunningError, SettingsError, StoreError
+from denseface.service.protocol import messages
+from denseface.service.protocol.payload import FaceHeader, FrameHeader
+from denseface.service.protocol.states import CaptureState
+from denseface.service.protocol.wire import Packet
+from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage.frame_cache import FreshFrames
+from denseface.service.storage.record_file import read_parts, write_parts
+from denseface.service.storage.writer import write
+from tests.unit.service.faces import small_face, small_frame
+from tests.unit.service.keep import accept, finish
+
+
+@pytest.fixture
+def store(tmp_path):
+    with FolderStore(tmp_path / "data") as store:
+        yield store
+
+
+def frame(capture_id: str) -> Packet:
+    header, arrays = FrameHeader.of(small_frame())
+    return Packet(messages.Frame(capture_id=capture_id, frame=header), arrays)
+
+
+def result(capture_id: str, store: FolderStore) -> Packet:
+    header, arrays = FaceHeader.of(small_face())
+    return Packet(
+        messages.Result(capture_id=capture_id, settings_hash="0f", face=header,
+                        frame_sha256=store.find(capture_id).frame_sha256), arrays)
+
+
+def test_an_accepted_frame_survives_closing(tmp_path):
+    settings = Settings.of("faithful", ratio=7)
+    with FolderStore(tmp_path / "data") as store:
+        accept(store, frame("a"), settings, "0f")
+        accept(store, frame("b"), settings, "0f")
+        epoch = store.epoch
+    with FolderStore(tmp_path / "data") as store:
+        assert store.epoch == epoch
+        assert store.unfinished() == ["a", "b"]
+        stored = store.find("a")
+        assert stored is not None
+        assert (stored.state, stored.attempts) == (CaptureState.ACCEPTED, 0)
+        kept = store.frame("a")
+        assert Settings.model_validate_json(kept.about.settings) == settings
+        depth = kept.message.frame.join(kept.arrays).depth
+        np.testing.assert_array_equal(depth, small_frame().depth)
+        assert store.start_attempt("a") == 1
+        assert store.start_attempt("a") == 2
+
+
+def test_a_row_comes_after_its_file_is_safe(store, monkeypatch):
+    steps = []
+    sync, rename, transaction = os.fsync, Path.replace, store._database.transaction
+
+    def synced(descriptor):
+        steps.append("folder" if stat.S_ISDIR(os.fstat(descriptor).st_mode) else "file")
+        sync(descriptor)
+
+    def renamed(path, target):
+        steps.append(target.name)
+        return rename(path, target)
+
+    def begun():
+        steps.append("row")
+        return transaction()
+
+    monkeypatch.setattr("denseface.service.storage.record_file.os.fsync", synced)
+    monkeypatch.setattr(Path, "replace", renamed)
+    draft = store.frame_draft(frame("a"), Settings(), "0f")
+    monkeypatch.setattr(store._database, "transaction", begun)
+    store.accept(write([draft]))
+    assert steps == ["file", "a.frame", "folder", "row"]
+    assert store._database.one("PRAGMA synchronous")[0] == 2
+    assert store._database.one("PRAGMA journal_mode")[0] == "wal"
+
+
+def test_outcomes_are_numbered_in_order(store):
+    for name in "abc":
+        accept(store, frame(name), Settings(), "0f")
+    finish(store, result("b", store))
+    store.fail("a", "NoFaceError", "no face", dead=False)
+    store.fail("c", "WorkerLost", "gone", dead=True)
+    assert store.unfinished() == []
+    assert store.last_sequence() == 3
+    assert store.counts() == {CaptureState.DONE: 1, CaptureState.FAILED: 1, CaptureState.DEAD: 1}
+    first, second, third = (store.outcome_after(n).message for n in range(3))
+    assert isinstance(first, messages.FaceDone)
+    assert (first.capture_id, first.sequence) == ("b", 1)
+    assert (second.capture_id, second.error, second.dead) == ("a", "NoFaceError", False)
+    assert (third.capture_id, third.dead) == ("c", True)
+    assert store.outcome_after(3) is None
+    assert store.outcome("c").message == third
+    assert store.outcome("d") is None
+
+
+def test_a_second_outcome_changes_nothing(store):
+    accept(store, frame("a"), Settings(), "0f")
+    finish(store, result("a", store))
+    store.fail("a", "WorkerLost", "late", dead=True)
+    assert store.last_sequence() == 1
+    assert store.find("a").state is CaptureState.DONE
+
+
+def test_a_damaged_frame_is_named(store, tmp_path):
+    accept(store, frame("a"), Settings(), "0f")
+    path = tmp_path / "data" / "frames" / "a.frame"
+    data = bytearray(path.read_bytes())
+    data[-1] ^= 1
+    path.write_bytes(data)
+    store.frame("a")  # the first time from memory
+    with pytest.raises(CorruptFileError, match=r"a\.frame: contents"):
+        store.frame("a")
+    assert not path.exists()
+    with pytest.raises(CorruptFileError, match="No such file"):
+        store.frame("a")
+
+
+def test_two_hubs_cannot_have_one_folder(store, tmp_path):
+    with pytest.raises(HubRunningError, match="another hub"):
+        FolderStore(tmp_path / "data")
+
+
+def test_the_folder_is_private_and_swept(tmp_path):
+    (tmp_path / "data" / "frames").mkdir(parents=True)
+    left = tmp_path / "data" / "frames" / ".a.frame.77.tmp"
+    left.write_bytes(b"half")
+    with FolderStore(tmp_path / "data"):
+        assert not left.exists()
+        assert (tmp_path / "data").stat().st_mode & 0o777 == 0o700
+
+
+def test_a_file_in_the_folder_s_place_is_named(tmp_path):
+    (tmp_path / "data").write_text("")
+    with pytest.raises(SettingsError, match="data"):
+        FolderStore(tmp_path / "data")
+
+
+def test_parts_come_back_as_they_were(tmp_path):
+    parts = [b"header", b"", os.urandom(1000)]
+    checksum = write_parts(tmp_path / "x", parts)
+    assert read_parts(tmp_path / "x", checksum) == read_parts(tmp_path / "x") == (parts, checksum)
+    with pytest.raises(CorruptFileError):
+        read_parts(tmp_path / "x", "0" * 64)
+
+
+def test_parts_of_the_format_before_are_read(tmp_path):
+    body = struct.pack("<I2Q", 2, 1, 3) + b"a" + b"bcd"
+    digest = hashlib.sha256(body)
+    (tmp_path / "x").write_bytes(b"denseface spool 2\n" + digest.digest() + body)
+    assert read_parts(tmp_path / "x", digest.hexdigest()) == ([b"a", b"bcd"], digest.hexdigest())
+    (tmp_path / "x").write_bytes(b"denseface spool 2\n" + digest.digest() + body[:-1] + b"x")
+    with pytest.raises(CorruptFileError, match="contents"):
+        read_parts(tmp_path / "x")
+
+
+def test_no_flipped_bit_and_no_swap_of_parts_goes_unseen(tmp_path):
+    path = tmp_path / "x"
+    checksum = write_parts(path, [b"header", b"", bytes(range(64)), bytes(reversed(range(64)))])
+    content = path.read_bytes()
+    for position in range(len(content)):
+        for bit in range(8):
+            spoiled = bytearray(content)
+            spoiled[position] ^= 1 << bit
+            path.write_bytes(spoiled)
+            with pytest.raises(CorruptFileError):
+                read_parts(path, checksum)
+    for spoiled in (content[:-128] + content[-64:] + content[-128:-64], content[:-1],
+                    content + b"\0"):
+        path.write_bytes(spoiled)
+        with pytest.raises(CorruptFileError):
+            read_parts(path)
+
+
+def test_a_full_disk_leaves_nothing_half_written(tmp_path, monkeypatch):
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("denseface.service.storage.record_file.os.fsync", full)
+    with pytest.raises(StoreError, match="No space left"):
+        write_parts(tmp_path / "x", [b"data"])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_frames_are_held_in_memory_as_far_as_there_is_room(store, monkeypatch):
+    size = sum(array.nbytes for array in frame("a").arrays.values())
+    monkeypatch.setattr("denseface.service.storage.frame_cache._BYTES", 2 * size)
+    fresh = FreshFrames()
+    kept = {}
+    for name in "abc":
+        accept(store, frame(name), Settings(), "0f")
+        kept[name] = store.frame(name)
+    fresh.add(kept.values())
+    assert fresh.pop("c") is None
+    assert fresh.pop("a") is kept["a"]
+    assert fresh.pop("a") is None
+    fresh.add([kept["c"]])
+    assert [fresh.pop(name) for name in "bc"] == [kept["b"], kept["c"]]

@@ -1,0 +1,335 @@
+"""A data folder to which something happened."""
+
+import json
+import os
+import shutil
+import sqlite3
+
+import pytest
+
+from denseface.recon.settings import Settings
+from denseface.service.errors import (
+    DamagedDatabaseError,
+    DamagedFaceError,
+    DiskFullError,
+    StoreError,
+)
+from denseface.service.protocol.states import CaptureState
+from denseface.service.storage.folder_store import FolderStore
+from tests.unit.service.clocks import FakeClock
+from tests.unit.service.keep import accept, finish
+from tests.unit.service.storage.test_folder_store import frame, result
+
+DAY = 86400.0
+
+
+@pytest.fixture
+def data(tmp_path):
+    """A folder with a face, a failure, a dead letter and a frame that waits."""
+    with FolderStore(tmp_path / "data", FakeClock()) as store:
+        for name in ("done", "failed", "dead", "waits"):
+            accept(store, frame(name), Settings(), "0f")
+        finish(store, result("done", store))
+        store.fail("failed", "NoFaceError", "no face", dead=False)
+        store.fail("dead", "WorkerLost", "gone", dead=True)
+    return tmp_path / "data"
+
+
+def states(store):
+    return {name: store.find(name) and store.find(name).state
+            for name in ("done", "failed", "dead", "waits")}
+
+
+def reports(data):
+    return [json.loads(path.read_text()) for path in (data / "quarantine").glob("*.json")]
+
+
+REBUILT = {"done": CaptureState.DONE, "failed": CaptureState.ACCEPTED,
+           "dead": CaptureState.ACCEPTED, "waits": CaptureState.ACCEPTED}
+
+
+@pytest.mark.parametrize("damage", [
+    lambda _: b"no database " * 500,
+    lambda content: content[:len(content) // 2],
+    lambda content: content[:4096 * 2] + b"\xff" * 4096 + content[4096 * 3:],
+    lambda content: content.replace(b"accepted0f", b"acceptee0f"),
+    lambda content: content.replace(b"waits", b"wbits", 1),
+    lambda content: content[:60] + b"\0\0\0\1" + content[64:],
+    lambda content: content.replace(b'"seconds"', b'"sekonds"'),
+])
+def test_a_damaged_database_is_made_again_from_the_files(data, damage):
+    path = data / "captures.sqlite3"
+    with FolderStore(data) as store:
+        epoch = store.epoch
+    content = path.read_bytes()
+    damaged = damage(content)
+    assert damaged != content
+    path.write_bytes(damaged)
+    with FolderStore(data, FakeClock()) as store:
+        assert states(store) == REBUILT
+        assert store.epoch != epoch
+        assert store.outcome_after(0).message.capture_id == "done"
+        assert store.last_sequence() == 1
+        assert sorted(store.unfinished()) == ["dead", "failed", "waits"]
+        assert "settings" in json.loads(store.frame("waits").about.model_dump_json())
+    (report,) = reports(data)
+    assert report["file"].endswith("captures.sqlite3")
+    assert next((data / "quarantine").glob("*.captures.sqlite3")).read_bytes() == damaged
+
+
+@pytest.mark.parametrize("gone", [True, False])
+def test_a_database_that_is_gone_is_made_again(data, gone):
+    if gone:
+        (data / "captures.sqlite3").unlink()
+    else:
+        (data / "captures.sqlite3").write_bytes(b"")
+    with FolderStore(data) as store:
+        assert states(store) == REBUILT
+
+
+def test_a_database_with_a_flipped_bit_is_read_or_made_again(data):
+    path = data / "captures.sqlite3"
+    content = path.read_bytes()
+    for position in range(0, len(content), 211):
+        flipped = bytearray(content)
+        flipped[position] ^= 1 << position % 8
+        path.write_bytes(flipped)
+        with FolderStore(data, FakeClock()) as store:
+            found = states(store)
+            assert found["done"] is CaptureState.DONE
+            assert found["waits"] is CaptureState.ACCEPTED
+            assert len(store.counts()) in (2, 4)
+            store.frame("waits")
+        path.write_bytes(content)
+
+
+def test_a_log_with_a_flipped_bit_loses_nothing_that_was_accepted(data, tmp_path):
+    killed = tmp_path / "killed"
+    with FolderStore(data, FakeClock()) as store:
+        last = store.last_sequence()
+        for name in ("x", "y"):
+            accept(store, frame(name), Settings(), "0f")
+        finish(store, result("x", store))
+        shutil.copytree(data, killed)
+    log = killed / "captures.sqlite3-wal"
+    size = log.stat().st_size
+    assert size > 10_000
+    for position in range(0, size, 997):
+        again = tmp_path / str(position)
+        shutil.copytree(killed, again)
+        _flip(again / log.name, position)
+        with FolderStore(again, FakeClock()) as store:
+            assert store.find("x").state is CaptureState.DONE
+            assert store.find("y").state is CaptureState.ACCEPTED
+            assert store.outcome("x").message.sequence > last
+            finish(store, result("y", store))
+            assert store.outcome("y").message.sequence > last + 1
+        shutil.rmtree(again)
+
+
+def test_what_was_kept_is_as_old_after_a_rebuild(data):
+    clock = FakeClock()
+    clock.pass_time(DAY - 10)
+    with FolderStore(data, clock):
+        pass
+    (data / "captures.sqlite3").unlink()
+    with FolderStore(data, clock) as store:
+        assert store.expired(DAY, 9) == []
+        clock.pass_time(10)
+        assert store.expired(DAY, 9) == ["done"]
+
+
+def test_a_frame_without_a_row_is_taken_in(data):
+    _forget(data, "waits")
+    with FolderStore(data, FakeClock()) as store:
+        assert states(store)["waits"] is CaptureState.ACCEPTED
+        finish(store, result("waits", store))
+
+
+def test_a_face_without_a_row_is_taken_in(data):
+    with sqlite3.connect(data / "captures.sqlite3") as database:
+        database.execute("DELETE FROM outcomes WHERE capture_id = 'done'")
+        database.execute("UPDATE captures SET state = 'accepted' WHERE capture_id = 'done'")
+    database.close()
+    with FolderStore(data, FakeClock()) as store:
+        assert states(store)["done"] is CaptureState.DONE
+        assert store.outcome("done").message.kind == "face_done"
+
+
+def test_a_damaged_frame_without_a_row_is_a_dead_letter(data):
+    _forget(data, "waits")
+    _flip(data / "frames" / "waits.frame")
+    with FolderStore(data, FakeClock()) as store:
+        assert store.find("waits").state is CaptureState.DEAD
+        assert "checksum" in store.outcome("waits").message.message
+    (report,) = reports(data)
+    assert report["capture_id"] == "waits"
+    with FolderStore(data, FakeClock()) as store:
+        assert store.find("waits").state is CaptureState.DEAD
+
+
+def test_a_damaged_face_names_its_capture(data):
+    (face,) = (data / "faces").iterdir()
+    _flip(face)
+    with FolderStore(data, FakeClock()) as store:
+        with pytest.raises(DamagedFaceError) as caught:
+            store.outcome_after(0)
+        assert caught.value.capture_id == "done"
+        assert not face.exists()
+        store.reopen("done", attempts_left=True)
+        assert store.outcome_after(0).message.capture_id == "failed"
+        assert store.find("done").state is CaptureState.ACCEPTED
+
+
+def test_a_frame_under_another_name_is_not_taken_in(data):
+    (data / "frames" / "waits.frame").rename(data / "frames" / "other.frame")
+    with FolderStore(data, FakeClock()) as store:
+        assert store.find("other") is None
+    (report,) = reports(data)
+    assert "is of capture waits" in report["reason"]
+
+
+def test_what_is_not_ours_is_left_alone(data, capsys):
+    strange = [data / "notes.txt", data / "frames" / "holiday.jpg"]
+    for path in strange:
+        path.write_text("mine")
+    with FolderStore(data, FakeClock()):
+        assert all(path.read_text() == "mine" for path in strange)
+    out = capsys.readouterr().out
+    assert "notes.txt" in out
+    assert "holiday.jpg" in out
+
+
+def test_quarantine_goes_after_the_retention(data):
+    _flip(data / "frames" / "waits.frame")
+    clock = FakeClock()
+    with FolderStore(data, clock) as store:
+        with pytest.raises(StoreError):
+            store.frame("waits")
+        store.sweep(DAY)
+        assert len(reports(data)) == 1
+        clock.pass_time(DAY)
+        store.sweep(None)
+        assert len(reports(data)) == 1
+        store.sweep(DAY)
+        assert list((data / "quarantine").iterdir()) == []
+
+
+def test_quarantine_goes_with_its_capture(data):
+    _flip(data / "frames" / "waits.frame")
+    with FolderStore(data, FakeClock()) as store:
+        with pytest.raises(StoreError):
+            store.frame("waits")
+        store.remove(["dead"])
+        assert len(reports(data)) == 1
+        store.remove(["waits"])
+        assert list((data / "quarantine").iterdir()) == []
+
+
+def test_a_removal_that_was_cut_short_is_finished(data, monkeypatch):
+    def killed(*_):
+        raise StoreError("killed")
+
+    with FolderStore(data, FakeClock()) as store:
+        monkeypatch.setattr(store._removal, "_finish", killed)
+        with pytest.raises(StoreError):
+            store.remove(["done", "waits"])
+    monkeypatch.undo()
+    with FolderStore(data, FakeClock()) as store:
+        assert store.find("done") is None
+        assert store.counts() == {CaptureState.FAILED: 1, CaptureState.DEAD: 1}
+        accept(store, frame("done"), Settings(), "0f")
+        assert store.find("done").state is CaptureState.ACCEPTED
+        store.sweep(None)
+        assert store.find("done").state is CaptureState.ACCEPTED
+        assert sorted(path.name for path in (data / "frames").iterdir()) == [
+            "dead.frame", "done.frame", "failed.frame"]
+
+
+@pytest.mark.parametrize(("number", "kind", "message"), [
+    (28, DiskFullError, "no room on the disk"), (122, DiskFullError, "no room on the disk"),
+    (5, StoreError, "the disk fails")])
+@pytest.mark.parametrize("step", ["write", "fsync", "rename", "folder"])
+def test_a_frame_that_cannot_be_kept_leaves_nothing(
+        data, monkeypatch, number, kind, message, step):
+    calls = []
+
+    def fails(*_, **__):
+        raise OSError(number, os.strerror(number))
+
+    def second_fails(descriptor):
+        calls.append(descriptor)
+        if len(calls) == 2:
+            fails()
+
+    with FolderStore(data, FakeClock()) as store:
+        before = sorted((data / "frames").iterdir())
+        match step:
+            case "write":
+                monkeypatch.setattr("denseface.service.storage.record_file.write_atomically", fails)
+            case "fsync":
+                monkeypatch.setattr("denseface.service.storage.record_file.os.fsync", fails)
+            case "rename":
+                monkeypatch.setattr("pathlib.Path.replace", fails)
+            case "folder":
+                monkeypatch.setattr("denseface.service.storage.record_file.os.fsync", second_fails)
+        with pytest.raises(kind, match=message):
+            accept(store, frame("new"), Settings(), "0f")
+        monkeypatch.undo()
+        assert sorted((data / "frames").iterdir()) == before
+        assert store.find("new") is None
+        accept(store, frame("new"), Settings(), "0f")
+
+
+def test_a_full_database_leaves_no_frame(data):
+    with FolderStore(data, FakeClock()) as store:
+        pages = store._database.one("PRAGMA page_count")[0]
+        store._database.one(f"PRAGMA max_page_count = {pages}")
+        for number in range(200):
+            try:
+                accept(store, frame(f"x{number}"), Settings(), "0f")
+            except DiskFullError as error:
+                assert "no room on the disk" in str(error)  # noqa: PT017
+                break
+        assert store.find(f"x{number}") is None
+        assert not (data / "frames" / f"x{number}.frame").exists()
+        assert store.find("waits").state is CaptureState.ACCEPTED
+
+
+def test_a_purge_makes_room_on_a_full_disk(data, monkeypatch):
+    with FolderStore(data, FakeClock()) as store:
+        real = store._removal._mark
+
+        def full(capture_ids):
+            if (data / "ballast").exists():
+                raise DiskFullError("no room on the disk")
+            real(capture_ids)
+
+        monkeypatch.setattr(store._removal, "_mark", full)
+        assert (data / "ballast").stat().st_size == 2**20
+        store.remove(["waits"])
+        assert store.find("waits") is None
+        assert (data / "ballast").stat().st_size == 2**20
+
+
+def test_damage_while_serving_ends_the_hub(data):
+    with FolderStore(data, FakeClock()) as store:
+        store._database.truncate_log()
+        path = data / "captures.sqlite3"
+        path.write_bytes(path.read_bytes()[:4096] + b"\xff" * 40960)
+        store._database.all("PRAGMA shrink_memory")
+        with pytest.raises(DamagedDatabaseError):
+            store.counts()
+
+
+def _forget(data, capture_id):
+    database = sqlite3.connect(data / "captures.sqlite3")
+    with database:
+        database.execute("DELETE FROM captures WHERE capture_id = ?", (capture_id,))
+    database.close()
+
+
+def _flip(path, position=None):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2 if position is None else position] ^= 1
+    path.write_bytes(content)

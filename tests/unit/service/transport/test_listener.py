@@ -1,0 +1,159 @@
+"""A door, its keys and who knocks, within one process."""
+
+import socket
+import time
+
+import pytest
+import zmq
+
+from denseface.service.errors import AddressError, KeyFileError
+from denseface.service.monitoring.counters import Counters
+from denseface.service.monitoring.rejections import Refusals
+from denseface.service.runtime.memory import MemoryWatch
+from denseface.service.security.allow_list import Role, allow, revoke
+from denseface.service.security.keys import KeyPair, new_pair, read_public
+from denseface.service.settings import ServiceSettings
+from denseface.service.transport.connection import Credentials, connect
+from denseface.service.transport.listener import Door
+from denseface.service.transport.listeners import Entrance
+from tests.ports import free_port
+
+
+class _Never:
+    """Wakes no poll."""
+
+    def __init__(self):
+        self.ends = socket.socketpair()
+
+    def fileno(self):
+        return self.ends[0].fileno()
+
+
+@pytest.fixture
+def context():
+    with zmq.Context() as context:
+        yield context
+
+
+@pytest.fixture
+def wakes():
+    never = _Never()
+    yield never
+    for end in never.ends:
+        end.close()
+
+
+def _address(host="127.0.0.1"):
+    return f"tcp://{f'[{host}]' if ':' in host else host}:{free_port(host)}"
+
+
+def _until(entrance, true):
+    deadline = time.monotonic() + 20
+    heard = []
+    while not true(heard):
+        assert time.monotonic() < deadline
+        entrance.tick()
+        heard += entrance.receive(10)
+    return heard
+
+
+def test_a_door_on_the_other_loopback(context):
+    try:
+        address = _address("::1")
+    except OSError:
+        pytest.skip("this machine has no IPv6")
+    door = Door(context, address, None, Refusals(Counters()))
+    dealer, knock = connect(context, zmq.DEALER, address, None)
+    try:
+        dealer.send(b"hello")
+        assert door.sockets[0].poll(10_000)
+        (incoming,) = door.receive()
+        assert incoming.parts == [b"hello"]
+        assert incoming.sender.roles == frozenset(Role)
+        assert door.send(incoming.peer, [b"back"])
+        assert dealer.poll(10_000)
+    finally:
+        knock.close()
+        dealer.close()
+        door.close()
+
+
+def test_an_address_in_use_is_named(context):
+    address = _address()
+    door = Door(context, address, None, Refusals(Counters()))
+    with pytest.raises(AddressError, match=rf"^{address}: Address already in use$"):
+        Door(context, address, None, Refusals(Counters()))
+    door.close()
+
+
+def test_who_was_refused_comes_in_once_allowed(context, wakes, tmp_path, monkeypatch):
+    """After a refusal libzmq alone would never knock again."""
+    monkeypatch.setattr("denseface.service.transport.connection._REDIAL_S", 0.1)
+    _, hub_key = new_pair(tmp_path, "hub")
+    secret, public = new_pair(tmp_path, "late")
+    allow(tmp_path, "other", KeyPair.made().public, frozenset({Role.WORKER}))
+    address, refusals = _address(), Refusals(Counters())
+    settings = ServiceSettings(address=address, key=secret, hub_key=hub_key)
+    doors = ServiceSettings(address=_address(), listen=(address,), keys=tmp_path)
+    entrance = Entrance(context, doors, refusals, [wakes])
+    dealer, knock = connect(context, zmq.DEALER, address, Credentials.of(settings))
+    try:
+        _until(entrance, lambda _: knock.read() or knock.refused)
+        assert "does not let this key in" in str(knock.refused)
+        assert refusals.counts()["unknown key"] >= 1
+        one = allow(tmp_path, "late", read_public(public), frozenset({Role.WORKER}))
+        _until(entrance, lambda _: knock.read() or not knock.refused)
+        dealer.send(b"hello")
+        (incoming,) = _until(entrance, lambda heard: heard)
+        assert (incoming.sender, incoming.key) == (one, one.fingerprint)
+        assert entrance.knows(incoming.peer)
+        assert entrance.send(incoming.peer, [b"back"])
+        revoke(tmp_path, "late")
+        assert entrance.tick()
+        assert not entrance.knows(incoming.peer)
+        assert not entrance.send(incoming.peer, [b"back"])
+    finally:
+        knock.close()
+        dealer.close(linger=0)
+        entrance.close()
+
+
+def test_keys_are_for_other_machines(tmp_path):
+    secret, public = new_pair(tmp_path, "a")
+    away = {"address": "tcp://10.0.0.1:5700"}
+    assert Credentials.of(ServiceSettings(**away)) is None
+    for half, missing in (({"key": secret}, "--hub-key"), ({"hub_key": public}, "--key")):
+        with pytest.raises(KeyFileError, match=f"expected {missing} FILE"):
+            Credentials.of(ServiceSettings(**away, **half))
+    both = Credentials.of(ServiceSettings(**away, key=secret, hub_key=public))
+    assert both.hub == both.pair.public
+    assert Credentials.of(ServiceSettings(address="ipc:///run/hub", key=secret)) is None
+
+
+@pytest.mark.parametrize("address", ["ipc:///run/x", "tcp://host", "tcp://0.0.0.0:70000"])
+def test_only_a_port_can_be_guarded(context, wakes, address):
+    with pytest.raises(AddressError, match=address):
+        Entrance(context, ServiceSettings(address=_address(), listen=(address,)),
+                 Refusals(Counters()), [wakes])
+
+
+def test_several_addresses_come_with_commas():
+    settings = ServiceSettings.of({"DENSEFACE_LISTEN": "tcp://10.0.0.1:1,tcp://10.0.0.2:2"})
+    assert settings.listen == ("tcp://10.0.0.1:1", "tcp://10.0.0.2:2")
+    assert ServiceSettings.of({"DENSEFACE_LISTEN": "x"}, listen=["y"]).listen == ("y",)
+
+
+def test_memory_that_stays_with_the_process_is_said_once(monkeypatch, tmp_path):
+    statm = tmp_path / "statm"
+    statm.touch()
+    monkeypatch.setattr("denseface.service.runtime.memory._STATM", statm)
+    monkeypatch.setattr("denseface.service.runtime.memory._PAGE", 1)
+    watch = MemoryWatch(100)
+
+    def beyond(used):
+        statm.write_text(f"1000 {used} 3 4")
+        return watch.beyond()
+
+    assert [beyond(used) for used in (50, 120, 110, 130, 140, 150)] == [0, 120, 0, 0, 140, 0]
+    assert [beyond(used) for used in (50, 120)] == [0, 120]
+    watch.close()
