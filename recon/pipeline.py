@@ -19,7 +19,7 @@ from denseface.recon.face import Face, PointCloud, Report
 from denseface.recon.numerics.threads import one_blas_thread
 from denseface.recon.propagation.densify import densify
 from denseface.recon.propagation.uncertainty import noise_share
-from denseface.recon.registration.registration import LookUp, Registration, look_up, register
+from denseface.recon.registration.registration import ColorSampler, Registration, look_up, register
 from denseface.recon.segmentation.segment import segment_face, window_of_box
 from denseface.recon.settings import Settings
 from denseface.recon.surface.rbf import MIN_SEEDS, Surface, fit_surface
@@ -110,7 +110,7 @@ def _version() -> str:
 
 def surface_of(
     points: NDArray[np.float32], spacing: float, settings: Settings,
-    look_up: LookUp | None = None,
+    look_up: ColorSampler | None = None,
 ) -> Surface | DetailedSurface:
     """Fit the seeds, and add the detail that the settings ask for.
 

@@ -21,7 +21,7 @@ from denseface.recon.numerics.local_means import blurred, enlarged, local_means
 from denseface.recon.numerics.percentile import percentile
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, read_between, share_out
 from denseface.recon.propagation._image_kernels import add_between
-from denseface.recon.registration.registration import LookUp
+from denseface.recon.registration.registration import ColorSampler
 from denseface.recon.surface._sheet_kernels import face_field, lay_under, shares, slopes
 from denseface.recon.surface.rbf import Surface
 from denseface.recon.surface.support import Support
@@ -80,7 +80,7 @@ class DetailedSurface:
 
 def add_detail(
     base: Surface, points: NDArray[np.float32], spacing: float, radius: float, *,
-    symmetry: bool = False, look_up: LookUp | None = None,
+    symmetry: bool = False, look_up: ColorSampler | None = None,
 ) -> DetailedSurface:
     """Add to a broad fit what its seeds show besides.
 

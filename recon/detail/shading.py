@@ -25,7 +25,7 @@ from denseface.recon.detail._shading_kernels import (
 )
 from denseface.recon.numerics._local_mean_kernels import divided
 from denseface.recon.numerics.local_means import blurred, enlarged, local_means
-from denseface.recon.registration.registration import LookUp
+from denseface.recon.registration.registration import ColorSampler
 
 __all__ = ["shading_detail", "shape_from_shading"]
 
@@ -60,7 +60,7 @@ _STEPS = 3
 
 def shading_detail(
     heights: Image, weight: Image, slopes: tuple[Image, Image],
-    places: tuple[NDArray[np.float64], NDArray[np.float64]], look_up: LookUp,
+    places: tuple[NDArray[np.float64], NDArray[np.float64]], look_up: ColorSampler,
 ) -> Image:
     """Find what is to be added to a surface for its shading to be that of the image.
 

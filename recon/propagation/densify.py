@@ -14,7 +14,7 @@ from denseface.recon.numerics.push_pull import average_neighbors
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, places
 from denseface.recon.propagation._image_kernels import collect, unset
 from denseface.recon.propagation.uncertainty import sources_of_error, standard_error
-from denseface.recon.registration.registration import LookUp
+from denseface.recon.registration.registration import ColorSampler
 from denseface.recon.segmentation.segment import Seeds
 from denseface.recon.surface.rbf import Surface
 from denseface.recon.surface.support import Support
@@ -43,7 +43,7 @@ def densify(
     spacing: float,
     ratio: float,
     share: float,
-    look_up: LookUp | None = None,
+    look_up: ColorSampler | None = None,
 ) -> DenseCloud:
     """Sample the surface on a regular grid, `ratio` points for each seed.
 

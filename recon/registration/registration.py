@@ -12,9 +12,9 @@ from denseface.capture.frame import CameraModel, RgbdFrame
 from denseface.recon.errors import NoDepthError
 from denseface.recon.registration._kernels import EMPTY, look, project, project_points, see
 
-__all__ = ["LookUp", "Registration", "look_up", "register"]
+__all__ = ["ColorSampler", "Registration", "look_up", "register"]
 
-LookUp = Callable[[NDArray[np.float32]], tuple[NDArray[np.uint8], NDArray[np.bool_]]]
+ColorSampler = Callable[[NDArray[np.float32]], tuple[NDArray[np.uint8], NDArray[np.bool_]]]
 """Points, (n, 3) float32, mm, to their colours, (n, 3) uint8, and which are seen, (n,) bool."""
 
 # A point is hidden when another, nearer one falls on the same spot of the colour image. A steep

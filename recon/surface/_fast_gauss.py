@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["Charges"]
+__all__ = ["FastGaussTransform"]
 
 # a over the sharpest b, and d in units of the sharpest's radius: good to 2e-6 with `_TAPS` points.
 _NARROWER = 4.0
@@ -33,7 +33,7 @@ _AT_TAPS[:_TAPS] = np.exp(-_FALL * np.arange(-_BEFORE, _TAPS - _BEFORE) ** 2.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Charges:
+class FastGaussTransform:
     """Scattered weights, spread over the points of a regular grid.
 
     Attributes
@@ -52,7 +52,7 @@ class Charges:
     def of(
         cls, x: NDArray[np.float64], y: NDArray[np.float64],
         weights: tuple[NDArray[np.floating], NDArray[np.floating]], sharpest: float,
-    ) -> "Charges":
+    ) -> "FastGaussTransform":
         """Spread two kinds of weight at (x, y), (n,) each, for Gaussians with b <= sharpest."""
         step = _STEP / np.sqrt(sharpest)
         (xs, column, first_x, ratio_x), (ys, row, first_y, ratio_y) = (

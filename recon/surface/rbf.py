@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from denseface.recon.errors import TooLittleDepthError
 from denseface.recon.surface._conjugate_gradients import conjugate_gradients
-from denseface.recon.surface._fast_gauss import Charges
+from denseface.recon.surface._fast_gauss import FastGaussTransform
 from denseface.recon.surface._trend import Trend, polynomial
 
 __all__ = ["MIN_SEEDS", "Surface", "fit_surface"]
@@ -195,14 +195,15 @@ def fit_surface(
     # The polynomial is eliminated: what it explains by itself is taken off first, and the node
     # weights are sought beside it. In single precision, which the small rest allows.
     trend = Trend.of(x, y, z, W)
-    charges = Charges.of(x, y, (W, trend.rest), _DENSITY / r0**2)
+    charges = FastGaussTransform.of(x, y, (W, trend.rest), _DENSITY / r0**2)
     extent = (float(x.min()), float(x.max())), (float(y.min()), float(y.max()))
     return _fit(trend, charges, extent, float(W.sum()), r0, smoothing,
                 relative=smoothing / float(W.max()))
 
 
 def _fit(
-    trend: Trend, charges: Charges, extent: tuple[tuple[float, float], tuple[float, float]],
+    trend: Trend, charges: FastGaussTransform,
+    extent: tuple[tuple[float, float], tuple[float, float]],
     total: float, r0: float, smoothing: float, *, relative: float,
 ) -> Surface:
     """Fit what the trend leaves of the seeds.
@@ -239,8 +240,8 @@ def _fit(
 
 
 def _node_sums(
-    trend: Trend, charges: Charges, nodes_x: NDArray[np.float64], nodes_y: NDArray[np.float64],
-    r0: float,
+    trend: Trend, charges: FastGaussTransform, nodes_x: NDArray[np.float64],
+    nodes_y: NDArray[np.float64], r0: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Sum g(x_i - t) W_i times each term of the polynomial, (6, rows, columns), and W_i rest_i."""
     across, down = (
@@ -253,8 +254,8 @@ def _node_sums(
 
 
 def _density(
-    charges: Charges, nodes_x: NDArray[np.float64], nodes_y: NDArray[np.float64], flat: "_Flat",
-    r0: float,
+    charges: FastGaussTransform, nodes_x: NDArray[np.float64], nodes_y: NDArray[np.float64],
+    flat: "_Flat", r0: float,
 ) -> NDArray[np.float32]:
     """Sum W_i exp(-4 |x_i - s|^2 / R0^2) for s on a grid of half steps.
 

@@ -20,10 +20,10 @@ from denseface.recon.face import Face
 from denseface.service.client.events import Published, PublishedFace, PublishedPreview, preview_of
 from denseface.service.client.exchanges import (
     UNCONNECTED_S,
-    Ask,
+    Exchanges,
+    SendRequest,
     Step,
     Talk,
-    Talks,
     checked,
     deadline,
     no_answer,
@@ -37,7 +37,7 @@ from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable, publications_of
 from denseface.service.transport.connection import Credentials, connect
 from denseface.service.transport.sockets import send_parts
-from denseface.service.transport.subscription import LOOK_S, Ear
+from denseface.service.transport.subscription import LOOK_S, Subscription
 
 __all__ = ["AsyncClient"]
 
@@ -60,7 +60,7 @@ class AsyncClient:
         check_connectable(self.address)
         self._publications = publications_of(self.address)
         self._keys = Credentials.of(settings)
-        self._talks = Talks(settings.resend_s)
+        self._talks = Exchanges(settings.resend_s)
         self._waiting: dict[int, asyncio.Future[Packet]] = {}
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._socket, self._knock = connect(self._context, zmq.DEALER, self.address, self._keys)
@@ -133,11 +133,11 @@ class AsyncClient:
                     preview = preview_of(ear.newest())
                 yield preview
 
-    def _ear(self, *topics: Topic) -> Ear:
+    def _ear(self, *topics: Topic) -> Subscription:
         self._check_open()
-        return Ear(self._context, self._publications, self._keys, topics)
+        return Subscription(self._context, self._publications, self._keys, topics)
 
-    async def _carry_out(self, talk: Talk[_T], ear: Ear | None = None) -> _T:
+    async def _carry_out(self, talk: Talk[_T], ear: Subscription | None = None) -> _T:
         try:
             step = next(talk)
             while True:
@@ -153,15 +153,17 @@ class AsyncClient:
         finally:
             talk.close()
 
-    async def _do(self, step: Step, ear: Ear | None) -> Packet | None:
-        if isinstance(step, Ask):
+    async def _do(self, step: Step, ear: Subscription | None) -> Packet | None:
+        if isinstance(step, SendRequest):
             return await self._ask(step.message, step.timeout, ear)
         if ear is None:
             raise TypeError("there is no subscription to hear")
         await self._wait(ear, step.timeout)
         return ear.receive()
 
-    async def _ask(self, message: Request, timeout: float, ear: Ear | None = None) -> Packet:
+    async def _ask(
+        self, message: Request, timeout: float, ear: Subscription | None = None
+    ) -> Packet:
         """Send until answered, or until it is known that the hub lets us in no more."""
         self._check_open()
         parts = encode(Packet(message))
@@ -213,7 +215,7 @@ class AsyncClient:
         if self._context.closed:
             raise ClientClosedError(f"{self.address}: the client was closed")
 
-    async def _wait(self, ear: Ear, timeout: float) -> None:
+    async def _wait(self, ear: Subscription, timeout: float) -> None:
         until = time.monotonic() + timeout
         while not await self._readable(ear.socket, min(until - time.monotonic(), LOOK_S)):
             ear.knock.check()

@@ -26,10 +26,10 @@ from denseface.service.client.events import (
 )
 from denseface.service.client.exchanges import (
     UNCONNECTED_S,
-    Ask,
+    Exchanges,
+    SendRequest,
     Step,
     Talk,
-    Talks,
     checked,
     deadline,
     no_answer,
@@ -44,7 +44,7 @@ from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable, publications_of
 from denseface.service.transport.connection import Credentials, connect
 from denseface.service.transport.sockets import send_parts
-from denseface.service.transport.subscription import LOOK_S, Ear
+from denseface.service.transport.subscription import LOOK_S, Subscription
 
 __all__ = ["Client", "Published", "PublishedFace", "PublishedFailure", "PublishedPreview"]
 
@@ -78,7 +78,7 @@ class Client:
         check_connectable(self.address)
         self._publications = publications_of(self.address)
         self._keys = Credentials.of(settings)
-        self._talks = Talks(settings.resend_s)
+        self._talks = Exchanges(settings.resend_s)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._socket, self._knock = connect(
             self._context, zmq.DEALER, self.address, self._keys)
@@ -164,7 +164,7 @@ class Client:
             More than one start is given, `last` is not positive or `since` has no zone.
         """
         follow = Follower(self._talks, after, last, since)
-        with closing(Ear(self._context, self._publications, self._keys, TOPICS)) as ear:
+        with closing(Subscription(self._context, self._publications, self._keys, TOPICS)) as ear:
             self._carry_out(follow.start(timeout), ear)
             while True:
                 yield self._carry_out(follow.next(timeout), ear)
@@ -184,7 +184,8 @@ class Client:
         ClientTimeoutError
             Nothing came in `timeout` seconds.
         """
-        with closing(Ear(self._context, self._publications, self._keys, (Topic.PREVIEW,))) as ear:
+        with closing(Subscription(
+                self._context, self._publications, self._keys, (Topic.PREVIEW,))) as ear:
             while True:
                 until = deadline(timeout)
                 preview = None
@@ -203,7 +204,7 @@ class Client:
         """
         return self._carry_out(self._talks.status(timeout))
 
-    def _carry_out(self, talk: Talk[_T], ear: Ear | None = None) -> _T:
+    def _carry_out(self, talk: Talk[_T], ear: Subscription | None = None) -> _T:
         try:
             step = next(talk)
             while True:
@@ -217,8 +218,8 @@ class Client:
             result: _T = end.value
             return result
 
-    def _do(self, step: Step, ear: Ear | None) -> Packet | None:
-        if isinstance(step, Ask):
+    def _do(self, step: Step, ear: Subscription | None) -> Packet | None:
+        if isinstance(step, SendRequest):
             return self._ask(step.message, step.timeout, ear)
         if ear is None:
             raise TypeError("there is no subscription to hear")
@@ -226,14 +227,16 @@ class Client:
         return ear.receive()
 
     @staticmethod
-    def _wait(ear: Ear, timeout: float) -> None:
+    def _wait(ear: Subscription, timeout: float) -> None:
         until = time.monotonic() + timeout
         while not ear.socket.poll(max(0, math.ceil(min(until - time.monotonic(), LOOK_S) * 1000))):
             ear.knock.check()
             if time.monotonic() >= until:
                 raise ClientTimeoutError("nothing was published in the time allowed")
 
-    def _ask(self, message: messages.Request, timeout: float, ear: Ear | None = None) -> Packet:
+    def _ask(
+        self, message: messages.Request, timeout: float, ear: Subscription | None = None
+    ) -> Packet:
         """Send until answered, or until it is known that the hub lets us in no more."""
         if self._context.closed:
             raise ClientClosedError(f"{self.address}: the client was closed")

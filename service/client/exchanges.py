@@ -30,8 +30,19 @@ from denseface.service.errors import (
 from denseface.service.protocol import messages
 from denseface.service.protocol.wire import Packet
 
-__all__ = ["UNCONNECTED_S", "Ask", "Hear", "Step", "Talk", "Talks", "ask", "checked", "deadline",
-           "expect", "no_answer"]
+__all__ = [
+    "UNCONNECTED_S",
+    "AwaitPublication",
+    "Exchanges",
+    "SendRequest",
+    "Step",
+    "Talk",
+    "ask",
+    "checked",
+    "deadline",
+    "expect",
+    "no_answer",
+]
 
 _T = TypeVar("_T")
 
@@ -42,7 +53,7 @@ _LONGEST_WAIT_S = 20.0
 
 
 @dataclass(frozen=True)
-class Ask:
+class SendRequest:
     """Send a request until it is answered; what comes of it is the answer."""
 
     message: messages.Request
@@ -50,19 +61,19 @@ class Ask:
 
 
 @dataclass(frozen=True)
-class Hear:
+class AwaitPublication:
     """Wait for a publication, without end where `timeout` is infinite; None where it is garbled."""
 
     timeout: float
 
 
-Step = Ask | Hear
+Step = SendRequest | AwaitPublication
 Talk = Generator[Step, Packet | None, _T]
 
 
 def ask(message: messages.Request, timeout: float) -> Talk[Packet]:
     """Ask in the midst of a talk."""
-    packet = yield Ask(message, timeout)
+    packet = yield SendRequest(message, timeout)
     if packet is None:
         raise TypeError("a request is answered by a message")
     return packet
@@ -100,7 +111,7 @@ def deadline(timeout: float | None) -> float:
     return math.inf if timeout is None else time.monotonic() + timeout
 
 
-class Talks:
+class Exchanges:
     """The talks of one client; it numbers their requests."""
 
     def __init__(self, resend_s: float) -> None:

@@ -4,7 +4,7 @@ import time
 from datetime import datetime
 
 from denseface.service.client.events import Published, outcome_of
-from denseface.service.client.exchanges import Hear, Talk, Talks, ask, deadline
+from denseface.service.client.exchanges import AwaitPublication, Exchanges, Talk, ask, deadline
 from denseface.service.errors import ClientTimeoutError, LocalProtocolError, RemoteProtocolError
 from denseface.service.protocol.messages import (
     CaptureFailed,
@@ -44,7 +44,7 @@ class Follower:
     """
 
     def __init__(
-        self, talks: Talks, after: int | None = None, last: int | None = None,
+        self, talks: Exchanges, after: int | None = None, last: int | None = None,
         since: datetime | None = None,
     ) -> None:
         if (after is not None) + (last is not None) + (since is not None) > 1:
@@ -92,7 +92,7 @@ class Follower:
         return packet
 
     def _hear(self, until: float) -> Talk[Packet | None]:
-        packet = yield Hear(until - time.monotonic())
+        packet = yield AwaitPublication(until - time.monotonic())
         if packet is None:
             self._behind = True
             return None

@@ -65,7 +65,7 @@ def _revoke(args: argparse.Namespace, folder: Path) -> None:
 
 
 def _list(args: argparse.Namespace, folder: Path) -> None:  # noqa: ARG001
-    from denseface.service.security.allow_list import Keyring
+    from denseface.service.security.allow_list import AllowList
 
-    for one in sorted(Keyring(folder), key=lambda one: one.name):
+    for one in sorted(AllowList(folder), key=lambda one: one.name):
         print(f"{one.name:20} {one.fingerprint}  {', '.join(sorted(one.roles))}")

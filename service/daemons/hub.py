@@ -15,7 +15,7 @@ from denseface.service.errors import LocalProtocolError, RemoteProtocolError
 from denseface.service.hub.hub import Hub
 from denseface.service.hub.previews import PERIOD_S
 from denseface.service.monitoring.observer import Observer
-from denseface.service.monitoring.rejections import Refusals
+from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outputs import Output, Publish, Topic, send, steps
 from denseface.service.protocol.wire import Buffer, Packet, decode_to_hub, encode
@@ -24,9 +24,9 @@ from denseface.service.runtime.signals import StopSignal
 from denseface.service.security.permissions import missing_role
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.writer import Threads
+from denseface.service.storage.writer import WriterThreads
 from denseface.service.transport.listener import Incoming
-from denseface.service.transport.listeners import Entrance
+from denseface.service.transport.listeners import Listeners
 
 __all__ = ["run"]
 
@@ -49,10 +49,10 @@ def run(settings: ServiceSettings, recon: Settings) -> int:
     os.umask(0o077)  # the database's files too are for this user alone
     keep_freed_memory()  # fetched anew for each face, it costs a third of the processor time
     log = structlog.get_logger("hub")
-    with StopSignal() as stop, FolderStore(settings.data) as store, Threads() as writer, \
+    with StopSignal() as stop, FolderStore(settings.data) as store, WriterThreads() as writer, \
             Observer(settings.data) as observer, zmq.Context() as context:
-        refusals = Refusals(observer.figures.counters)
-        entrance = Entrance(context, settings, refusals, (stop, writer))
+        refusals = Rejections(observer.figures.counters)
+        entrance = Listeners(context, settings, refusals, (stop, writer))
         try:
             hub = Hub(store, settings, recon, observer.figures, refusals, writer, time.monotonic())
             loop = _Loop(entrance, hub, refusals, observer, writer)
@@ -80,8 +80,8 @@ def _scrapes(settings: ServiceSettings, observer: Observer) -> AbstractContextMa
 
 class _Loop:
     def __init__(
-        self, entrance: Entrance, hub: Hub, refusals: Refusals, observer: Observer,
-        writer: Threads,
+        self, entrance: Listeners, hub: Hub, refusals: Rejections, observer: Observer,
+        writer: WriterThreads,
     ) -> None:
         self._writer = writer
         self._entrance = entrance

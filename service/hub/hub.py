@@ -20,13 +20,13 @@ from denseface.service.errors import (
     StoreError,
 )
 from denseface.service.hub.jobs import Jobs
-from denseface.service.hub.maintenance import Keeper
+from denseface.service.hub.maintenance import Maintenance
 from denseface.service.hub.outcomes import Outcomes
-from denseface.service.hub.peers import MOST_PEERS, Roster, Sensor, Worker
-from denseface.service.hub.presses import Intake
-from denseface.service.hub.previews import Viewfinder
+from denseface.service.hub.peers import MOST_PEERS, Peers, Sensor, Worker
+from denseface.service.hub.presses import Presses
+from denseface.service.hub.previews import Previews
 from denseface.service.monitoring.figures import Figures
-from denseface.service.monitoring.rejections import Refusals
+from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outputs import Output, Publish, Topic, send
 from denseface.service.protocol.states import CaptureState
@@ -34,7 +34,7 @@ from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage.base import Store
 from denseface.service.storage.records import FaceAbout, FrameAbout
-from denseface.service.storage.writer import AtOnce, Writer, Written
+from denseface.service.storage.writer import InlineWriter, Writer, WriteResult
 
 __all__ = ["Hub", "settings_hash"]
 
@@ -62,23 +62,23 @@ class Hub:
 
     def __init__(
         self, store: Store, settings: ServiceSettings, recon: Settings,
-        figures: Figures | None = None, refusals: Refusals | None = None,
+        figures: Figures | None = None, refusals: Rejections | None = None,
         writer: Writer | None = None, opened: float = -math.inf,
     ) -> None:
         self._store = store
-        self._writer = writer = writer or AtOnce()
+        self._writer = writer = writer or InlineWriter()
         self._figures = figures or Figures()
-        self._refusals = refusals or Refusals(self._figures.counters)
+        self._refusals = refusals or Rejections(self._figures.counters)
         self._settings = settings
-        self._roster = Roster()
+        self._roster = Peers()
         self._outcomes = Outcomes(store, self._remake)
         self._jobs = Jobs(store, writer, self._roster, settings.attempts,
                           self._outcomes.concluded, self._refusals)
-        self._intake = Intake(store, writer, self._roster, settings, recon, settings_hash(recon),
+        self._intake = Presses(store, writer, self._roster, settings, recon, settings_hash(recon),
                               self._jobs.add, opened + settings.silence_s)
-        self._keeper = Keeper(
+        self._keeper = Maintenance(
             store, settings, self._intake, self._jobs, self._outcomes, self._figures.counters)
-        self._viewfinder = Viewfinder(self._roster, settings.heartbeat_s)
+        self._viewfinder = Previews(self._roster, settings.heartbeat_s)
         self._status_due = 0.0
         self._log = structlog.get_logger("hub")
 
@@ -138,7 +138,7 @@ class Hub:
             if not written:
                 return
 
-    def _written(self, now: float, written: Sequence[Written]) -> Iterator[Output]:
+    def _written(self, now: float, written: Sequence[WriteResult]) -> Iterator[Output]:
         yield from self._intake.written(
             [one for one in written if isinstance(one.draft.about, FrameAbout)])
         yield from self._jobs.written(

@@ -9,16 +9,16 @@ from pydantic import ValidationError
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import CorruptFileError, ProtocolError, ServiceError, StoreError
-from denseface.service.hub.peers import Roster, Worker
-from denseface.service.hub.unsaved_faces import Faces
-from denseface.service.monitoring.rejections import Refusals
+from denseface.service.hub.peers import Peers, Worker
+from denseface.service.hub.unsaved_faces import UnsavedFaces
+from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outputs import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.failpoints import failpoint
-from denseface.service.storage.base import Store, Stored
-from denseface.service.storage.writer import Writer, Written
+from denseface.service.storage.base import CaptureRow, Store
+from denseface.service.storage.writer import Writer, WriteResult
 
 __all__ = ["Jobs"]
 
@@ -31,8 +31,8 @@ class Jobs:
     """Frames that wait for a worker or are held by one."""
 
     def __init__(
-        self, store: Store, writer: Writer, roster: Roster, attempts: int,
-        concluded: Callable[[str], Iterator[Output]], refusals: Refusals,
+        self, store: Store, writer: Writer, roster: Peers, attempts: int,
+        concluded: Callable[[str], Iterator[Output]], refusals: Rejections,
     ) -> None:
         """Take up what the store has unfinished; `concluded` announces an outcome."""
         self._store = store
@@ -42,7 +42,7 @@ class Jobs:
         self._refusals = refusals
         self._queue = deque(store.unfinished())
         self._reasons: dict[str, tuple[str, str]] = {}
-        self._faces = Faces(store, writer)
+        self._faces = UnsavedFaces(store, writer)
         self._paused_until = 0.0
         self._log = structlog.get_logger("hub")
         if self._queue:
@@ -121,7 +121,7 @@ class Jobs:
             except (ProtocolError, StoreError) as error:
                 self._retry(message.capture_id, type(error).__name__, str(error))
 
-    def written(self, now: float, faces: Sequence[Written]) -> Iterator[Output]:
+    def written(self, now: float, faces: Sequence[WriteResult]) -> Iterator[Output]:
         """Announce faces that are safe, in order; those that the disk refused wait."""
         for capture_id, error in self._faces.written(faces):
             if error is None:
@@ -182,7 +182,7 @@ class Jobs:
             self._retry(capture_id, "HandedBack", "the worker that held it was stopped")
 
     def _give(
-        self, now: float, capture_id: str, stored: Stored, worker: Worker
+        self, now: float, capture_id: str, stored: CaptureRow, worker: Worker
     ) -> Iterator[Output]:
         try:
             kept = self._store.frame(capture_id)

@@ -7,7 +7,7 @@ import structlog
 from denseface.service.errors import StoreError
 from denseface.service.hub.jobs import Jobs
 from denseface.service.hub.outcomes import Outcomes
-from denseface.service.hub.presses import Intake
+from denseface.service.hub.presses import Presses
 from denseface.service.monitoring.counters import Counters
 from denseface.service.protocol import messages
 from denseface.service.protocol.outputs import Output, send
@@ -15,7 +15,7 @@ from denseface.service.protocol.states import CaptureEvent, CaptureState, advanc
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage.base import Store
 
-__all__ = ["Keeper"]
+__all__ = ["Maintenance"]
 
 _BATCH = 20
 """Captures removed at once: the hub must not be away from its peers for long."""
@@ -26,11 +26,11 @@ _SWEEP_S = 600.0
 _Request = messages.ListDead | messages.RetryDead | messages.DropDead | messages.Purge
 
 
-class Keeper:
+class Maintenance:
     """Retention, dead letters, purges."""
 
     def __init__(
-        self, store: Store, settings: ServiceSettings, intake: Intake, jobs: Jobs,
+        self, store: Store, settings: ServiceSettings, intake: Presses, jobs: Jobs,
         outcomes: Outcomes, counters: Counters,
     ) -> None:
         self._store = store

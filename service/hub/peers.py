@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
-__all__ = ["MOST_PEERS", "Roster", "Sensor", "Worker"]
+__all__ = ["MOST_PEERS", "Peers", "Sensor", "Worker"]
 
 MOST_PEERS = 256
 """Of sensors, and of workers: whoever comes later is not taken, so that all fit into a status."""
@@ -38,7 +38,7 @@ class Worker:
 
 
 @dataclass
-class Roster:
+class Peers:
     """Peers by their connection."""
 
     sensors: dict[bytes, Sensor] = field(default_factory=dict)

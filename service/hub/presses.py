@@ -7,7 +7,7 @@ import structlog
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import ServiceError, StoreError
-from denseface.service.hub.peers import Roster
+from denseface.service.hub.peers import Peers
 from denseface.service.protocol import messages
 from denseface.service.protocol.outputs import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
@@ -15,9 +15,9 @@ from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage.base import Store
-from denseface.service.storage.writer import Writer, Written
+from denseface.service.storage.writer import Writer, WriteResult
 
-__all__ = ["Intake"]
+__all__ = ["Presses"]
 
 _MIB = 2**20
 _REFUSALS = 1000
@@ -40,11 +40,11 @@ class _Press:
     """The sensor whose frame is being written; None where none came."""
 
 
-class Intake:
+class Presses:
     """Presses that wait for their frame, or for their frame to be safe."""
 
     def __init__(
-        self, store: Store, writer: Writer, roster: Roster, settings: ServiceSettings,
+        self, store: Store, writer: Writer, roster: Peers, settings: ServiceSettings,
         recon: Settings, recon_hash: str, accepted: Callable[[str], None], all_here: float,
     ) -> None:
         """Take presses; `accepted` is told of each frame that is safe.
@@ -133,7 +133,7 @@ class Intake:
             return
         self._writer.start(draft)
 
-    def written(self, frames: Sequence[Written]) -> Iterator[Output]:
+    def written(self, frames: Sequence[WriteResult]) -> Iterator[Output]:
         """Say that frames are safe, or not: to the sensor and to all who pressed."""
         for one in frames:
             if isinstance(one.error, ServiceError):

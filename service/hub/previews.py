@@ -7,18 +7,18 @@ in a queue; a press goes first. Nothing of it is kept.
 import secrets
 from collections.abc import Iterator
 
-from denseface.service.hub.peers import Roster
+from denseface.service.hub.peers import Peers
 from denseface.service.protocol import messages
 from denseface.service.protocol.outputs import Output, Publish, Topic, send
 from denseface.service.protocol.wire import Packet
 
-__all__ = ["PERIOD_S", "Viewfinder"]
+__all__ = ["PERIOD_S", "Previews"]
 
 PERIOD_S = 0.1
 """Shortest time between two previews, seconds."""
 
 
-class Viewfinder:
+class Previews:
     """Asks the sensor for previews and publishes them.
 
     Parameters
@@ -26,7 +26,7 @@ class Viewfinder:
     patience_s : time after which one that did not come is asked for again, seconds
     """
 
-    def __init__(self, roster: Roster, patience_s: float) -> None:
+    def __init__(self, roster: Peers, patience_s: float) -> None:
         self._roster = roster
         self._patience_s = patience_s
         self._epoch = secrets.token_hex(8)

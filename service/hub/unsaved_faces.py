@@ -7,22 +7,22 @@ import structlog
 from denseface.service.errors import StoreError
 from denseface.service.protocol.wire import Packet
 from denseface.service.storage.base import Store
-from denseface.service.storage.records import Draft
-from denseface.service.storage.writer import Writer, Written
+from denseface.service.storage.records import PendingWrite
+from denseface.service.storage.writer import Writer, WriteResult
 
-__all__ = ["Faces"]
+__all__ = ["UnsavedFaces"]
 
 _MOST_UNKEPT = 16
 """Faces in memory; beyond it no work is begun, and one that the disk refuses is let go."""
 
 
-class Faces:
+class UnsavedFaces:
     """Captures that are CONCLUDING."""
 
     def __init__(self, store: Store, writer: Writer) -> None:
         self._store = store
         self._writer = writer
-        self._unkept: dict[str, Draft] = {}
+        self._unkept: dict[str, PendingWrite] = {}
         self._refused: dict[str, bool] = {}
         """Those that the disk refused, in order; True where one is being written again."""
 
@@ -52,14 +52,14 @@ class Faces:
                 self._refused[capture_id] = True
         return not self._refused and len(self._unkept) < _MOST_UNKEPT
 
-    def written(self, faces: Sequence[Written]) -> list[tuple[str, Exception | None]]:
+    def written(self, faces: Sequence[WriteResult]) -> list[tuple[str, Exception | None]]:
         """Give their rows to faces that were written, in order, and say of each what came of it.
 
         One that the disk refused stays, unless there are too many.
         """
         return list(self._written(faces))
 
-    def _written(self, faces: Sequence[Written]) -> Iterator[tuple[str, Exception | None]]:
+    def _written(self, faces: Sequence[WriteResult]) -> Iterator[tuple[str, Exception | None]]:
         for one in faces:
             if one.error:
                 yield one.draft.capture_id, self._not_kept(one.draft.capture_id, one.error)
@@ -85,7 +85,7 @@ class Faces:
         self._unkept.pop(capture_id, None)
         self._refused.pop(capture_id, None)
 
-    def _kept(self, written: Written) -> tuple[str, None]:
+    def _kept(self, written: WriteResult) -> tuple[str, None]:
         self.drop(written.draft.capture_id)
         return written.draft.capture_id, None
 

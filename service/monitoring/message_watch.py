@@ -12,7 +12,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.outputs import Output, Publish, Send
 from denseface.service.protocol.wire import Packet
 
-__all__ = ["Watch"]
+__all__ = ["MessageWatch"]
 
 _MOST = 10_000
 """Captures whose times are followed; beyond it the oldest is let go of."""
@@ -25,7 +25,7 @@ class _Times:
     dispatched: float | None = None
 
 
-class Watch:
+class MessageWatch:
     """Counts what `service.monitoring.prometheus` has names for.
 
     Times are those of the hub's clock, after it has done what a message asked for.

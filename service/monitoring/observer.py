@@ -10,7 +10,7 @@ import structlog
 
 from denseface.service.monitoring.board import Board, Picture
 from denseface.service.monitoring.figures import Figures
-from denseface.service.monitoring.message_watch import Watch
+from denseface.service.monitoring.message_watch import MessageWatch
 from denseface.service.protocol.messages import Status
 from denseface.service.protocol.outputs import Output, Publish
 from denseface.service.protocol.wire import Packet
@@ -33,7 +33,7 @@ class Observer:
     def __init__(self, data: Path) -> None:
         self.figures = Figures()
         self.board = Board()
-        self._watch = Watch(self.figures.counters, self.figures.latencies)
+        self._watch = MessageWatch(self.figures.counters, self.figures.latencies)
         self._data = data
         self._measure = Background[int]("usage")
         self._measure_due = 0.0

@@ -8,7 +8,7 @@ import structlog
 
 from denseface.service.monitoring.counters import Counters
 
-__all__ = ["Refusals"]
+__all__ = ["Rejections"]
 
 _BURST = 5.0
 _PER_S = 0.2
@@ -22,7 +22,7 @@ class _Allowance:
     unsaid: int = 0
 
 
-class Refusals:
+class Rejections:
     """Counts under the name `refused`, with the reason as label."""
 
     def __init__(

@@ -24,7 +24,7 @@ from denseface.service.security.keys import (
 )
 from denseface.service.settings import private_folder
 
-__all__ = ["Allowed", "Keyring", "Role", "allow", "revoke"]
+__all__ = ["AllowList", "Allowed", "Role", "allow", "revoke"]
 
 _WRITABLE_BY_OTHERS = 0o022
 
@@ -66,7 +66,7 @@ class _File(BaseModel):
     roles: tuple[Role, ...] = Field(min_length=1)
 
 
-class Keyring:
+class AllowList:
     """The keys of one folder, as they are now."""
 
     def __init__(self, keys: Path) -> None:
@@ -148,7 +148,7 @@ def allow(keys: Path, name: str, public: str, roles: frozenset[Role]) -> Allowed
     """
     one = Allowed(check_name(name), public, roles)
     folder = private_folder(private_folder(keys) / "allowed")
-    for other in Keyring(keys):
+    for other in AllowList(keys):
         if (other.public == public) != (other.name == name):
             raise KeyFileError(
                 f"{name}: that name or key is in use: {other.name} {other.fingerprint}; "

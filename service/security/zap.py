@@ -9,8 +9,8 @@ from collections.abc import Callable
 import zmq
 import zmq.utils.z85
 
-from denseface.service.monitoring.rejections import Refusals
-from denseface.service.security.allow_list import Allowed, Keyring
+from denseface.service.monitoring.rejections import Rejections
+from denseface.service.security.allow_list import Allowed, AllowList
 
 __all__ = ["DOMAIN", "TOPICS_DOMAIN", "Authenticator"]
 
@@ -31,7 +31,7 @@ class Authenticator:
     """
 
     def __init__(
-        self, context: "zmq.Context[zmq.Socket[bytes]]", keyring: Keyring, refusals: Refusals,
+        self, context: "zmq.Context[zmq.Socket[bytes]]", keyring: AllowList, refusals: Rejections,
         admits: Callable[[Allowed, bytes], bool],
     ) -> None:
         self._keyring = keyring

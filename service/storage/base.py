@@ -9,14 +9,14 @@ from denseface.recon.settings import Settings
 from denseface.service.protocol.messages import DeadLetter
 from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet
-from denseface.service.storage.records import Draft, KeptFrame
-from denseface.service.storage.writer import Written
+from denseface.service.storage.records import FrameRecord, PendingWrite
+from denseface.service.storage.writer import WriteResult
 
-__all__ = ["Store", "Stored"]
+__all__ = ["CaptureRow", "Store"]
 
 
 @dataclass(frozen=True)
-class Stored:
+class CaptureRow:
     """A capture's row."""
 
     state: CaptureState
@@ -46,13 +46,13 @@ class Store(Protocol):
 
     def frame_draft(
         self, frame: Packet, settings: Settings, settings_hash: str, pressed_by: str = ""
-    ) -> Draft:
+    ) -> PendingWrite:
         """Give what is to be written of a `Frame`."""
 
-    def accept(self, frames: Sequence[Written]) -> None:
+    def accept(self, frames: Sequence[WriteResult]) -> None:
         """Keep frames that were written, all or none."""
 
-    def find(self, capture_id: str) -> Stored | None:
+    def find(self, capture_id: str) -> CaptureRow | None:
         """Give a capture's row."""
 
     def unfinished(self) -> list[str]:
@@ -67,13 +67,13 @@ class Store(Protocol):
     def take_back_attempt(self, capture_id: str) -> None:
         """Count an attempt no more that was not made to its end."""
 
-    def frame(self, capture_id: str) -> KeptFrame:
+    def frame(self, capture_id: str) -> FrameRecord:
         """Give the frame back; CorruptFileError where it is damaged, which quarantines it."""
 
-    def face_draft(self, result: Packet) -> Draft:
+    def face_draft(self, result: Packet) -> PendingWrite:
         """Give what is to be written of a `Result`; StoreError where it is of no use."""
 
-    def finish(self, faces: Sequence[Written]) -> None:
+    def finish(self, faces: Sequence[WriteResult]) -> None:
         """Keep faces that were written as outcomes, in order, all or none.
 
         A second outcome of a capture changes nothing.

@@ -9,12 +9,12 @@ import structlog
 
 from denseface.service.errors import DiskFullError
 
-__all__ = ["Ballast"]
+__all__ = ["DiskReserve"]
 
 _BYTES = 2**20
 
 
-class Ballast:
+class DiskReserve:
     """One MiB, put back as soon as there is room again."""
 
     def __init__(self, path: Path) -> None:

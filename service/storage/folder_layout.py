@@ -8,14 +8,14 @@ from pathlib import Path
 from denseface.service.settings import private_folder
 from denseface.service.storage.record_file import sync_folder
 
-__all__ = ["Layout"]
+__all__ = ["FolderLayout"]
 
 _FRAME = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.frame")
 _FACE = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.[0-9a-f]{1,64}\.face")
 _TEMPORARY = re.compile(r"\..*\.tmp")
 
 
-class Layout:
+class FolderLayout:
     """The paths of a data folder; makes the folders that are missing, durably.
 
     Raises

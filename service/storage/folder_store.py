@@ -24,24 +24,24 @@ from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.settings import private_folder
-from denseface.service.storage.base import Stored
-from denseface.service.storage.folder_layout import Layout
+from denseface.service.storage.base import CaptureRow
+from denseface.service.storage.folder_layout import FolderLayout
 from denseface.service.storage.folder_lock import lock
-from denseface.service.storage.frame_cache import FreshFrames
+from denseface.service.storage.frame_cache import FrameCache
 from denseface.service.storage.record_file import naming, store_error
 from denseface.service.storage.records import (
-    Draft,
     FaceAbout,
+    FaceRecord,
     FrameAbout,
-    KeptFace,
-    KeptFrame,
+    FrameRecord,
+    PendingWrite,
     read_face,
     read_frame,
 )
 from denseface.service.storage.recovery import recover
-from denseface.service.storage.retention import Removal
+from denseface.service.storage.retention import Retention
 from denseface.service.storage.store_clock import Clock, SystemClock, stamp
-from denseface.service.storage.writer import Written
+from denseface.service.storage.writer import WriteResult
 
 __all__ = ["FolderStore"]
 
@@ -69,9 +69,9 @@ class FolderStore:
 
     def __init__(self, folder: Path, clock: Clock | None = None) -> None:
         with naming(folder):
-            self._layout = Layout(private_folder(folder))
-        self._fresh = FreshFrames()
-        self._fresh_faces: dict[str, KeptFace] = {}
+            self._layout = FolderLayout(private_folder(folder))
+        self._fresh = FrameCache()
+        self._fresh_faces: dict[str, FaceRecord] = {}
         """Those that were kept last: they are published at once."""
         self._unread: set[str] = set()
         """Captures whose face was published from memory and never read from its file."""
@@ -80,11 +80,11 @@ class FolderStore:
             self._database, self._account, self._quarantine = recover(
                 self._layout, clock or SystemClock())
             self._epoch = self._database.meta("epoch") or ""
-            self._found: tuple[tuple[str, int], Stored | None] = ("", -1), None
+            self._found: tuple[tuple[str, int], CaptureRow | None] = ("", -1), None
             """The row that was asked for last."""
             self._counts: dict[CaptureState, int] = {}
             self._counted_at = -1
-            self._removal = Removal(
+            self._removal = Retention(
                 self._layout, self._database, self._account, self._quarantine, self._forget)
         except OSError as error:
             os.close(self._lock)
@@ -115,7 +115,7 @@ class FolderStore:
 
     def frame_draft(
         self, frame: Packet, settings: Settings, settings_hash: str, pressed_by: str = ""
-    ) -> Draft:
+    ) -> PendingWrite:
         """Give what is to be written of a `Frame`."""
         message = frame.message
         if not isinstance(message, Frame):
@@ -127,9 +127,9 @@ class FolderStore:
             accepted_at=stamp(self._account.wall()), clock=clock,
             settings=settings.model_dump_json(), settings_hash=settings_hash,
             pressed_by=pressed_by)
-        return Draft(capture_id, self._layout.frame(capture_id), about, frame)
+        return PendingWrite(capture_id, self._layout.frame(capture_id), about, frame)
 
-    def accept(self, frames: Sequence[Written]) -> None:
+    def accept(self, frames: Sequence[WriteResult]) -> None:
         """Keep frames that were written, all or none."""
         fresh = {one.draft.capture_id: _kept_frame(one) for one in frames}
         with self._database.transaction() as database:
@@ -142,7 +142,7 @@ class FolderStore:
         self._fresh.add(fresh.values())
         failpoint("hub.frame.stored")
 
-    def find(self, capture_id: str) -> Stored | None:
+    def find(self, capture_id: str) -> CaptureRow | None:
         """Give a capture's row."""
         # Asked again and again of what comes next, between two changes.
         asked = capture_id, self._database.changes
@@ -150,7 +150,7 @@ class FolderStore:
             row = self._database.one(
                 "SELECT * FROM captures WHERE capture_id = ? AND state != ?",
                 capture_id, CaptureState.REMOVED)
-            self._found = asked, None if row is None else Stored(
+            self._found = asked, None if row is None else CaptureRow(
                 CaptureState(row["state"]), row["settings_hash"], row["frame_sha256"],
                 row["attempts"], row["accepted_at"], row["pressed_by"])
         return self._found[1]
@@ -177,7 +177,7 @@ class FolderStore:
         self._database.all(
             "UPDATE captures SET attempts = max(attempts - 1, 0) WHERE capture_id = ?", capture_id)
 
-    def frame(self, capture_id: str) -> KeptFrame:
+    def frame(self, capture_id: str) -> FrameRecord:
         """Give the frame back; CorruptFileError where it is damaged, which quarantines it."""
         stored = self.find(capture_id)
         if stored is None:
@@ -193,7 +193,7 @@ class FolderStore:
             self._quarantine.take(path, str(error), capture_id)
             raise
 
-    def face_draft(self, result: Packet) -> Draft:
+    def face_draft(self, result: Packet) -> PendingWrite:
         """Give what is to be written of a `Result`; StoreError where it is of no use."""
         message = result.message
         if not isinstance(message, Result):
@@ -204,10 +204,10 @@ class FolderStore:
         about = FaceAbout(
             accepted_at=stored.accepted_at, finished_at=stamp(self._account.wall()),
             clock=self._account.save())
-        return Draft(message.capture_id,
+        return PendingWrite(message.capture_id,
                      self._layout.face(message.capture_id, message.settings_hash), about, result)
 
-    def finish(self, faces: Sequence[Written]) -> None:
+    def finish(self, faces: Sequence[WriteResult]) -> None:
         """Keep faces that were written as outcomes, in order, all or none.
 
         A second outcome of a capture changes nothing.
@@ -354,15 +354,15 @@ class FolderStore:
         return Packet(FaceDone(**common, face=fresh.message.face), fresh.arrays)
 
 
-def _kept_frame(written: Written) -> KeptFrame:
+def _kept_frame(written: WriteResult) -> FrameRecord:
     draft = written.draft
     if not isinstance(draft.packet.message, Frame) or not isinstance(draft.about, FrameAbout):
         raise TypeError(f"a frame is accepted, found {draft.packet.message.kind}")
-    return KeptFrame(draft.packet.message, draft.packet.arrays, draft.about, written.checksum)
+    return FrameRecord(draft.packet.message, draft.packet.arrays, draft.about, written.checksum)
 
 
-def _kept_face(written: Written) -> KeptFace:
+def _kept_face(written: WriteResult) -> FaceRecord:
     draft = written.draft
     if not isinstance(draft.packet.message, Result) or not isinstance(draft.about, FaceAbout):
         raise TypeError(f"a face finishes a capture, found {draft.packet.message.kind}")
-    return KeptFace(draft.packet.message, draft.packet.arrays, draft.about, written.checksum)
+    return FaceRecord(draft.packet.message, draft.packet.arrays, draft.about, written.checksum)

@@ -2,29 +2,29 @@
 
 from collections.abc import Iterable
 
-from denseface.service.storage.records import KeptFrame
+from denseface.service.storage.records import FrameRecord
 
-__all__ = ["FreshFrames"]
+__all__ = ["FrameCache"]
 
 _BYTES = 64 * 2**20
 """Of all images together; what comes when there is no room is read from its file."""
 
 
-class FreshFrames:
+class FrameCache:
     """As many as there is room for."""
 
     def __init__(self) -> None:
-        self._frames: dict[str, KeptFrame] = {}
+        self._frames: dict[str, FrameRecord] = {}
         self._room = _BYTES
 
-    def add(self, frames: Iterable[KeptFrame]) -> None:
+    def add(self, frames: Iterable[FrameRecord]) -> None:
         """Hold frames that are safe."""
         for kept in frames:
             if self._room >= (size := _size(kept)):
                 self._room -= size
                 self._frames[kept.message.capture_id] = kept
 
-    def pop(self, capture_id: str) -> KeptFrame | None:
+    def pop(self, capture_id: str) -> FrameRecord | None:
         """Give a frame away; None where it is not here."""
         kept = self._frames.pop(capture_id, None)
         if kept:
@@ -32,5 +32,5 @@ class FreshFrames:
         return kept
 
 
-def _size(kept: KeptFrame) -> int:
+def _size(kept: FrameRecord) -> int:
     return sum(array.nbytes for array in kept.arrays.values())

@@ -9,7 +9,7 @@ import structlog
 
 from denseface.service.settings import private_folder
 from denseface.service.storage.record_file import write_atomically
-from denseface.service.storage.store_clock import Account, stamp
+from denseface.service.storage.store_clock import StoreClock, stamp
 
 __all__ = ["Quarantine"]
 
@@ -21,7 +21,7 @@ class Quarantine:
     retention, like all that is kept.
     """
 
-    def __init__(self, folder: Path, account: Account) -> None:
+    def __init__(self, folder: Path, account: StoreClock) -> None:
         self._folder = private_folder(folder)
         self._account = account
         self._log = structlog.get_logger("store")

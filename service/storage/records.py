@@ -18,8 +18,15 @@ from denseface.service.protocol.wire import Packet, encode
 from denseface.service.storage.former import decode_former
 from denseface.service.storage.record_file import read_parts, write_parts
 
-__all__ = ["Draft", "FaceAbout", "FrameAbout", "KeptFace", "KeptFrame", "read_face",
-           "read_frame"]
+__all__ = [
+    "FaceAbout",
+    "FaceRecord",
+    "FrameAbout",
+    "FrameRecord",
+    "PendingWrite",
+    "read_face",
+    "read_frame",
+]
 
 _Time = Annotated[str, Field(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}\+00:00$")]
 
@@ -49,7 +56,7 @@ class FaceAbout(_About):
 
 
 @dataclass(frozen=True)
-class KeptFrame:
+class FrameRecord:
     """A frame's file."""
 
     message: Frame
@@ -59,7 +66,7 @@ class KeptFrame:
 
 
 @dataclass(frozen=True)
-class KeptFace:
+class FaceRecord:
     """A face's file."""
 
     message: Result
@@ -69,7 +76,7 @@ class KeptFace:
 
 
 @dataclass(frozen=True)
-class Draft:
+class PendingWrite:
     """A frame or a face before it is on the disk: its file comes first, then its row."""
 
     capture_id: str
@@ -97,7 +104,7 @@ class Draft:
             self.path.unlink(missing_ok=True)
 
 
-def read_frame(path: Path, checksum: str | None = None) -> KeptFrame:
+def read_frame(path: Path, checksum: str | None = None) -> FrameRecord:
     """Read a frame.
 
     Raises
@@ -108,15 +115,15 @@ def read_frame(path: Path, checksum: str | None = None) -> KeptFrame:
     packet, about, found = _read(path, checksum, FrameAbout)
     if not isinstance(packet.message, Frame):
         raise CorruptFileError(f"{path}: holds a {packet.message.kind}, a frame expected")
-    return KeptFrame(packet.message, packet.arrays, about, found)
+    return FrameRecord(packet.message, packet.arrays, about, found)
 
 
-def read_face(path: Path, checksum: str | None = None) -> KeptFace:
+def read_face(path: Path, checksum: str | None = None) -> FaceRecord:
     """Read a face; errors as `read_frame`."""
     packet, about, found = _read(path, checksum, FaceAbout)
     if not isinstance(packet.message, Result):
         raise CorruptFileError(f"{path}: holds a {packet.message.kind}, a result expected")
-    return KeptFace(packet.message, packet.arrays, about, found)
+    return FaceRecord(packet.message, packet.arrays, about, found)
 
 
 _A = TypeVar("_A", bound=_About)

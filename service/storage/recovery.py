@@ -17,15 +17,15 @@ import structlog
 from denseface.service.errors import CorruptFileError, DamagedDatabaseError, StoreError
 from denseface.service.protocol.states import CaptureState
 from denseface.service.storage.database import Database
-from denseface.service.storage.disk_reserve import Ballast
-from denseface.service.storage.folder_layout import Layout
+from denseface.service.storage.disk_reserve import DiskReserve
+from denseface.service.storage.folder_layout import FolderLayout
 from denseface.service.storage.quarantine import Quarantine
-from denseface.service.storage.records import KeptFace, KeptFrame, read_face, read_frame
-from denseface.service.storage.store_clock import Account, Clock, stamp
+from denseface.service.storage.records import FaceRecord, FrameRecord, read_face, read_frame
+from denseface.service.storage.store_clock import Clock, StoreClock, stamp
 
 __all__ = ["recover"]
 
-_KeptT = TypeVar("_KeptT", KeptFrame, KeptFace)
+_KeptT = TypeVar("_KeptT", FrameRecord, FaceRecord)
 
 _SHOWN = 5
 _JUMP = 1000
@@ -35,7 +35,7 @@ _NO_SETTINGS, _NO_CHECKSUM = "0", "0" * 64
 """Of a capture whose frame cannot be read, for which there is neither."""
 
 
-def recover(layout: Layout, clock: Clock) -> tuple[Database, Account, Quarantine]:
+def recover(layout: FolderLayout, clock: Clock) -> tuple[Database, StoreClock, Quarantine]:
     """Open what there is, mend it, sweep what is half-written, report what is unknown.
 
     Raises
@@ -47,7 +47,7 @@ def recover(layout: Layout, clock: Clock) -> tuple[Database, Account, Quarantine
         path.unlink()
     database, account, quarantine = _open(layout, clock)
     try:
-        ballast = Ballast(layout.ballast)
+        ballast = DiskReserve(layout.ballast)
         if database.left_open:
             ballast.overboard(lambda: database.jump(_JUMP))
         ballast.overboard(_Adoption(layout, database, account, quarantine).run)
@@ -59,7 +59,7 @@ def recover(layout: Layout, clock: Clock) -> tuple[Database, Account, Quarantine
     return database, account, quarantine
 
 
-def _open(layout: Layout, clock: Clock) -> tuple[Database, Account, Quarantine]:
+def _open(layout: FolderLayout, clock: Clock) -> tuple[Database, StoreClock, Quarantine]:
     try:
         return _opened(layout, clock)
     except DamagedDatabaseError as error:
@@ -71,25 +71,25 @@ def _open(layout: Layout, clock: Clock) -> tuple[Database, Account, Quarantine]:
         return _opened(layout, clock)
 
 
-def _opened(layout: Layout, clock: Clock) -> tuple[Database, Account, Quarantine]:
+def _opened(layout: FolderLayout, clock: Clock) -> tuple[Database, StoreClock, Quarantine]:
     database = Database(layout.database)
     try:
         saved = database.meta("clock")
-        account = Account(clock, saved) if saved else _account(layout, clock)
+        account = StoreClock(clock, saved) if saved else _account(layout, clock)
     except ValueError as error:
         database.close()
         raise DamagedDatabaseError(f"{layout.database.name}: {error}") from error
     return database, account, Quarantine(layout.quarantine, account)
 
 
-def _account(layout: Layout, clock: Clock) -> Account:
+def _account(layout: FolderLayout, clock: Clock) -> StoreClock:
     """Go on with the newest account that a frame holds, or a face where there are no frames."""
-    accounts: list[Account] = []
+    accounts: list[StoreClock] = []
     for names, read in ((layout.all_frames(), read_frame), (layout.all_faces(), read_face)):
         for _, path in () if accounts else names:
             with suppress(StoreError):
-                accounts.append(Account(clock, read(path).about.clock))
-    return max(accounts, key=lambda account: account.now(), default=Account(clock, None))
+                accounts.append(StoreClock(clock, read(path).about.clock))
+    return max(accounts, key=lambda account: account.now(), default=StoreClock(clock, None))
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class _Adoption:
     """Gives every file its row."""
 
     def __init__(
-        self, layout: Layout, database: Database, account: Account, quarantine: Quarantine
+        self, layout: FolderLayout, database: Database, account: StoreClock, quarantine: Quarantine
     ) -> None:
         self._layout = layout
         self._database = database
@@ -170,7 +170,7 @@ class _Adoption:
             self._quarantine.take(path, "a face of another frame or settings", capture_id)
             return
         self._outcomes[capture_id] = _Outcome(
-            kept.about.finished_at, Account.seconds_of(kept.about.clock), CaptureState.DONE,
+            kept.about.finished_at, StoreClock.seconds_of(kept.about.clock), CaptureState.DONE,
             face_sha256=kept.checksum)
 
     def _read(

@@ -8,16 +8,16 @@ from datetime import datetime
 
 from denseface.service.protocol.states import CaptureState
 from denseface.service.storage.database import Database
-from denseface.service.storage.disk_reserve import Ballast
-from denseface.service.storage.folder_layout import Layout
+from denseface.service.storage.disk_reserve import DiskReserve
+from denseface.service.storage.folder_layout import FolderLayout
 from denseface.service.storage.quarantine import Quarantine
 from denseface.service.storage.record_file import naming, sync_folder
-from denseface.service.storage.store_clock import Account, stamp
+from denseface.service.storage.store_clock import StoreClock, stamp
 
-__all__ = ["Removal"]
+__all__ = ["Retention"]
 
 
-class Removal:
+class Retention:
     """Retention and purges of a `FolderStore`, whose methods of the same names say more.
 
     Parameters
@@ -26,7 +26,7 @@ class Removal:
     """
 
     def __init__(
-        self, layout: Layout, database: Database, account: Account, quarantine: Quarantine,
+        self, layout: FolderLayout, database: Database, account: StoreClock, quarantine: Quarantine,
         forget: Callable[[Sequence[str]], None],
     ) -> None:
         self._layout = layout
@@ -34,7 +34,7 @@ class Removal:
         self._account = account
         self._quarantine = quarantine
         self._forget = forget
-        self._ballast = Ballast(layout.ballast)
+        self._ballast = DiskReserve(layout.ballast)
         self._ballast.take_in()
 
     def expired(self, retention_s: float, most: int) -> list[str]:

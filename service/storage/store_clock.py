@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Protocol
 
-__all__ = ["Account", "Clock", "SystemClock", "stamp"]
+__all__ = ["Clock", "StoreClock", "SystemClock", "stamp"]
 
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 _GRACE_S = 3600.0
@@ -61,7 +61,7 @@ class _Mark:
     at: float
 
 
-class Account:
+class StoreClock:
     """Seconds of a store's life.
 
     Parameters
@@ -101,7 +101,7 @@ class Account:
         return self._clock.wall()
 
     def save(self) -> str:
-        """Give what the next `Account` of this store needs to go on."""
+        """Give what the next `StoreClock` of this store needs to go on."""
         boot, at = self._clock.boot()
         return json.dumps({"seconds": self.now(), "wall": stamp(self._clock.wall()),
                            "boot": boot, "at": at})

@@ -16,19 +16,19 @@ from typing import Protocol, Self
 from denseface.service.errors import StoreError
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.storage.record_file import store_error, sync_folder
-from denseface.service.storage.records import Draft, FrameAbout
+from denseface.service.storage.records import FrameAbout, PendingWrite
 
-__all__ = ["AtOnce", "Threads", "Writer", "Written", "write"]
+__all__ = ["InlineWriter", "WriteResult", "Writer", "WriterThreads", "write"]
 
 _BATCH = 8
 """Most files that one sync of their folder is shared by: the first waits for the last."""
 
 
 @dataclass(frozen=True)
-class Written:
+class WriteResult:
     """What became of a draft."""
 
-    draft: Draft
+    draft: PendingWrite
     checksum: str = ""
     """Of its file, where there is no error."""
     error: Exception | None = None
@@ -38,17 +38,17 @@ class Written:
 class Writer(Protocol):
     """Writes the files of drafts; those of one kind in the order in which they came."""
 
-    def start(self, draft: Draft) -> None:
+    def start(self, draft: PendingWrite) -> None:
         """Begin to write one."""
 
-    def take(self) -> list[Written]:
+    def take(self) -> list[WriteResult]:
         """Give what has ended since the last call."""
 
     def settle(self) -> None:
         """Wait until all that was begun has ended."""
 
 
-def write(drafts: Sequence[Draft]) -> list[Written]:
+def write(drafts: Sequence[PendingWrite]) -> list[WriteResult]:
     """Write and sync files, then each of their folders once; nothing stays of a frame that fails.
 
     Whatever is raised is in what is given back.
@@ -56,7 +56,7 @@ def write(drafts: Sequence[Draft]) -> list[Written]:
     written = [_write(draft) for draft in drafts]
     failed = {folder: error for folder in {one.draft.path.parent for one in written
                                            if one.error is None} if (error := _sync(folder))}
-    written = [one if one.error else Written(
+    written = [one if one.error else WriteResult(
         one.draft, one.checksum, failed.get(one.draft.path.parent)) for one in written]
     for one in written:
         if one.error is None:
@@ -66,11 +66,11 @@ def write(drafts: Sequence[Draft]) -> list[Written]:
     return written
 
 
-def _write(draft: Draft) -> Written:
+def _write(draft: PendingWrite) -> WriteResult:
     try:
-        return Written(draft, draft.write())
+        return WriteResult(draft, draft.write())
     except Exception as error:
-        return Written(draft, error=error)
+        return WriteResult(draft, error=error)
 
 
 def _sync(folder: Path) -> StoreError | None:
@@ -81,17 +81,17 @@ def _sync(folder: Path) -> StoreError | None:
     return None
 
 
-class AtOnce:
+class InlineWriter:
     """Writes in the thread that asks for it."""
 
     def __init__(self) -> None:
-        self._done: list[Written] = []
+        self._done: list[WriteResult] = []
 
-    def start(self, draft: Draft) -> None:
+    def start(self, draft: PendingWrite) -> None:
         """Write."""
         self._done += write([draft])
 
-    def take(self) -> list[Written]:
+    def take(self) -> list[WriteResult]:
         """Give what was written."""
         done, self._done = self._done, []
         return done
@@ -100,7 +100,7 @@ class AtOnce:
         """Do nothing: it has ended."""
 
 
-class Threads:
+class WriterThreads:
     """Writes frames in one thread and faces in another.
 
     A presser waits for a frame, so none waits for a face. What has ended makes `fileno` readable
@@ -111,7 +111,7 @@ class Threads:
         self._event = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
         self._changed = threading.Condition()
         self._begun = 0
-        self._done: list[Written] = []
+        self._done: list[WriteResult] = []
         self._frames = _Lane("frames", self._ended)
         self._faces = _Lane("faces", self._ended)
 
@@ -124,13 +124,13 @@ class Threads:
         with self._changed:
             return bool(self._done)
 
-    def start(self, draft: Draft) -> None:
+    def start(self, draft: PendingWrite) -> None:
         """Begin to write one."""
         with self._changed:
             self._begun += 1
         (self._frames if isinstance(draft.about, FrameAbout) else self._faces).put(draft)
 
-    def take(self) -> list[Written]:
+    def take(self) -> list[WriteResult]:
         """Give what has ended since the last call."""
         with self._changed:
             done, self._done = self._done, []
@@ -143,7 +143,7 @@ class Threads:
         with self._changed:
             self._changed.wait_for(lambda: self._begun == 0)
 
-    def _ended(self, written: list[Written]) -> None:
+    def _ended(self, written: list[WriteResult]) -> None:
         with self._changed:
             self._begun -= len(written)
             self._done += written
@@ -162,13 +162,13 @@ class Threads:
 
 
 class _Lane:
-    def __init__(self, name: str, ended: Callable[[list[Written]], None]) -> None:
+    def __init__(self, name: str, ended: Callable[[list[WriteResult]], None]) -> None:
         self._ended = ended
-        self._waiting: SimpleQueue[Draft | None] = SimpleQueue()
+        self._waiting: SimpleQueue[PendingWrite | None] = SimpleQueue()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def put(self, draft: Draft) -> None:
+    def put(self, draft: PendingWrite) -> None:
         self._waiting.put(draft)
 
     def close(self) -> None:

@@ -14,7 +14,7 @@ from denseface.service.security.keys import KeyPair, read_pair, read_public
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.sockets import open_socket
 
-__all__ = ["Credentials", "Knock", "connect"]
+__all__ = ["ConnectionMonitor", "Credentials", "connect"]
 
 _SURE = 3
 """Handshakes that break off in a row until it is said why: a hub may have ended in one."""
@@ -58,7 +58,7 @@ class Credentials:
         socket.set(zmq.CURVE_SECRETKEY, self.pair.secret.encode())
 
 
-class Knock:
+class ConnectionMonitor:
     """Listens to how a socket's connections begin and remembers why the last one did not."""
 
     def __init__(self, socket: "zmq.Socket[bytes]", address: str, keys: Credentials | None) -> None:
@@ -131,7 +131,7 @@ class Knock:
 
 def connect(
     context: "zmq.Context[zmq.Socket[bytes]]", kind: int, address: str, keys: Credentials | None
-) -> "tuple[zmq.Socket[bytes], Knock]":
+) -> "tuple[zmq.Socket[bytes], ConnectionMonitor]":
     """Open a socket toward the hub, which may come later."""
     socket = open_socket(context, kind, address)
     if kind == zmq.DEALER:
@@ -139,6 +139,6 @@ def connect(
         socket.set(zmq.IMMEDIATE, 1)
     if keys:
         keys.show(socket)
-    knock = Knock(socket, address, keys)
+    knock = ConnectionMonitor(socket, address, keys)
     socket.connect(address)
     return socket, knock

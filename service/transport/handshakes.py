@@ -11,7 +11,7 @@ from contextlib import suppress
 import zmq
 from zmq.utils.monitor import parse_monitor_message
 
-from denseface.service.monitoring.rejections import Refusals
+from denseface.service.monitoring.rejections import Rejections
 
 __all__ = ["Handshakes", "address_of"]
 
@@ -30,7 +30,7 @@ _DETAILS = {
 class Handshakes:
     """Listens to what libzmq says of one listening socket's connections."""
 
-    def __init__(self, listening: "zmq.Socket[bytes]", refusals: Refusals) -> None:
+    def __init__(self, listening: "zmq.Socket[bytes]", refusals: Rejections) -> None:
         self._refusals = refusals
         self._listening = listening
         self.socket = listening.get_monitor_socket(int(_EVENTS))

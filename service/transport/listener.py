@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import zmq
 
 from denseface.service.errors import AddressError
-from denseface.service.monitoring.rejections import Refusals
+from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol.outputs import Topic
 from denseface.service.protocol.payload import MAX_PAYLOAD_BYTES
 from denseface.service.protocol.wire import MAX_HEADER_BYTES, MAX_PARTS, Buffer
-from denseface.service.security.allow_list import Allowed, Keyring
+from denseface.service.security.allow_list import Allowed, AllowList
 from denseface.service.security.keys import KeyPair
 from denseface.service.security.permissions import EVERY_ROLE, TOPICS
 from denseface.service.security.zap import DOMAIN, TOPICS_DOMAIN
@@ -30,7 +30,7 @@ from denseface.service.transport.sockets import (
     send_parts,
 )
 
-__all__ = ["Door", "Guard", "Incoming"]
+__all__ = ["Guard", "Incoming", "Listener"]
 
 _TOKEN_BYTES = 8
 _LOCAL = bytes(_TOKEN_BYTES)
@@ -49,7 +49,7 @@ class Guard:
 
     pair: KeyPair
     """The hub's own."""
-    keyring: Keyring
+    keyring: AllowList
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ _ANYONE = Allowed("", "", EVERY_ROLE)
 """Whoever came by the local door."""
 
 
-class Door:
+class Listener:
     """Binds both sockets of one address.
 
     Parameters
@@ -85,7 +85,7 @@ class Door:
 
     def __init__(
         self, context: "zmq.Context[zmq.Socket[bytes]]", address: str, guard: Guard | None,
-        refusals: Refusals,
+        refusals: Rejections,
     ) -> None:
         self.address = address
         self._guard = guard

@@ -7,27 +7,27 @@ from typing import Protocol
 import zmq
 
 from denseface.service.errors import AddressError, AuthenticatorStoppedError
-from denseface.service.monitoring.rejections import Refusals
+from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol.outputs import Topic
 from denseface.service.protocol.wire import Buffer
 from denseface.service.runtime.descriptors import DescriptorWatch
 from denseface.service.runtime.memory import MemoryWatch
-from denseface.service.security.allow_list import Allowed, Keyring
+from denseface.service.security.allow_list import Allowed, AllowList
 from denseface.service.security.keys import HUB, read_pair
 from denseface.service.security.permissions import TOPICS
 from denseface.service.security.zap import TOPICS_DOMAIN, Authenticator
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_bindable, is_local, socket_file
-from denseface.service.transport.listener import Door, Guard, Incoming
+from denseface.service.transport.listener import Guard, Incoming, Listener
 
-__all__ = ["Entrance", "guard", "guarded_addresses"]
+__all__ = ["Listeners", "guard", "guarded_addresses"]
 
 
 class _Wakes(Protocol):
     def fileno(self) -> int: ...
 
 
-class Entrance:
+class Listeners:
     """Opens every door that the settings name.
 
     Raises
@@ -38,12 +38,12 @@ class Entrance:
 
     def __init__(
         self, context: "zmq.Context[zmq.Socket[bytes]]", settings: ServiceSettings,
-        refusals: Refusals, wakes: Sequence[_Wakes],
+        refusals: Rejections, wakes: Sequence[_Wakes],
     ) -> None:
-        self._keyring: Keyring | None = None
+        self._keyring: AllowList | None = None
         self._changes = 0
         self._authenticator: Authenticator | None = None
-        self._doors: list[Door] = []
+        self._doors: list[Listener] = []
         self._refusals = refusals
         self._memory = MemoryWatch(settings.memory_mb << 20)
         self._descriptors = DescriptorWatch()
@@ -54,13 +54,13 @@ class Entrance:
             guarded = guarded_addresses(settings)
             if settings.address not in guarded:
                 check_bindable(settings.address)
-                self._doors.append(Door(context, settings.address, None, refusals))
+                self._doors.append(Listener(context, settings.address, None, refusals))
             if guarded:
                 keys = guard(settings)
                 self._keyring = keys.keyring
                 self._authenticator = Authenticator(context, keys.keyring, refusals, _admits)
                 self._poller.register(self._authenticator.socket, zmq.POLLIN)
-                self._doors += [Door(context, one, keys, refusals) for one in guarded]
+                self._doors += [Listener(context, one, keys, refusals) for one in guarded]
         except BaseException:
             self.close()
             raise
@@ -176,7 +176,7 @@ def guard(settings: ServiceSettings) -> Guard:
         raise AddressError(
             f"{address}: refused, it is not local to this machine: others are only let in with "
             f"CURVE security, and there is no hub key {path}; `denseface keys new {HUB}` makes one")
-    keyring = Keyring(settings.keys)
+    keyring = AllowList(settings.keys)
     if not len(keyring):
         raise AddressError(
             f"{address}: refused, no key is allowed in {settings.keys / 'allowed'}; "

@@ -9,13 +9,13 @@ from denseface.service.protocol.wire import MAX_HEADER_BYTES, MAX_PARTS, Packet,
 from denseface.service.transport.connection import Credentials, connect
 from denseface.service.transport.sockets import receive_parts
 
-__all__ = ["LOOK_S", "Ear"]
+__all__ = ["LOOK_S", "Subscription"]
 
 LOOK_S = 1.0
 """Time between two looks whether the hub still lets us in, seconds."""
 
 
-class Ear:
+class Subscription:
     """Subscribes to topics of the publications at an address."""
 
     def __init__(

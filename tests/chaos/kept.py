@@ -5,7 +5,7 @@ from contextlib import closing
 from pathlib import Path
 
 from denseface.service.errors import StoreError
-from denseface.service.storage.folder_layout import Layout
+from denseface.service.storage.folder_layout import FolderLayout
 from denseface.service.storage.records import read_face, read_frame
 from tests.chaos.history import Kept
 
@@ -14,7 +14,7 @@ __all__ = ["read_kept"]
 
 def read_kept(data: Path) -> list[Kept]:
     """Read every capture, and every file that belongs to one; the hub must have ended."""
-    layout = Layout(data)
+    layout = FolderLayout(data)
     with closing(sqlite3.connect(layout.database)) as database:
         database.row_factory = sqlite3.Row
         rows = database.execute(
@@ -24,7 +24,7 @@ def read_kept(data: Path) -> list[Kept]:
             for row in rows]
 
 
-def _sound(layout: Layout, row: sqlite3.Row) -> bool:
+def _sound(layout: FolderLayout, row: sqlite3.Row) -> bool:
     capture_id = row["capture_id"]
     try:
         frame = read_frame(layout.frame(capture_id), row["frame_sha256"])

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from denseface.service.runtime.failpoints import NAMES
-from denseface.service.storage.folder_layout import Layout
+from denseface.service.storage.folder_layout import FolderLayout
 from tests.chaos.cluster import Part
 from tests.chaos.scene import Scene
 
@@ -116,7 +116,7 @@ class Storm(threading.Thread):
         hub = self._scene.cluster.hub
         hub.end(signal.SIGKILL)
         try:
-            layout = Layout(self._scene.cluster.data)
+            layout = FolderLayout(self._scene.cluster.data)
             files = [*layout.all_frames(), *layout.all_faces()]
             if files:
                 capture_id, path = self._random.choice(files)

@@ -13,7 +13,7 @@ from random import Random
 
 import atheris
 
-with atheris.instrument_imports(include=["capture", "recon", "service"]):
+with atheris.instrument_imports(include=["denseface"]):
     from tests.fuzzing.corpus import encoded, pack, unpack
     from tests.fuzzing.mutate import mutate
     from tests.fuzzing.targets import Cost

@@ -170,7 +170,7 @@ def test_a_full_disk_refuses_presses_and_no_more(tmp_path, address):
         pytest.skip("this user may not mount a small disk of its own")
     hub = subprocess.Popen(
         ["unshare", "-m", "sh", "-c",
-         'mount -t tmpfs -o size=4m,mode=700 none "$1" && exec "$2" -m service hub --data "$1"'
+         'mount -t tmpfs -o size=4m,mode=700 none "$1" && exec "$2" -m denseface hub --data "$1"'
          ' --address "$3"', "sh", data, sys.executable, address],
         cwd=REPOSITORY, env=os.environ | {"DENSEFACE_RESERVE_MIB": "0"})
     seen = Path(f"/proc/{hub.pid}/root") / data.relative_to("/")

@@ -99,8 +99,8 @@ def test_a_sensor_that_falls_silent(clip):
             "    print(frame.depth_timestamp_us)")
     out, error = failing("", environment(clip, end="stop"), code)
     assert len(out.splitlines()) <= 3
-    assert re.match(r"capture\.errors\.SensorTimeoutError: openni2: no depth and color pair within "
-                    r"0\.5 s", error)
+    assert re.match(r"denseface\.capture\.errors\.SensorTimeoutError: openni2: no depth and "
+                    r"color pair within 0\.5 s", error)
 
 
 def test_no_stale_frame_at_a_press(clip):

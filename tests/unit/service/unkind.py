@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 from denseface.service.errors import DiskFullError
 from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.records import Draft
-from denseface.service.storage.writer import Written, write
+from denseface.service.storage.records import PendingWrite
+from denseface.service.storage.writer import WriteResult, write
 
 __all__ = ["KilledError", "StepWriter", "UnkindStore"]
 
@@ -50,14 +50,14 @@ class StepWriter:
     writes : is told of each draft that is going to be a file
     """
 
-    def __init__(self, room: Callable[[], None], writes: Callable[[Draft], None]) -> None:
+    def __init__(self, room: Callable[[], None], writes: Callable[[PendingWrite], None]) -> None:
         self.at_once = True
-        self.waiting: deque[Draft] = deque()
+        self.waiting: deque[PendingWrite] = deque()
         self._room = room
         self._writes = writes
-        self._done: list[Written] = []
+        self._done: list[WriteResult] = []
 
-    def start(self, draft: Draft) -> None:
+    def start(self, draft: PendingWrite) -> None:
         self.waiting.append(draft)
         if self.at_once:
             self.settle()
@@ -68,13 +68,13 @@ class StepWriter:
         try:
             self._room()
         except DiskFullError as error:
-            self._done += [Written(draft, error=error) for draft in batch]
+            self._done += [WriteResult(draft, error=error) for draft in batch]
             return
         for draft in batch:  # before: the hub may be killed when one is written
             self._writes(draft)
         self._done += write(batch)
 
-    def take(self) -> list[Written]:
+    def take(self) -> list[WriteResult]:
         done, self._done = self._done, []
         return done
 

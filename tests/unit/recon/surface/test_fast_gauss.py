@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from denseface.recon.surface._fast_gauss import Charges
+from denseface.recon.surface._fast_gauss import FastGaussTransform
 
 
 def direct(rows, columns, x, y, weights, b):
@@ -20,7 +20,7 @@ def test_equals_the_sum_over_all_points(n, seed, width, height, sharpest, part, 
     rng = np.random.default_rng(seed)
     x, y = low + width * rng.random(n), height * rng.random(n)
     weights = rng.normal(size=(2, n))
-    charges = Charges.of(x, y, (weights[0], weights[1]), sharpest)
+    charges = FastGaussTransform.of(x, y, (weights[0], weights[1]), sharpest)
     columns, rows = low + np.linspace(-3, width + 3, 17), np.linspace(-3, height + 3, 13)
     b = part * sharpest
     down, across = charges.factor(charges.y, rows, b), charges.factor(charges.x, columns, b)
@@ -34,7 +34,7 @@ def test_moments_weigh_by_powers_of_the_place():
     rng = np.random.default_rng(0)
     x, y = rng.uniform(20, 60, 500), rng.uniform(-30, 30, 500)
     u, v = (x - 40) / 30, (y - 2) / 30
-    charges = Charges.of(x, y, (np.ones(500), u), 0.2)
+    charges = FastGaussTransform.of(x, y, (np.ones(500), u), 0.2)
     columns, rows, b = np.linspace(15, 65, 11), np.linspace(-35, 35, 12), 0.07
     across = charges.moments(charges.x, columns, b, 40, 30)
     down = charges.moments(charges.y, rows, b, 2, 30)

@@ -4,7 +4,7 @@ from collections import deque
 
 import pytest
 
-from denseface.service.client.exchanges import Ask, Hear, Talks
+from denseface.service.client.exchanges import AwaitPublication, Exchanges, SendRequest
 from denseface.service.client.follower import Follower
 from denseface.service.errors import ClientTimeoutError, LocalProtocolError
 from denseface.service.protocol import messages
@@ -46,18 +46,18 @@ class FakeHub:
 
     def do(self, step):
         match step:
-            case Hear():
+            case AwaitPublication():
                 if not self.published:
                     raise ClientTimeoutError("silence")
                 return self.published.popleft()
-            case Ask() if self.away:
+            case SendRequest() if self.away:
                 self.away -= 1
                 raise ClientTimeoutError("away")
-            case Ask(message=messages.GetStatus()):
+            case SendRequest(message=messages.GetStatus()):
                 return Packet(self.status())
-            case Ask(message=messages.GetNext(after=after)):
+            case SendRequest(message=messages.GetNext(after=after)):
                 return Packet(self.next(after))
-            case Ask(message=messages.FindStart(last=last)):
+            case SendRequest(message=messages.FindStart(last=last)):
                 return Packet(messages.StartAt(
                     epoch=self.epoch, sequence=len(self.outcomes) - last))
 
@@ -81,7 +81,7 @@ def hub():
 
 
 def following(hub, **start):
-    follow = Follower(Talks(2.0), **start)
+    follow = Follower(Exchanges(2.0), **start)
     hub.carry_out(follow.start(60))
     return follow
 
@@ -184,4 +184,4 @@ def test_but_no_longer_than_allowed(hub, follow):
 @pytest.mark.parametrize("start", [{"after": 1, "last": 1}, {"last": 0}])
 def test_impossible_starts_are_refused(start):
     with pytest.raises(LocalProtocolError):
-        Follower(Talks(2.0), **start)
+        Follower(Exchanges(2.0), **start)

@@ -74,9 +74,9 @@ def test_handlers_are_put_back(number):
     assert signal.getsignal(number) is before
 
 
-def test_a_folder_service_where_the_user_stands_is_not_run(tmp_path, monkeypatch):
-    (tmp_path / "service").mkdir()
-    (tmp_path / "service" / "__init__.py").write_text("raise SystemExit('not ours')")
+def test_a_package_of_our_name_where_the_user_stands_is_not_run(tmp_path, monkeypatch):
+    (tmp_path / "denseface").mkdir()
+    (tmp_path / "denseface" / "__init__.py").write_text("raise SystemExit('not ours')")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("denseface.service.daemons.supervisor._STORM_RESTARTS", 0)
     assert Supervisor([ProcessSpec("x", ("no-such-command",))]).run() == 2

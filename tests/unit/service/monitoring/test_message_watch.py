@@ -5,7 +5,7 @@ import pytest
 from denseface.recon.settings import Settings
 from denseface.service.hub.hub import Hub
 from denseface.service.monitoring.figures import Figures
-from denseface.service.monitoring.message_watch import Watch
+from denseface.service.monitoring.message_watch import MessageWatch
 from denseface.service.protocol import messages
 from denseface.service.protocol.outputs import send, steps
 from denseface.service.protocol.wire import Packet
@@ -30,7 +30,7 @@ class WatchedBench(Bench):
     def __init__(self, store):
         self.figures = Figures()
         super().__init__(Hub(store, SETTINGS, Settings(), self.figures), store)
-        self.watch = Watch(self.figures.counters, self.figures.latencies)
+        self.watch = MessageWatch(self.figures.counters, self.figures.latencies)
 
     def say(self, peer, message, arrays=None):
         packet = Packet(message, arrays or {})

@@ -8,7 +8,7 @@ import pytest
 
 from denseface.service.cli import main
 from denseface.service.errors import KeyFileError
-from denseface.service.security.allow_list import Keyring, Role, allow, revoke
+from denseface.service.security.allow_list import AllowList, Role, allow, revoke
 from denseface.service.security.keys import KeyPair, new_pair, read_pair, read_public
 
 ROLES = frozenset({Role.WORKER})
@@ -77,7 +77,7 @@ def test_a_folder_is_no_key(tmp_path):
 
 
 def test_the_list_is_live(keys):
-    ring = Keyring(keys)
+    ring = AllowList(keys)
     assert (len(ring), ring.refresh()) == (0, False)
     one = allow(keys, "a", KeyPair.made().public, ROLES)
     assert ring.refresh()
@@ -114,7 +114,7 @@ def test_a_name_and_a_key_belong_together(keys):
 ])
 def test_a_damaged_file_keeps_its_key_out_and_no_other(keys, damage):
     one, other = (allow(keys, name, KeyPair.made().public, ROLES) for name in "ab")
-    ring = Keyring(keys)
+    ring = AllowList(keys)
     assert len(ring) == 2
     damage(keys / "allowed" / "a")
     assert ring.refresh()
@@ -123,7 +123,7 @@ def test_a_damaged_file_keeps_its_key_out_and_no_other(keys, damage):
 
 def test_a_folder_that_went_lets_nobody_in(keys):
     one = allow(keys, "a", KeyPair.made().public, ROLES)
-    ring = Keyring(keys)
+    ring = AllowList(keys)
     (keys / "allowed").rename(keys / "gone")
     assert ring.refresh()
     assert not ring.holds(one.token)
@@ -133,7 +133,7 @@ def test_a_folder_that_went_lets_nobody_in(keys):
     "pathlib.Path.iterdir", "denseface.service.security.allow_list.read_private_text"])
 def test_a_want_of_descriptors_revokes_nobody(keys, monkeypatch, where):
     one = allow(keys, "a", KeyPair.made().public, ROLES)
-    ring = Keyring(keys)
+    ring = AllowList(keys)
 
     def none_left(*_):
         error = OSError(errno.EMFILE, "Too many open files")
@@ -165,7 +165,7 @@ def test_the_commands(keys, capsys):
     assert public in out
     assert read_pair(keys / "kiosk.secret").secret not in out
     assert run("allow", "front", keys / "kiosk.public", "presser", "subscriber")[0] == 0
-    ring = Keyring(keys)
+    ring = AllowList(keys)
     listed = run("list")[1]
     assert listed.split() == ["front", ring.get(public).fingerprint, "presser,", "subscriber"]
     assert run("revoke", "front")[:2] == (0, "front may come in no more\n")

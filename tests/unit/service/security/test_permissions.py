@@ -6,7 +6,7 @@ import pytest
 
 from denseface.recon.settings import Settings
 from denseface.service.monitoring.counters import Counters
-from denseface.service.monitoring.rejections import Refusals
+from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outputs import Topic
 from denseface.service.protocol.payload import FrameHeader
@@ -81,7 +81,7 @@ def test_a_presser_gets_what_it_pressed(role, own, may):
 
 def test_refusals_are_all_counted_and_not_all_logged(capsys):
     counters, now = Counters(), [0.0]
-    refusals = Refusals(counters, lambda: now[0])
+    refusals = Rejections(counters, lambda: now[0])
     for _ in range(1000):
         refusals.note("role", key="a")
     refusals.note("malformed", key="b")

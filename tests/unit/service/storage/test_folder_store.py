@@ -16,7 +16,7 @@ from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet
 from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.frame_cache import FreshFrames
+from denseface.service.storage.frame_cache import FrameCache
 from denseface.service.storage.record_file import read_parts, write_parts
 from denseface.service.storage.writer import write
 from tests.unit.service.faces import small_face, small_frame
@@ -197,7 +197,7 @@ def test_a_full_disk_leaves_nothing_half_written(tmp_path, monkeypatch):
 def test_frames_are_held_in_memory_as_far_as_there_is_room(store, monkeypatch):
     size = sum(array.nbytes for array in frame("a").arrays.values())
     monkeypatch.setattr("denseface.service.storage.frame_cache._BYTES", 2 * size)
-    fresh = FreshFrames()
+    fresh = FrameCache()
     kept = {}
     for name in "abc":
         accept(store, frame(name), Settings(), "0f")

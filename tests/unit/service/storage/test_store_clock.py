@@ -2,7 +2,7 @@
 
 import pytest
 
-from denseface.service.storage.store_clock import Account, SystemClock
+from denseface.service.storage.store_clock import StoreClock, SystemClock
 from tests.unit.service.clocks import FakeClock
 
 DAY = 86400.0
@@ -10,7 +10,7 @@ DAY = 86400.0
 
 def test_time_is_counted_whatever_the_wall_clock_says():
     clock = FakeClock()
-    account = Account(clock, None)
+    account = StoreClock(clock, None)
     clock.pass_time(10)
     clock.set_wall(400 * DAY)
     clock.pass_time(10)
@@ -20,27 +20,27 @@ def test_time_is_counted_whatever_the_wall_clock_says():
 
 def test_a_hub_that_was_away_counts_on():
     clock = FakeClock()
-    saved = Account(clock, None).save()
+    saved = StoreClock(clock, None).save()
     clock.pass_time(100)
     clock.set_wall(400 * DAY)
-    account = Account(clock, saved)
+    account = StoreClock(clock, saved)
     assert account.now() == 100
     assert account.settled(DAY)
 
 
 def test_the_time_switched_off_is_the_wall_clock_s():
     clock = FakeClock()
-    saved = Account(clock, None).save()
+    saved = StoreClock(clock, None).save()
     clock.restart(off_s=600)
-    assert Account(clock, saved).now() == pytest.approx(600, abs=1)
-    assert Account(clock, saved).settled(DAY)
+    assert StoreClock(clock, saved).now() == pytest.approx(600, abs=1)
+    assert StoreClock(clock, saved).settled(DAY)
 
 
 def test_a_clock_far_ahead_after_a_start_waits_for_someone_to_see_it():
     clock = FakeClock()
-    saved = Account(clock, None).save()
+    saved = StoreClock(clock, None).save()
     clock.restart(off_s=400 * DAY)
-    account = Account(clock, saved)
+    account = StoreClock(clock, saved)
     assert not account.settled(DAY)
     clock.pass_time(3600)
     assert account.settled(DAY)
@@ -48,11 +48,11 @@ def test_a_clock_far_ahead_after_a_start_waits_for_someone_to_see_it():
 
 def test_a_clock_that_starts_in_the_past_takes_nothing_back():
     clock = FakeClock()
-    account = Account(clock, None)
+    account = StoreClock(clock, None)
     clock.pass_time(50)
     saved = account.save()
     clock.restart(off_s=-400 * DAY)
-    assert Account(clock, saved).now() == 50
+    assert StoreClock(clock, saved).now() == 50
 
 
 @pytest.mark.parametrize("saved", [
@@ -61,10 +61,10 @@ def test_a_clock_that_starts_in_the_past_takes_nothing_back():
     '{"seconds": 1, "wall": "2026-01-01T00:00:00", "boot": "b", "at": 1}'])
 def test_a_damaged_mark_is_named(saved):
     with pytest.raises(ValueError, match="clock mark"):
-        Account(FakeClock(), saved)
+        StoreClock(FakeClock(), saved)
 
 
 def test_this_machine_has_such_clocks():
-    account = Account(SystemClock(), Account(SystemClock(), None).save())
+    account = StoreClock(SystemClock(), StoreClock(SystemClock(), None).save())
     assert account.gap_s == 0
     assert 0 <= account.now() < 60

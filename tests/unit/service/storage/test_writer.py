@@ -10,7 +10,7 @@ import pytest
 from denseface.recon.settings import Settings
 from denseface.service.errors import DiskFullError
 from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.writer import Threads, write
+from denseface.service.storage.writer import WriterThreads, write
 from tests.unit.service.keep import accept
 from tests.unit.service.storage.test_folder_store import frame, result
 
@@ -93,7 +93,7 @@ def test_frames_do_not_wait_for_a_face_and_each_kind_stays_in_order(store, monke
         return real(self)
 
     monkeypatch.setattr(type(face), "write", slow_for_faces)
-    with Threads() as writer:
+    with WriterThreads() as writer:
         writer.start(face)
         assert waits.wait(20)
         frames = [draft(store, name) for name in "abc"]
@@ -118,7 +118,7 @@ def test_frames_do_not_wait_for_a_face_and_each_kind_stays_in_order(store, monke
 
 def test_at_the_end_what_was_begun_is_written(store):
     drafts = [draft(store, f"c{number}") for number in range(20)]
-    with Threads() as writer:
+    with WriterThreads() as writer:
         for one in drafts:
             writer.start(one)
     assert [one.draft for one in writer.take()] == drafts
@@ -131,7 +131,7 @@ def test_what_nobody_expected_is_told_too(store, monkeypatch):
 
     one = draft(store, "a")
     monkeypatch.setattr(type(one), "write", broken)
-    with Threads() as writer:
+    with WriterThreads() as writer:
         writer.start(one)
         writer.settle()
     assert isinstance(writer.take()[0].error, RuntimeError)

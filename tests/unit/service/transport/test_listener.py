@@ -8,14 +8,14 @@ import zmq
 
 from denseface.service.errors import AddressError, KeyFileError
 from denseface.service.monitoring.counters import Counters
-from denseface.service.monitoring.rejections import Refusals
+from denseface.service.monitoring.rejections import Rejections
 from denseface.service.runtime.memory import MemoryWatch
 from denseface.service.security.allow_list import Role, allow, revoke
 from denseface.service.security.keys import KeyPair, new_pair, read_public
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.connection import Credentials, connect
-from denseface.service.transport.listener import Door
-from denseface.service.transport.listeners import Entrance
+from denseface.service.transport.listener import Listener
+from denseface.service.transport.listeners import Listeners
 from tests.ports import free_port
 
 
@@ -62,7 +62,7 @@ def test_a_door_on_the_other_loopback(context):
         address = _address("::1")
     except OSError:
         pytest.skip("this machine has no IPv6")
-    door = Door(context, address, None, Refusals(Counters()))
+    door = Listener(context, address, None, Rejections(Counters()))
     dealer, knock = connect(context, zmq.DEALER, address, None)
     try:
         dealer.send(b"hello")
@@ -80,9 +80,9 @@ def test_a_door_on_the_other_loopback(context):
 
 def test_an_address_in_use_is_named(context):
     address = _address()
-    door = Door(context, address, None, Refusals(Counters()))
+    door = Listener(context, address, None, Rejections(Counters()))
     with pytest.raises(AddressError, match=rf"^{address}: Address already in use$"):
-        Door(context, address, None, Refusals(Counters()))
+        Listener(context, address, None, Rejections(Counters()))
     door.close()
 
 
@@ -92,10 +92,10 @@ def test_who_was_refused_comes_in_once_allowed(context, wakes, tmp_path, monkeyp
     _, hub_key = new_pair(tmp_path, "hub")
     secret, public = new_pair(tmp_path, "late")
     allow(tmp_path, "other", KeyPair.made().public, frozenset({Role.WORKER}))
-    address, refusals = _address(), Refusals(Counters())
+    address, refusals = _address(), Rejections(Counters())
     settings = ServiceSettings(address=address, key=secret, hub_key=hub_key)
     doors = ServiceSettings(address=_address(), listen=(address,), keys=tmp_path)
-    entrance = Entrance(context, doors, refusals, [wakes])
+    entrance = Listeners(context, doors, refusals, [wakes])
     dealer, knock = connect(context, zmq.DEALER, address, Credentials.of(settings))
     try:
         _until(entrance, lambda _: knock.read() or knock.refused)
@@ -133,8 +133,8 @@ def test_keys_are_for_other_machines(tmp_path):
 @pytest.mark.parametrize("address", ["ipc:///run/x", "tcp://host", "tcp://0.0.0.0:70000"])
 def test_only_a_port_can_be_guarded(context, wakes, address):
     with pytest.raises(AddressError, match=address):
-        Entrance(context, ServiceSettings(address=_address(), listen=(address,)),
-                 Refusals(Counters()), [wakes])
+        Listeners(context, ServiceSettings(address=_address(), listen=(address,)),
+                 Rejections(Counters()), [wakes])
 
 
 def test_several_addresses_come_with_commas():
