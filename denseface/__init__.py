@@ -23,12 +23,12 @@ __all__ = [
 _HOMES = {
     "AsyncClient": "denseface.service.client.aio",
     "Client": "denseface.service.client.blocking",
-    "Face": "recon",
-    "RgbdFrame": "capture",
-    "Settings": "recon",
+    "Face": "denseface.recon",
+    "RgbdFrame": "denseface.capture",
+    "Settings": "denseface.recon",
     "load_face": "denseface.service.export.formats",
-    "open_source": "capture",
-    "reconstruct": "recon",
+    "open_source": "denseface.capture",
+    "reconstruct": "denseface.recon",
     "save_face": "denseface.service.export.formats",
 }
 

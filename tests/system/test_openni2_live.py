@@ -68,7 +68,7 @@ def test_an_argument_wins_over_what_the_sensor_says(clip, tmp_path):
         update={"color": frame.calibration.color.model_copy(update={"fx": 500.0})})
     path = tmp_path / "mine.json"
     path.write_text(mine.to_json())
-    code = ("import sys; from capture import open_source\n"
+    code = ("import sys; from denseface.capture import open_source\n"
             "with open_source('openni2:', sys.argv[1]) as source:\n"
             "    frame = next(iter(source))\n"
             "    print(frame.calibration.color.fx, frame.calibration_origin, source.frame_count)")

@@ -12,7 +12,7 @@ from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.process import environment, play, record_clip, run_python
 
 _JPEG_LOSS = 3.0
-_OPEN = "import sys; from capture import open_source\nlist(open_source(sys.argv[1]))"
+_OPEN = "import sys; from denseface.capture import open_source\nlist(open_source(sys.argv[1]))"
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +141,8 @@ def test_names_that_openni2_does_not_survive(recorded, tmp_path, name):
 def test_with_debians_own_drivers(recorded, closed):
     """Also where the caller forgets to close: no crash at the end of the process."""
     env = {k: v for k, v in os.environ.items() if not k.startswith(("OPENNI2", "VIRTUAL"))}
-    code = ("import sys; from capture import open_source\nsource = open_source(sys.argv[1])\n"
+    code = ("import sys; from denseface.capture import open_source\n"
+            "source = open_source(sys.argv[1])\n"
             "print(len(list(source)))\n" + ("source.close()" if closed else ""))
     done = run_python(code, recorded, env=env)
     assert (done.returncode, done.stdout, done.stderr) == (0, "4\n", "")

@@ -14,6 +14,12 @@ def test_every_public_name_is_there(name):
     assert name in dir(denseface)
 
 
+@pytest.mark.parametrize("name", sorted({*denseface.__all__} - {"__version__"}))
+def test_every_public_name_lives_in_the_package(name):
+    """Not in a second copy under `capture` or `recon`, which a checkout's folders would give."""
+    assert getattr(denseface, name).__module__.startswith("denseface.")
+
+
 def test_an_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="'denseface' has no attribute 'nothing'"):
         _ = denseface.nothing
