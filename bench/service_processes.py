@@ -15,7 +15,7 @@ import psutil
 import zmq
 
 from denseface.service.client.blocking import Client
-from denseface.service.protocol.outputs import Topic
+from denseface.service.protocol.topics import Topic
 from denseface.service.transport.addresses import publications_of
 from denseface.service.transport.sockets import open_socket
 

@@ -14,7 +14,7 @@ from denseface.recon.settings import Settings
 from denseface.service.client.events import outcome_of
 from denseface.service.hub.hub import Hub
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Output
+from denseface.service.protocol.outgoing import Output
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.wire import Buffer, Packet, decode_from_hub, decode_to_hub, encode
 from denseface.service.settings import ServiceSettings

@@ -38,7 +38,7 @@ from denseface.service.client.follower import TOPICS, Follower
 from denseface.service.errors import ClientClosedError, ClientTimeoutError, ProtocolError
 from denseface.service.protocol import messages
 from denseface.service.protocol.messages import Status
-from denseface.service.protocol.outputs import Topic
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, decode_from_hub, encode
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable, publications_of

@@ -16,7 +16,7 @@ from denseface.service.protocol.messages import (
     StartAt,
     Status,
 )
-from denseface.service.protocol.outputs import Topic
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 
 __all__ = ["TOPICS", "Follower"]

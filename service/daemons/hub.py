@@ -17,7 +17,8 @@ from denseface.service.hub.previews import PERIOD_S
 from denseface.service.monitoring.observer import Observer
 from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Output, Publish, Topic, send, steps
+from denseface.service.protocol.outgoing import Output, Publish, send, steps
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Buffer, Packet, decode_to_hub, encode
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.signals import StopSignal

@@ -28,8 +28,9 @@ from denseface.service.hub.previews import Previews
 from denseface.service.monitoring.figures import Figures
 from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Output, Publish, Topic, send
+from denseface.service.protocol.outgoing import Output, Publish, send
 from denseface.service.protocol.states import CaptureState
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage.base import Store

@@ -13,7 +13,7 @@ from denseface.service.hub.peers import Peers, Worker
 from denseface.service.hub.unsaved_faces import UnsavedFaces
 from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Output, send
+from denseface.service.protocol.outgoing import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.failpoints import failpoint

@@ -10,7 +10,7 @@ from denseface.service.hub.outcomes import Outcomes
 from denseface.service.hub.presses import Presses
 from denseface.service.monitoring.counters import Counters
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Output, send
+from denseface.service.protocol.outgoing import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage.base import Store

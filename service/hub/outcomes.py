@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from denseface.service.errors import DamagedFaceError
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Output, Publish, Send, Topic, send
+from denseface.service.protocol.outgoing import Output, Publish, Send, send
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.storage.base import Store
 

@@ -9,7 +9,7 @@ from denseface.recon.settings import Settings
 from denseface.service.errors import ServiceError, StoreError
 from denseface.service.hub.peers import Peers
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Output, send
+from denseface.service.protocol.outgoing import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.failpoints import failpoint

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 
 from denseface.service.hub.peers import Peers
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Output, Publish, Topic, send
+from denseface.service.protocol.outgoing import Output, Publish, send
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 
 __all__ = ["PERIOD_S", "Previews"]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from denseface.service.monitoring.counters import Counters
 from denseface.service.monitoring.latencies import Latencies
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Output, Publish, Send
+from denseface.service.protocol.outgoing import Output, Publish, Send
 from denseface.service.protocol.wire import Packet
 
 __all__ = ["MessageWatch"]

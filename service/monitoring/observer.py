@@ -12,7 +12,7 @@ from denseface.service.monitoring.board import Board, Picture
 from denseface.service.monitoring.figures import Figures
 from denseface.service.monitoring.message_watch import MessageWatch
 from denseface.service.protocol.messages import Status
-from denseface.service.protocol.outputs import Output, Publish
+from denseface.service.protocol.outgoing import Output, Publish
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 

@@ -5,7 +5,7 @@ has every role.
 """
 
 from denseface.service.protocol.messages import Message
-from denseface.service.protocol.outputs import Topic
+from denseface.service.protocol.topics import Topic
 from denseface.service.security.allow_list import Role
 
 __all__ = ["EVERY_ROLE", "KINDS", "TOPICS", "missing_role"]

@@ -13,8 +13,8 @@ import zmq
 
 from denseface.service.errors import AddressError
 from denseface.service.monitoring.rejections import Rejections
-from denseface.service.protocol.outputs import Topic
 from denseface.service.protocol.payload import MAX_PAYLOAD_BYTES
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import MAX_HEADER_BYTES, MAX_PARTS, Buffer
 from denseface.service.security.allow_list import Allowed, AllowList
 from denseface.service.security.keys import KeyPair

@@ -8,7 +8,7 @@ import zmq
 
 from denseface.service.errors import AddressError, AuthenticatorStoppedError
 from denseface.service.monitoring.rejections import Rejections
-from denseface.service.protocol.outputs import Topic
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Buffer
 from denseface.service.runtime.descriptors import DescriptorWatch
 from denseface.service.runtime.memory import MemoryWatch

@@ -3,8 +3,8 @@
 import zmq
 
 from denseface.service.errors import ProtocolError
-from denseface.service.protocol.outputs import Topic
 from denseface.service.protocol.payload import MAX_PAYLOAD_BYTES
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import MAX_HEADER_BYTES, MAX_PARTS, Packet, decode_from_hub
 from denseface.service.transport.connection import Credentials, connect
 from denseface.service.transport.sockets import receive_parts

@@ -10,7 +10,7 @@ import zmq
 from denseface.service.client.blocking import Client, PublishedFace
 from denseface.service.errors import PressRefusedError, ProtocolError, ServiceError
 from denseface.service.protocol.messages import CaptureFailed, FaceDone
-from denseface.service.protocol.outputs import Topic
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import decode_from_hub
 from denseface.service.transport.addresses import publications_of
 from tests.chaos.history import Answer, Seen

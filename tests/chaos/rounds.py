@@ -10,7 +10,7 @@ from pathlib import Path
 
 import zmq
 
-from denseface.service.protocol.outputs import Topic
+from denseface.service.protocol.topics import Topic
 from denseface.service.transport.addresses import publications_of
 from tests.chaos.cluster import Nursery
 from tests.chaos.history import Answer, History, violations

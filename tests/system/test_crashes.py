@@ -9,7 +9,7 @@ import psutil
 import pytest
 import zmq
 
-from denseface.service.protocol.outputs import Topic
+from denseface.service.protocol.topics import Topic
 from denseface.service.runtime.failpoints import NAMES
 from denseface.service.storage.folder_layout import FolderLayout
 from denseface.service.transport.addresses import publications_of

@@ -9,8 +9,8 @@ import numpy as np
 import zmq
 
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Topic
 from denseface.service.protocol.payload import FaceHeader, PreviewHeader
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, decode_to_hub, encode
 from denseface.service.transport.addresses import publications_of
 from tests.unit.service.faces import small_face

@@ -18,7 +18,7 @@ from denseface.service.errors import (
     PressRefusedError,
     UnknownCaptureError,
 )
-from denseface.service.protocol.outputs import Topic
+from denseface.service.protocol.topics import Topic
 from tests.unit.service.fake_hub import fake_hub
 from tests.waiting import until
 

@@ -9,9 +9,10 @@ from denseface.recon.settings import Settings
 from denseface.service.errors import StoreError
 from denseface.service.hub.hub import Hub, settings_hash
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Output, Publish, Send, Topic
+from denseface.service.protocol.outgoing import Output, Publish, Send
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.states import TRANSITIONS, CaptureEvent, CaptureState, advance
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage.folder_store import FolderStore

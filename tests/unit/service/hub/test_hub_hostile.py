@@ -19,7 +19,8 @@ from denseface.service.errors import ProtocolError
 from denseface.service.hub.hub import Hub
 from denseface.service.hub.peers import MOST_PEERS
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Output, Publish, Topic
+from denseface.service.protocol.outgoing import Output, Publish
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, decode_from_hub, decode_to_hub, encode
 from denseface.service.security.permissions import KINDS
 from denseface.service.settings import ServiceSettings

@@ -16,8 +16,9 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from denseface.recon.settings import Settings
 from denseface.service.hub.hub import Hub, settings_hash
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Publish, Topic
+from denseface.service.protocol.outgoing import Publish
 from denseface.service.protocol.states import CaptureState
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage import records, retention, writer

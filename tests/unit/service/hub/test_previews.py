@@ -13,8 +13,9 @@ from denseface.service.daemons.sensor import Sensor
 from denseface.service.daemons.shrink import shrunk
 from denseface.service.hub.hub import Hub
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Publish, Topic
+from denseface.service.protocol.outgoing import Publish
 from denseface.service.protocol.payload import MAX_PREVIEW_SIDE, PreviewHeader
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.storage.folder_store import FolderStore
 from tests.unit.service.faces import small_frame

@@ -7,7 +7,7 @@ from denseface.service.hub.hub import Hub
 from denseface.service.monitoring.figures import Figures
 from denseface.service.monitoring.message_watch import MessageWatch
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import send, steps
+from denseface.service.protocol.outgoing import send, steps
 from denseface.service.protocol.wire import Packet
 from denseface.service.storage.folder_store import FolderStore
 from tests.unit.service.faces import small_face
@@ -164,7 +164,7 @@ def test_the_times_of_captures_that_never_end_are_let_go_of(bench):
 
 
 def messages_to(packet):
-    from denseface.service.protocol.outputs import Send
+    from denseface.service.protocol.outgoing import Send
 
     return Send(SENSOR, packet)
 

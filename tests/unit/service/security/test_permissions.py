@@ -8,8 +8,8 @@ from denseface.recon.settings import Settings
 from denseface.service.monitoring.counters import Counters
 from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol import messages
-from denseface.service.protocol.outputs import Topic
 from denseface.service.protocol.payload import FrameHeader
+from denseface.service.protocol.topics import Topic
 from denseface.service.security.allow_list import Role
 from denseface.service.security.permissions import EVERY_ROLE, KINDS, TOPICS, missing_role
 from tests.unit.service.faces import small_frame

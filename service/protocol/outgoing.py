@@ -1,25 +1,14 @@
-"""What the hub gives out: messages to peers and to subscribers."""
+"""Messages that the hub hands over to be sent: to one peer, or to all subscribers of a topic."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
 from denseface.service.protocol.messages import FromHub, Job
 from denseface.service.protocol.payload import Arrays
+from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 
-__all__ = ["Output", "Publish", "Send", "Topic", "send", "steps"]
-
-
-class Topic(StrEnum):
-    """What may be subscribed to."""
-
-    FACES = "faces"
-    """`FaceDone` and `CaptureFailed`, numbered without gaps."""
-    STATUS = "status"
-    """`Status`, at every heartbeat."""
-    PREVIEW = "preview"
-    """`Preview`, ten a second at most while somebody subscribes."""
+__all__ = ["Output", "Publish", "Send", "send", "steps"]
 
 
 @dataclass(frozen=True)
