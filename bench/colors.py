@@ -15,7 +15,7 @@ from bench.cases import HOLE_SPACINGS, reporting_heads
 from bench.machine import describe
 from denseface.recon import ReconstructionError, reconstruct
 from denseface.recon.face import Face
-from denseface.recon.registration.registration import look_up, register
+from denseface.recon.registration import register, sample_colors
 from tests.simulator import KINECT_CALIBRATED, Person, Scene, TrueColors, head_names, simulate
 
 __all__ = ["PARTS", "Compared"]
@@ -110,17 +110,17 @@ def _faces(
         except ReconstructionError as error:
             print(f"{name} is left out: {error}", file=sys.stderr)
             continue
-        looked_up, _ = look_up(shot.frame, register(shot.frame), face.dense.points)
+        sampled, _ = sample_colors(shot.frame, register(shot.frame), face.dense.points)
         compared = Compared.of(face, TrueColors.of(scene, KINECT_CALIBRATED))
-        yield name, shot.frame.color, face, looked_up, compared
+        yield name, shot.frame.color, face, sampled, compared
 
 
 def _print_errors(count: int, heads: list[str]) -> None:
     ours: list[dict[str, float]] = []
     direct: list[dict[str, float]] = []
-    for name, _, face, looked_up, compared in _faces(_scenes(count, heads), 300):
+    for name, _, face, sampled, compared in _faces(_scenes(count, heads), 300):
         ours.append(compared.errors(face.dense.colors))
-        direct.append(compared.errors(looked_up))
+        direct.append(compared.errors(sampled))
         print(f"{name}: {ours[-1]['all']:.2f}", file=sys.stderr, flush=True)
     print(f"\n{len(ours)} frames (simulated heads {', '.join(heads)}):\n")
     print("| mean absolute difference, of 255 | " + " | ".join(PARTS) + " | worst frame |")
@@ -136,11 +136,11 @@ def _print_background(heads: list[str]) -> None:
     print("| head, wall | points | more wall than face | a quarter wall or more "
           "| each looked up: more wall | a quarter or more |")
     print("|" + " --- |" * 6)
-    for name, image, face, looked_up, compared in _faces(_walled(heads), 500):
+    for name, image, face, sampled, compared in _faces(_walled(heads), 500):
         wall = np.median(image[:10].reshape(-1, 3), axis=0)
         rim = compared.parts["rim"]
         cells = []
-        for colors in (face.dense.colors, looked_up):
+        for colors in (face.dense.colors, sampled):
             share = compared.background(colors, wall)
             for least in (_MOSTLY, _SHOWS):
                 over = 1e4 * (share > least)

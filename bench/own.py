@@ -9,7 +9,7 @@ from denseface.recon import Settings
 from denseface.recon.pipeline import surface_of
 from denseface.recon.propagation.densify import densify
 from denseface.recon.propagation.uncertainty import noise_share
-from denseface.recon.registration.registration import look_up, register
+from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation.segment import segment_face
 from denseface.recon.surface.spacing import mean_spacing
 
@@ -29,11 +29,11 @@ def after_segmentation(case: Case, known: Settings) -> Callable[[], object]:
     registered = register(frame, known.depth_offset_mm)
     seeds = segment_face(registered, case.face.report.face_box, frame.calibration.color.fx)
 
-    looked_up = partial(look_up, frame, registered)
+    sampler = partial(sample_colors, frame, registered)
 
     def call() -> object:
         spacing = mean_spacing(seeds.points, seeds.pixels, known.neighbors)
-        surface = surface_of(seeds.points, spacing, known, looked_up)
-        return densify(seeds, surface, spacing, known.ratio, noise_share(known), looked_up)
+        surface = surface_of(seeds.points, spacing, known, sampler)
+        return densify(seeds, surface, spacing, known.ratio, noise_share(known), sampler)
 
     return call

@@ -13,9 +13,9 @@ from bench.accuracy import RECORDINGS
 from bench.recall_scenes import CHOOSING, REPORTING, View, empty_views, face_views, taken
 from denseface.capture import RgbdFrame, open_source
 from denseface.recon import Settings
-from denseface.recon.detection.detect import Detection, detect_face
+from denseface.recon.detection import Detection, detect_face
 from denseface.recon.errors import ReconstructionError
-from denseface.recon.registration.registration import register
+from denseface.recon.registration import register
 from tests.simulator import Truth, shared_folder
 
 __all__: list[str] = []

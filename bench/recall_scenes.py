@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.capture import RgbdFrame
-from denseface.capture.frame import CameraModel
+from denseface.capture.calibration import CameraModel
 from denseface.capture.npz import load_frame, save_frame
 from tests.simulator import KINECT_CALIBRATED, Light, Person, Scene, Truth, head_names, simulate
 

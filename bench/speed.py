@@ -26,7 +26,7 @@ from bench.pcl_peer import Pcl
 from bench.peer_methods import inpaint_points, rbf_points
 from denseface.recon import Preset, Settings, pipeline, reconstruct, warm
 from denseface.recon.pipeline import surface_of
-from denseface.recon.registration.registration import look_up, register
+from denseface.recon.registration import register, sample_colors
 from denseface.recon.surface.rbf import MIN_SEEDS, fit_surface
 
 __all__: list[str] = []
@@ -87,7 +87,7 @@ def _fit_times(case: Case, pcl: Pcl | None) -> None:
     """One fit and its evaluation, and the whole of ours, against others, by turns."""
     xs, ys = _grid(case)
     seeds, spacing = case.seeds, case.spacing
-    looked_up = partial(look_up, case.frame,
+    sampler = partial(sample_colors, case.frame,
                         register(case.frame, case.face.report.settings.depth_offset_mm))
     calls: dict[str, Callable[[], float]] = {
         **{f"ours, `{preset.value}`: its fit {_of_fit(preset)} and evaluation": partial(
@@ -95,7 +95,7 @@ def _fit_times(case: Case, pcl: Pcl | None) -> None:
            for preset in (Preset.BEST, Preset.FAITHFUL)},
         "ours, `best`: fit, detail, evaluation with slopes": lambda: milliseconds(
             lambda: surface_of(
-                seeds.astype(np.float32), spacing, Settings(), looked_up).sampled(xs, ys)),
+                seeds.astype(np.float32), spacing, Settings(), sampler).sampled(xs, ys)),
         **{f"ours, `{preset.value}`, all after segmentation: spacing, fit, normals, colours, sigma":
            partial(milliseconds, after_segmentation(case, with_preset(preset)))
            for preset in (Preset.BEST, Preset.FAITHFUL)},

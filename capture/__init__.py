@@ -1,7 +1,8 @@
 """Frames and where they come from."""
 
+from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
 from denseface.capture.errors import CaptureError
-from denseface.capture.frame import Calibration, CameraModel, DepthToColor, RgbdFrame
+from denseface.capture.frame import RgbdFrame
 from denseface.capture.source import Source, open_source
 
 __all__ = ["Calibration", "CameraModel", "CaptureError", "DepthToColor", "RgbdFrame", "Source",

@@ -19,9 +19,10 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from denseface.capture._chosen import ChosenCalibration
+from denseface.capture._calibration_choice import ChosenCalibration
+from denseface.capture.calibration import MAX_SIDE, Calibration
 from denseface.capture.errors import CaptureError, FrameError, UnreadableSourceError
-from denseface.capture.frame import MAX_SIDE, Calibration, RgbdFrame
+from denseface.capture.frame import RgbdFrame
 
 __all__ = ["NpzSource", "load_frame", "save_frame"]
 

@@ -15,9 +15,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
-from denseface.capture._chosen import choose_calibration
+from denseface.capture._calibration_choice import choose_calibration
+from denseface.capture.calibration import Calibration
 from denseface.capture.errors import UnreadableSourceError
-from denseface.capture.frame import Calibration, RgbdFrame
+from denseface.capture.frame import RgbdFrame
 
 __all__ = ["Source", "open_source"]
 

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from denseface.capture.frame import RgbdFrame
 from denseface.recon.detail.detail import DetailedSurface, add_detail
-from denseface.recon.detection.detect import detect_face
+from denseface.recon.detection import detect_face
 from denseface.recon.errors import NoDepthError, TooLittleDepthError
 from denseface.recon.face import Face, PointCloud, Report
 from denseface.recon.numerics.threads import one_blas_thread
 from denseface.recon.propagation.densify import densify
 from denseface.recon.propagation.uncertainty import noise_share
-from denseface.recon.registration.registration import ColorSampler, Registration, look_up, register
+from denseface.recon.registration import ColorSampler, Registration, register, sample_colors
 from denseface.recon.segmentation.segment import segment_face, window_of_box
 from denseface.recon.settings import Settings
 from denseface.recon.surface.rbf import MIN_SEEDS, Surface, fit_surface
@@ -69,11 +69,11 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     clock.lap("segmentation")
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     clock.lap("neighbors")
-    looked_up = partial(look_up, frame, registered)
-    surface = surface_of(seeds.points, spacing, settings, looked_up)
+    sampler = partial(sample_colors, frame, registered)
+    surface = surface_of(seeds.points, spacing, settings, sampler)
     clock.lap("rbf")
     dense = densify(seeds, surface, spacing, settings.ratio, noise_share(settings),
-                    looked_up)
+                    sampler)
     clock.lap("propagation")
     initial = PointCloud(seeds.points, seeds.colors)
     report = Report(
@@ -110,7 +110,7 @@ def _version() -> str:
 
 def surface_of(
     points: NDArray[np.float32], spacing: float, settings: Settings,
-    look_up: ColorSampler | None = None,
+    sampler: ColorSampler | None = None,
 ) -> Surface | DetailedSurface:
     """Fit the seeds, and add the detail that the settings ask for.
 
@@ -118,7 +118,7 @@ def surface_of(
     ----------
     points : (n, 3) float32, mm, depth camera frame
     spacing : their mean spacing, mm
-    look_up : tells points' colours; None, and there is no detail by shading
+    sampler : tells points' colours; None, and there is no detail by shading
 
     Raises
     ------
@@ -130,7 +130,7 @@ def surface_of(
         return surface
     return add_detail(surface, points, spacing, settings.detail_factor * spacing,
                       symmetry=settings.symmetry,
-                      look_up=look_up if settings.shading else None)
+                      sampler=sampler if settings.shading else None)
 
 
 def _warnings(frame: RgbdFrame, seeds: int) -> tuple[str, ...]:

@@ -5,15 +5,14 @@ from functools import cache, partial
 
 import numpy as np
 
-from denseface.capture.frame import Calibration, CameraModel, RgbdFrame
+from denseface.capture.calibration import Calibration, CameraModel
+from denseface.capture.frame import RgbdFrame
 from denseface.recon.detail.detail import add_detail
-from denseface.recon.detection._kernels import depths_in_box, middle_depths
-from denseface.recon.detection._relief import bulge_mm
-from denseface.recon.detection.detect import detect_face
+from denseface.recon.detection import detect_face, judge_box
 from denseface.recon.errors import NoFaceError
 from denseface.recon.numerics.malloc import keep_freed_memory
 from denseface.recon.propagation.densify import densify
-from denseface.recon.registration.registration import look_up, register
+from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation.segment import segment_face
 from denseface.recon.settings import Settings
 from denseface.recon.surface.rbf import fit_surface
@@ -42,17 +41,13 @@ def warm() -> None:
     registered = register(frame)
     with suppress(NoFaceError):  # not even OpenCV sees one
         detect_face(frame.color, registered, _FOCAL_PX)
-    left, top, width, height = map(float, _BOX)
-    depths = depths_in_box(registered.pixels, registered.color_depth, registered.visible,
-                           left, top, width, height)
-    middle_depths(depths, 0.5)
-    bulge_mm(depths, _NEAREST_MM)
+    judge_box(_BOX, registered, _FOCAL_PX)
     seeds = segment_face(registered, _BOX, _FOCAL_PX)
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     fit = fit_surface(seeds.points, settings.r0_factor * spacing, settings.smoothing)
-    looked_up = partial(look_up, frame, registered)
-    surface = add_detail(fit, seeds.points, spacing, spacing, symmetry=True, look_up=looked_up)
-    densify(seeds, surface, spacing, settings.ratio, 1.0, looked_up)
+    sampler = partial(sample_colors, frame, registered)
+    surface = add_detail(fit, seeds.points, spacing, spacing, symmetry=True, sampler=sampler)
+    densify(seeds, surface, spacing, settings.ratio, 1.0, sampler)
 
 
 def _ball() -> RgbdFrame:

@@ -6,7 +6,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from denseface.capture._chosen import ChosenCalibration
+from denseface.capture._calibration_choice import ChosenCalibration
 from denseface.capture.errors import FrameError, SensorError
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.openni2._calibration import calibration_of

@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 from typing import TypeGuard
 
-from denseface.capture.frame import Calibration, CameraModel, DepthToColor
+from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
 
 __all__ = ["SensorProperties", "calibration_of"]
 

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 
-from denseface.capture._chosen import ChosenCalibration
+from denseface.capture._calibration_choice import ChosenCalibration
 from denseface.capture.errors import SensorError, SensorTimeoutError
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.openni2._base import OpenNI2Source

@@ -4,9 +4,10 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from denseface.capture._chosen import ChosenCalibration
+from denseface.capture._calibration_choice import ChosenCalibration
+from denseface.capture.calibration import MAX_SIDE
 from denseface.capture.errors import SensorError, UnreadableSourceError
-from denseface.capture.frame import MAX_SIDE, RgbdFrame
+from denseface.capture.frame import RgbdFrame
 from denseface.capture.openni2._base import OpenNI2Source
 from denseface.capture.openni2._library import load, open_sources, reason
 from denseface.capture.openni2._oni_file import DEPTH_NODE, IMAGE_NODE, OniNode, check_oni

@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.capture.calibration import MAX_SIDE
 from denseface.capture.errors import SensorError
-from denseface.capture.frame import MAX_SIDE
 from denseface.capture.openni2._calibration import SensorProperties
 from denseface.capture.openni2._library import close_handle, reason
 

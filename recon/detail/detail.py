@@ -21,7 +21,7 @@ from denseface.recon.numerics.local_means import blurred, enlarged, local_means
 from denseface.recon.numerics.percentile import percentile
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, read_between, share_out
 from denseface.recon.propagation._image_kernels import add_between
-from denseface.recon.registration.registration import ColorSampler
+from denseface.recon.registration import ColorSampler
 from denseface.recon.surface._sheet_kernels import face_field, lay_under, shares, slopes
 from denseface.recon.surface.rbf import Surface
 from denseface.recon.surface.support import Support
@@ -80,7 +80,7 @@ class DetailedSurface:
 
 def add_detail(
     base: Surface, points: NDArray[np.float32], spacing: float, radius: float, *,
-    symmetry: bool = False, look_up: ColorSampler | None = None,
+    symmetry: bool = False, sampler: ColorSampler | None = None,
 ) -> DetailedSurface:
     """Add to a broad fit what its seeds show besides.
 
@@ -91,7 +91,7 @@ def add_detail(
     spacing : mean spacing of the points, mm
     radius : of the average (standard deviation), mm
     symmetry : let each side of the face be helped by the other's mirror image
-    look_up : tells points' colours, of whose shading more detail is taken; None: of depth alone
+    sampler : tells points' colours, of whose shading more detail is taken; None: of depth alone
     """
     supported = Support.of(points, spacing)
     xs, ys, step, support = supported.xs, supported.ys, supported.step, supported.inside
@@ -130,12 +130,12 @@ def add_detail(
     if plane is not None:
         more = helped_by_mirror(field, kept, filled[some], hole[some], plane, noise, _WINDOW_MM,
                                 origin, spacing)
-    if look_up is not None:
+    if sampler is not None:
         surface = heights[some] + detail[some] + filled[some] + more
         across, down = np.empty_like(surface), np.empty_like(surface)
         slopes(surface, spacing, across, down)
         more += shading_detail(
-            surface, shown * rim.within, (across, down), (xs[::2], ys[::2]), look_up)
+            surface, shown * rim.within, (across, down), (xs[::2], ys[::2]), sampler)
     add_between(detail, more, *between)
 
     smaller = halved(heights)

@@ -25,7 +25,7 @@ from denseface.recon.detail._shading_kernels import (
 )
 from denseface.recon.numerics._local_mean_kernels import divided
 from denseface.recon.numerics.local_means import blurred, enlarged, local_means
-from denseface.recon.registration.registration import ColorSampler
+from denseface.recon.registration import ColorSampler
 
 __all__ = ["shading_detail", "shape_from_shading"]
 
@@ -60,7 +60,7 @@ _STEPS = 3
 
 def shading_detail(
     heights: Image, weight: Image, slopes: tuple[Image, Image],
-    places: tuple[NDArray[np.float64], NDArray[np.float64]], look_up: ColorSampler,
+    places: tuple[NDArray[np.float64], NDArray[np.float64]], sampler: ColorSampler,
 ) -> Image:
     """Find what is to be added to a surface for its shading to be that of the image.
 
@@ -70,7 +70,7 @@ def shading_detail(
     weight : (rows, columns) float32, 0-1, how much a place counts
     slopes : dz/dx, dz/dy, (rows, columns) float32
     places : x of the columns, y of the rows, mm
-    look_up : tells points' colours
+    sampler : tells points' colours
 
     Returns
     -------
@@ -80,7 +80,7 @@ def shading_detail(
     if not len(points):
         return np.zeros_like(heights)
     weight = weight.copy()
-    brightness = brightness_of(*look_up(points), _LINEAR, _FULL, weight)
+    brightness = brightness_of(*sampler(points), _LINEAR, _FULL, weight)
     return shape_from_shading(brightness, weight, slopes, float(places[0][1] - places[0][0]))
 
 

@@ -14,7 +14,7 @@ from denseface.recon.numerics.push_pull import average_neighbors
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, places
 from denseface.recon.propagation._image_kernels import collect, unset
 from denseface.recon.propagation.uncertainty import sources_of_error, standard_error
-from denseface.recon.registration.registration import ColorSampler
+from denseface.recon.registration import ColorSampler
 from denseface.recon.segmentation.segment import Seeds
 from denseface.recon.surface.rbf import Surface
 from denseface.recon.surface.support import Support
@@ -43,7 +43,7 @@ def densify(
     spacing: float,
     ratio: float,
     share: float,
-    look_up: ColorSampler | None = None,
+    sampler: ColorSampler | None = None,
 ) -> DenseCloud:
     """Sample the surface on a regular grid, `ratio` points for each seed.
 
@@ -54,7 +54,7 @@ def densify(
     spacing : mean spacing of the seeds, mm
     ratio : dense points for each seed
     share : of the residuals' variance, how much the surface keeps as error: `noise_share`
-    look_up : tells the colours of points in holes; None, and their border's colours fill them
+    sampler : tells the colours of points in holes; None, and their border's colours fill them
     """
     supported, sheet = _sheet(seeds.points, surface, spacing)
     slopes = sheet[1], sheet[2]
@@ -73,11 +73,11 @@ def densify(
     columns, rows = supported.places(xs, ys)
     points, normals, colors, sigma, cells = collect(
         support, xs, ys, sheet, rows, columns, colors, every, sigma, sources.every)
-    if look_up is not None:
+    if sampler is not None:
         near = supported.near_seeds(_HOLE * spacing)
         hole = unset(near, rows, columns, cells)
         if len(hole):
-            own, seen = look_up(points[hole])
+            own, seen = sampler(points[hole])
             colors[hole[seen]] = own[seen]
     return DenseCloud(
         points=points,

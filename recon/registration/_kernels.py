@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["EMPTY", "look", "project", "project_points", "see"]
+__all__ = ["EMPTY", "project", "project_points", "sample_image", "visible_mask"]
 
 Rays = NDArray[np.float64]
 
@@ -113,7 +113,7 @@ def project_points(
 
 
 @compiled
-def see(
+def visible_mask(
     pixels: NDArray[np.float32], color_depth: NDArray[np.float32], nearest: NDArray[np.float32],
     pitch: float, hidden_mm: float, hidden_share: float, width: int, height: int,
 ) -> NDArray[np.bool_]:
@@ -136,7 +136,7 @@ def see(
 
 
 @compiled
-def look(
+def sample_image(
     pixels: NDArray[np.float32], visible: NDArray[np.bool_], image: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
     """Give the colours of the visible points, bilinear: (H, W, 3), zero for the others."""

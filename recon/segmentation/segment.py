@@ -14,7 +14,7 @@ from denseface.recon.errors import FaceWithoutDepthError
 from denseface.recon.face import Box
 from denseface.recon.numerics.morphology import fill_holes, opened
 from denseface.recon.numerics.percentile import percentile
-from denseface.recon.registration.registration import Registration
+from denseface.recon.registration import Registration
 from denseface.recon.segmentation._kernels import (
     connect,
     cut_beside,

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from denseface.capture import RgbdFrame, open_source
-from denseface.capture.frame import Calibration
+from denseface.capture.calibration import Calibration
 from denseface.capture.npz import save_frame
 
 __all__ = ["CHEAP", "write_small_frame"]

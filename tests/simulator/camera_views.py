@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.capture.frame import CameraModel
+from denseface.capture.calibration import CameraModel
 from tests.simulator.kinect import KinectModel
 from tests.simulator.scene import Light, Scene
 from tests.simulator.world import Hits, World, build_world

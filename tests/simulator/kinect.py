@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from scipy.spatial.transform import Rotation
 
-from denseface.capture.frame import Calibration, CameraModel, DepthToColor
+from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
 
 __all__ = ["KINECT_CALIBRATED", "KINECT_DEFAULT", "KinectModel"]
 

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.capture.frame import CameraModel
+from denseface.capture.calibration import CameraModel
 from tests.simulator.camera_views import DepthView
 from tests.simulator.caster import Caster
 from tests.simulator.labels import Label

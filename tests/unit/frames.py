@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from denseface.capture.frame import Calibration, CameraModel, DepthToColor, RgbdFrame
+from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
+from denseface.capture.frame import RgbdFrame
 
 
 def camera(width: int = 160, height: int = 120, f: float = 150.0, **changes: object) -> CameraModel:

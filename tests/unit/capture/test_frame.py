@@ -1,130 +1,10 @@
-import json
-
-import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from pydantic import ValidationError
 
-from denseface.capture.errors import CalibrationError, FrameError
-from denseface.capture.frame import Calibration, CameraModel, DepthToColor, RgbdFrame
-from tests.unit.frames import calibration, camera, cameras, frame, poses
-
-
-@settings(deadline=None)
-@given(cam=cameras(), z=st.floats(300, 4000), seed=st.integers(0, 999))
-def test_projection_undoes_back_projection(cam, z, seed):
-    rng = np.random.default_rng(seed)
-    pixels = rng.uniform((0, 0), (cam.width - 1, cam.height - 1), (50, 2))
-    points = cam.back_project(pixels, z)
-    np.testing.assert_allclose(points[:, 2], z)
-    np.testing.assert_allclose(cam.project(points), pixels, atol=1e-6)
-
-
-@settings(deadline=None)
-@given(cam=cameras(), seed=st.integers(0, 999))
-def test_projection_is_that_of_opencv(cam, seed):
-    rng = np.random.default_rng(seed)
-    points = rng.uniform((-300, -200, 500), (300, 200, 2000), (20, 3))
-    K = np.array([[cam.fx, 0, cam.cx], [0, cam.fy, cam.cy], [0, 0, 1]])
-    expected, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), K, np.array(cam.distortion))
-    np.testing.assert_allclose(cam.project(points), expected[:, 0], atol=1e-6)
-
-
-def test_back_projection_is_equation_1():
-    cam = camera(fx=150.0, fy=140.0, cx=80.0, cy=60.0)
-    x, y, z = cam.back_project(np.array([110.0, 88.0]), 700.0)
-    assert (x / (110 - 80), y / (88 - 60)) == pytest.approx((z / 150, z / 140))
-
-
-def test_rays_are_every_pixels_own():
-    cam = camera(distortion=(0.1, -0.05, 0.001, -0.002, 0.01))
-    rays = cam.rays()
-    assert rays.shape == (120, 160, 2)
-    assert not rays.flags.writeable
-    np.testing.assert_allclose(
-        cam.project(np.array([*rays[7, 130], 1.0])), (130, 7), atol=1e-8)
-
-
-@settings(deadline=None)
-@given(cam=cameras(), factor=st.sampled_from([0.5, 2.0, 3.0]))
-def test_scaled_camera_sees_the_same_rays(cam, factor):
-    point = np.array([[30.0, -20.0, 900.0]])
-    expected = (cam.project(point) + 0.5) * factor - 0.5
-    np.testing.assert_allclose(cam.scaled(factor).project(point), expected, atol=1e-6)
-
-
-@settings(deadline=None)
-@given(depth=cameras(), color=cameras(), pose=poses())
-def test_calibration_json_round_trip(depth, color, pose):
-    calib = Calibration(depth=depth, color=color, depth_to_color=pose)
-    assert Calibration.from_json(calib.to_json()) == calib
-
-
-def test_calibration_json_is_the_documented_one():
-    loaded = json.loads(calibration().to_json())
-    assert set(loaded) == {"depth", "color", "depth_to_color"}
-    assert set(loaded["depth"]) == {"width", "height", "fx", "fy", "cx", "cy", "distortion"}
-    assert set(loaded["depth_to_color"]) == {"rotation", "translation_mm"}
-
-
-def test_transform_is_rotation_then_translation():
-    quarter = DepthToColor(rotation=((0, -1, 0), (1, 0, 0), (0, 0, 1)), translation_mm=(1, 2, 3))
-    np.testing.assert_allclose(quarter.apply(np.array([10.0, 0, 0])), (1, 12, 3))
-
-
-def _broken(path: str, value: object) -> str:
-    loaded = json.loads(calibration().to_json())
-    *parents, last = path.split(".")
-    place = loaded
-    for key in parents:
-        place = place[key]
-    place[last] = value
-    return json.dumps(loaded)
-
-
-@pytest.mark.parametrize(("path", "value"), [
-    ("depth.fx", 0), ("depth.fx", -1.0), ("color.width", 0), ("color.height", 10**9),
-    ("depth.cx", "left"), ("depth.distortion", [0, 0]), ("depth.lens", 1),
-    ("depth_to_color.rotation", [[1, 0, 0], [0, 1, 0], [0, 0, -1]]),
-    ("depth_to_color.rotation", [[2, 0, 0], [0, 1, 0], [0, 0, 1]]),
-    ("depth_to_color.translation_mm", [0, 0]),
-])
-def test_bad_calibration_is_named_in_one_line(path, value):
-    with pytest.raises(CalibrationError) as caught:
-        Calibration.from_json(_broken(path, value), name="x.calibration.json")
-    assert str(caught.value).startswith(f"x.calibration.json: {path}")
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("text", ["", "{", "[]", "null", "NaN", b"\xff\xfe"])
-def test_bad_json_is_a_calibration_error(text):
-    with pytest.raises(CalibrationError, match=r"x\.json"):
-        Calibration.from_json(text, name="x.json")
-
-
-def test_missing_calibration_file(tmp_path):
-    with pytest.raises(CalibrationError, match=r"nowhere\.json: No such file"):
-        Calibration.from_file(tmp_path / "nowhere.json")
-
-
-@pytest.mark.parametrize("bad", [{"fx": float("nan")}, {"cy": float("inf")}, {"width": 2.5}])
-def test_camera_refuses_what_is_no_number(bad):
-    with pytest.raises(ValidationError):
-        camera(**bad)
-
-
-def test_a_distortion_that_folds_the_image_is_refused():
-    with pytest.raises(ValidationError, match="cannot be inverted"):
-        camera(distortion=(-2.0, 0, 0, 0, 0))
-
-
-def test_models_are_frozen():
-    with pytest.raises(ValidationError):
-        camera().fx = 1.0
-    assert isinstance(hash(camera()), int)
-
+from denseface.capture.calibration import DepthToColor
+from denseface.capture.errors import FrameError
+from denseface.capture.frame import RgbdFrame
+from tests.unit.frames import calibration, camera, frame
 
 DEPTH, COLOR = np.zeros((120, 160), np.uint16), np.zeros((120, 160, 3), np.uint8)
 
@@ -160,10 +40,3 @@ def test_frame_under_another_calibration():
     other = calibration(depth=camera(f=170.0))
     changed = frame(DEPTH, COLOR).with_calibration(other, "argument a.json")
     assert (changed.calibration, changed.calibration_origin) == (other, "argument a.json")
-
-
-def test_camera_model_refuses_wrong_shapes():
-    with pytest.raises(ValueError, match="points"):
-        camera().project(np.zeros((3, 2)))
-    with pytest.raises(ValueError, match="pixels"):
-        CameraModel.back_project(camera(), np.zeros((3, 3)), 1.0)

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays_of
 
 from denseface.capture import open_source
+from denseface.capture.calibration import Calibration
 from denseface.capture.errors import CalibrationError, FrameError, UnreadableSourceError
-from denseface.capture.frame import Calibration, RgbdFrame
+from denseface.capture.frame import RgbdFrame
 from denseface.capture.npz import load_frame, save_frame
 from tests.unit import frames
 

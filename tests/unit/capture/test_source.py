@@ -66,7 +66,7 @@ def test_missing_files_and_folders(tmp_path, kind):
 
 
 def test_importing_capture_is_light():
-    code = ("import sys, capture; "
+    code = ("import sys, denseface.capture; "
             "print([m for m in ('primesense', 'cv2', 'open3d', 'scipy') if m in sys.modules])")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

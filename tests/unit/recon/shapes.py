@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.capture.frame import DepthToColor
-from denseface.recon.registration.registration import Registration, register
+from denseface.capture.calibration import DepthToColor
+from denseface.recon.registration import Registration, register
 from denseface.recon.segmentation.segment import Seeds
 from tests.unit.frames import calibration, camera, frame
 

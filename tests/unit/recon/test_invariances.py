@@ -9,12 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from denseface.capture.frame import CameraModel, DepthToColor, RgbdFrame
+from denseface.capture.calibration import CameraModel, DepthToColor
+from denseface.capture.frame import RgbdFrame
 from denseface.recon import Settings
 from denseface.recon.face import DenseCloud
 from denseface.recon.pipeline import surface_of
 from denseface.recon.propagation.densify import densify
-from denseface.recon.registration.registration import look_up, register
+from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation.segment import Seeds
 from denseface.recon.settings import Neighbors
 from denseface.recon.surface.spacing import exact_spacing, mean_spacing
@@ -123,8 +124,8 @@ def test_a_sensor_on_its_side_registers_the_same_points(shot):
 def test_looking_up_is_the_same_on_its_side(shot, face):
     aside = turned_frame(shot.frame)
     points = face.dense.points[::7]
-    straight, seen = look_up(shot.frame, register(shot.frame), points)
-    colors, seen_aside = look_up(aside, register(aside), turned(points, 90.0))
+    straight, seen = sample_colors(shot.frame, register(shot.frame), points)
+    colors, seen_aside = sample_colors(aside, register(aside), turned(points, 90.0))
     assert (seen != seen_aside).mean() < 0.01
     assert np.abs(colors[seen].astype(int) - straight[seen]).mean() < 0.2
 

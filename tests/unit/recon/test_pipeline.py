@@ -21,7 +21,7 @@ from denseface.recon import (
     reconstruct,
 )
 from denseface.recon.pipeline import surface_of
-from denseface.recon.registration.registration import look_up, register
+from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation.segment import segment_face
 from denseface.recon.settings import Neighbors
 from denseface.recon.surface.spacing import mean_spacing
@@ -350,6 +350,6 @@ def test_without_colour_the_face_is_that_of_depth(shot):
         seeds = segment_face(tied, box, frame.calibration.color.fx)
         spacing = mean_spacing(seeds.points, seeds.pixels, Neighbors.LATTICE)
         surface = surface_of(seeds.points, spacing, Settings(shading=shading),
-                             partial(look_up, frame, tied))
+                             partial(sample_colors, frame, tied))
         heights.append(surface.sheet[0])
     assert np.abs(heights[0] - heights[1]).mean() < 0.02

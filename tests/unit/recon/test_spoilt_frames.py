@@ -9,7 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from denseface.capture.frame import CameraModel, DepthToColor, RgbdFrame
+from denseface.capture.calibration import CameraModel, DepthToColor
+from denseface.capture.frame import RgbdFrame
 from denseface.recon import ReconstructionError, Settings, reconstruct
 from tests.unit.frames import resampled
 

@@ -120,13 +120,13 @@ def image_of(brightness, seen=None, spoilt=None):
         values[spoilt] = 255
     seen = np.ones(X.shape, np.bool_) if seen is None else seen
 
-    def look_up(points):
+    def sampler(points):
         columns, rows = (np.rint((points[:, axis] - XS[0]) / STEP).astype(int) for axis in (0, 1))
         colors = np.repeat(values[rows, columns][:, None], 3, axis=1)
         colors[~seen[rows, columns]] = 0
         return colors, seen[rows, columns]
 
-    return look_up
+    return sampler
 
 
 def test_a_colour_image_tells_as_much_as_its_brightness():
@@ -140,10 +140,10 @@ def test_a_colour_image_tells_as_much_as_its_brightness():
 def test_what_is_hidden_or_saturated_does_not_count(how):
     brightness = lit(WITH_BUMP, LIGHTS[0])
     place = np.hypot(X + 20, Y - 5) < 8
-    look_up = (image_of(brightness, seen=~place) if how == "seen"
+    sampler = (image_of(brightness, seen=~place) if how == "seen"
                else image_of(brightness, spoilt=place))
     added, other = (shading_detail(BALL.astype(np.float32), weight, slopes(BALL), (XS, XS), image)
-                    for weight, image in ((EVERYWHERE, look_up),
+                    for weight, image in ((EVERYWHERE, sampler),
                                           ((EVERYWHERE * ~place), image_of(brightness))))
     np.testing.assert_array_equal(added, other)
 

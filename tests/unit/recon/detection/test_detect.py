@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from denseface.capture.frame import DepthToColor
-from denseface.recon.detection.detect import FACE_WIDTH_MM, detect_face
+from denseface.capture.calibration import DepthToColor
+from denseface.recon.detection import FACE_WIDTH_MM, detect_face
 from denseface.recon.errors import FaceWithoutDepthError, NoDepthError, NoFaceError
-from denseface.recon.registration.registration import register
+from denseface.recon.registration import register
 from tests.simulator import Light, Person, Scene, simulate
 from tests.unit.frames import calibration
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from denseface.recon.detection._regions import CELLS, regions_by_depth, without_flat
-from denseface.recon.registration.registration import register
+from denseface.recon.registration import register
 from tests.unit.frames import calibration, camera, frame
 
 SIZE = 480, 640

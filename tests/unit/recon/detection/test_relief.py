@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from denseface.recon.detection._kernels import depths_in_box
 from denseface.recon.detection._relief import bulge_mm
-from denseface.recon.registration.registration import register
+from denseface.recon.registration import register
 from tests.unit.frames import calibration, camera, frame
 
 BOX = (60, 40, 40, 40)

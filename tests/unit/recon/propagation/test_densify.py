@@ -125,11 +125,11 @@ def test_points_in_a_hole_are_coloured_by_what_is_seen_there():
     surface = fit_surface(points, 8 * spacing, 0.1)
     asked = []
 
-    def look_up(some):
+    def sampler(some):
         asked.append(some)
         return np.full((len(some), 3), (10, 20, 30), np.uint8), some[:, 0] > 0
 
-    dense = densify(seeds(points), surface, spacing, 10, 0.5, look_up)
+    dense = densify(seeds(points), surface, spacing, 10, 0.5, sampler)
     far, _ = cKDTree(points[:, :2]).query(dense.points[:, :2])
     inside = far > 2 * spacing
     assert len(asked[0]) >= inside.sum() > 100

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from denseface.capture.frame import Calibration, DepthToColor
+from denseface.capture.calibration import Calibration, DepthToColor
 from denseface.recon.errors import NoDepthError
-from denseface.recon.registration.registration import look_up, register
+from denseface.recon.registration import register, sample_colors
 from tests.unit.frames import calibration, camera, cameras, frame, poses
 
 NEAR, FAR = 600, 1200
@@ -117,7 +117,7 @@ def test_points_are_looked_up_as_if_they_had_been_measured():
     depth, color = two_planes()
     shot = frame(depth, color)
     registered = register(shot)
-    colors, seen = look_up(shot, registered, registered.points.reshape(-1, 3))
+    colors, seen = sample_colors(shot, registered, registered.points.reshape(-1, 3))
     np.testing.assert_array_equal(seen, registered.visible.ravel())
     np.testing.assert_array_equal(colors[seen], registered.colors[registered.visible])
     assert colors.dtype == np.uint8
@@ -129,5 +129,5 @@ def test_what_lies_outside_or_behind_is_not_seen():
     behind = shot.depth_camera.back_project(np.array([[80.0, 60.0]]), 900.0)
     aside, backward = np.array([[5000.0, 0.0, 700.0]]), np.array([[0.0, 0.0, -700.0]])
     points = np.concatenate([behind, aside, backward]).astype(np.float32)
-    _, seen = look_up(shot, register(shot), points)
+    _, seen = sample_colors(shot, register(shot), points)
     assert not seen.any()

@@ -8,11 +8,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.capture.frame import CameraModel, RgbdFrame
+from denseface.capture.calibration import CameraModel
+from denseface.capture.frame import RgbdFrame
 from denseface.recon.errors import NoDepthError
-from denseface.recon.registration._kernels import EMPTY, look, project, project_points, see
+from denseface.recon.registration._kernels import (
+    EMPTY,
+    project,
+    project_points,
+    sample_image,
+    visible_mask,
+)
 
-__all__ = ["ColorSampler", "Registration", "look_up", "register"]
+__all__ = ["ColorSampler", "Registration", "register", "sample_colors"]
 
 ColorSampler = Callable[[NDArray[np.float32]], tuple[NDArray[np.uint8], NDArray[np.bool_]]]
 """Points, (n, 3) float32, mm, to their colours, (n, 3) uint8, and which are seen, (n,) bool."""
@@ -103,8 +110,9 @@ def register(
     if bottom >= 0:
         part = (slice(max(top - 1, 0), bottom + 2), slice(max(left - 1, 0), right + 2))
         nearest[part] = cv2.erode(nearest[part], np.ones((3, 3), np.uint8))
-    visible = see(pixels, color_depth, nearest, pitch, _HIDDEN_MM, _HIDDEN_SHARE, width, height)
-    seen = look(pixels, visible, _read_only(frame.color)) if colors else np.zeros(
+    visible = visible_mask(pixels, color_depth, nearest, pitch, _HIDDEN_MM, _HIDDEN_SHARE, width,
+                           height)
+    seen = sample_image(pixels, visible, _read_only(frame.color)) if colors else np.zeros(
         (*depth.shape, 3), np.uint8)
     return Registration(
         rows=rows,
@@ -121,7 +129,7 @@ def register(
     )
 
 
-def look_up(
+def sample_colors(
     frame: RgbdFrame, registered: Registration, points: NDArray[np.float32]
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
     """Look any points' colours up in the colour image, as if they had been measured.
@@ -141,9 +149,9 @@ def look_up(
     z = np.empty((1, len(points)), np.float32)
     project_points(np.ascontiguousarray(points)[None], *_pose(frame), pixels, z)
     height, width = frame.color.shape[:2]
-    seen = see(pixels, z, registered.nearest, registered.pitch, _HIDDEN_MM, _HIDDEN_SHARE, width,
-               height)
-    return look(pixels, seen, _read_only(frame.color))[0], seen[0]
+    seen = visible_mask(pixels, z, registered.nearest, registered.pitch, _HIDDEN_MM, _HIDDEN_SHARE,
+                        width, height)
+    return sample_image(pixels, seen, _read_only(frame.color))[0], seen[0]
 
 
 @lru_cache(maxsize=8)

@@ -16,9 +16,9 @@ from denseface.recon.detection._relief import bulge_mm
 from denseface.recon.errors import FaceWithoutDepthError, NoFaceError
 from denseface.recon.face import Box, FaceCandidate
 from denseface.recon.numerics.percentile import percentile
-from denseface.recon.registration.registration import Registration
+from denseface.recon.registration import Registration
 
-__all__ = ["FACE_WIDTH_MM", "Detection", "detect_face"]
+__all__ = ["FACE_WIDTH_MM", "Detection", "detect_face", "judge_box"]
 
 FACE_WIDTH_MM = (110.0, 210.0)
 """How wide a cascade's box around a face is, child to large adult, hair included."""
@@ -256,25 +256,33 @@ class _Search:
         found = look_for_faces(gray, _scaled(part, shrink), look, ordinary * shrink,
                                (sizes[0] * shrink, sizes[1] * shrink), middles)
         narrower = 1 / _PROFILE_WIDER if look.cascade == _PROFILE else 1.0
-        return [self._weigh(_about_middle(_scaled(box, self.to_color), narrower)) for box in found]
+        return [judge_box(_about_middle(_scaled(box, self.to_color), narrower), self.registered,
+                          self.focal_px) for box in found]
 
-    def _weigh(self, box: Box) -> FaceCandidate:
-        """Judge a box by the depth in it."""
-        x, y, w, h = box
-        registered = self.registered
-        depths = depths_in_box(registered.pixels, registered.color_depth, registered.visible,
-                               float(x), float(y), float(w), float(h))
-        z = middle_depths(depths, _MIDDLE)
-        if len(z) < _LEAST_MIDDLE_SHARE * w * h * (_MIDDLE / registered.pitch)**2:
-            return FaceCandidate(box=box, depth_mm=None, width_mm=None, verdict="no depth")
-        depth = percentile(z, 50)
-        width = w * depth / self.focal_px
-        verdict = "face"
-        if not FACE_WIDTH_MM[0] <= width <= FACE_WIDTH_MM[1]:
-            verdict = "not a face's size at its depth"
-        elif bulge_mm(depths, depth) < _LEAST_BULGE_MM:
-            verdict = "flat"
-        return FaceCandidate(box=box, depth_mm=depth, width_mm=width, verdict=verdict)
+
+def judge_box(box: Box, registered: Registration, focal_px: float) -> FaceCandidate:
+    """Judge a detector's box by the depth in it.
+
+    Parameters
+    ----------
+    box : x, y, width, height; pixels of the colour image
+    registered : the depth tied to that image; every k-th pixel is enough
+    focal_px : focal length of the colour camera, pixels
+    """
+    x, y, w, h = box
+    depths = depths_in_box(registered.pixels, registered.color_depth, registered.visible,
+                           float(x), float(y), float(w), float(h))
+    z = middle_depths(depths, _MIDDLE)
+    if len(z) < _LEAST_MIDDLE_SHARE * w * h * (_MIDDLE / registered.pitch)**2:
+        return FaceCandidate(box=box, depth_mm=None, width_mm=None, verdict="no depth")
+    depth = percentile(z, 50)
+    width = w * depth / focal_px
+    verdict = "face"
+    if not FACE_WIDTH_MM[0] <= width <= FACE_WIDTH_MM[1]:
+        verdict = "not a face's size at its depth"
+    elif bulge_mm(depths, depth) < _LEAST_BULGE_MM:
+        verdict = "flat"
+    return FaceCandidate(box=box, depth_mm=depth, width_mm=width, verdict=verdict)
 
 
 def _depth(candidate: FaceCandidate) -> float:

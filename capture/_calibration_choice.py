@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from denseface.capture.frame import Calibration
+from denseface.capture.calibration import Calibration
 
 __all__ = ["ChosenCalibration", "choose_calibration"]
 

@@ -1,0 +1,229 @@
+"""The geometry of a depth + colour sensor: two cameras and their relative pose.
+
+The camera frame is OpenCV's: x right, y down, z forward; lengths in millimetres, image positions
+in pixels with (0, 0) the centre of the top left pixel.
+"""
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from denseface.capture.errors import CalibrationError
+
+__all__ = ["MAX_SIDE", "Calibration", "CameraModel", "DepthToColor"]
+
+MAX_SIDE = 16384
+"""Pixels: no image may be wider or higher."""
+
+_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+_Side = Annotated[int, Field(gt=0, le=MAX_SIDE)]
+_Row = tuple[_Finite, _Finite, _Finite]
+
+_UNDISTORT_ITERATIONS = 20
+_UNDISTORT_TOLERANCE = 1e-12
+_INVERTIBLE_PX = 1e-6
+_ROTATION_TOLERANCE = 1e-4
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class CameraModel(_Model):
+    """A pinhole camera with Brown-Conrady distortion, as in OpenCV."""
+
+    width: _Side
+    """Pixels."""
+    height: _Side
+    """Pixels."""
+    fx: _Positive
+    """Focal length along x, pixels."""
+    fy: _Positive
+    """Focal length along y, pixels."""
+    cx: _Finite
+    """Principal point along x, pixels."""
+    cy: _Finite
+    """Principal point along y, pixels."""
+    distortion: tuple[_Finite, _Finite, _Finite, _Finite, _Finite] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    """(k1, k2, p1, p2, k3), OpenCV's order."""
+
+    def project(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Project points to pixels, distortion included.
+
+        Parameters
+        ----------
+        points : (..., 3) float, mm, this camera's frame; z must be positive for a meaningful pixel
+
+        Returns
+        -------
+        (..., 2) float64, pixels (u, v)
+        """
+        points = np.asarray(points, np.float64)
+        if points.shape[-1:] != (3,):
+            raise ValueError(f"points must have shape (..., 3), got {points.shape}")
+        x, y = self._distort(points[..., 0] / points[..., 2], points[..., 1] / points[..., 2])
+        return np.stack([self.fx * x + self.cx, self.fy * y + self.cy], axis=-1)
+
+    def back_project(
+        self, pixels: NDArray[np.floating], depth_mm: NDArray[Any] | float
+    ) -> NDArray[np.float64]:
+        """Back-project pixels at a depth: x / (u - u0) = y / (v - v0) = z / f, paper Eq. (1).
+
+        Parameters
+        ----------
+        pixels : (..., 2) float, pixels (u, v)
+        depth_mm : (...) float, mm along z
+
+        Returns
+        -------
+        (..., 3) float64, mm, this camera's frame
+        """
+        pixels = np.asarray(pixels, dtype=np.float64)
+        if pixels.shape[-1:] != (2,):
+            raise ValueError(f"pixels must have shape (..., 2), got {pixels.shape}")
+        z = np.broadcast_to(np.asarray(depth_mm, np.float64), pixels.shape[:-1])
+        centered = np.subtract(pixels, (self.cx, self.cy), dtype=np.float64)
+        x, y = self._undistort(centered[..., 0] / self.fx, centered[..., 1] / self.fy)
+        return np.stack([x * z, y * z, z], axis=-1)
+
+    def rays(self) -> NDArray[np.float64]:
+        """Give the point at z = 1 that each pixel's centre sees: (height, width, 2) float64.
+
+        The array is computed once for each camera and is read-only.
+        """
+        return _rays(self)
+
+    def scaled(self, factor: float) -> Self:
+        """Give the same camera at another resolution (pixel centres at whole numbers)."""
+        return self.model_copy(update={
+            "width": round(self.width * factor), "height": round(self.height * factor),
+            "fx": self.fx * factor, "fy": self.fy * factor,
+            "cx": (self.cx + 0.5) * factor - 0.5, "cy": (self.cy + 0.5) * factor - 0.5,
+        })
+
+    def _distort(
+        self, x: NDArray[np.float64], y: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        if not any(self.distortion):
+            return x, y
+        k1, k2, p1, p2, k3 = self.distortion
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        return (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+                y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y)
+
+    def _undistort(
+        self, xd: NDArray[np.float64], yd: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Invert `_distort` by Newton's method."""
+        if not any(self.distortion):
+            return xd, yd
+        k1, k2, p1, p2, k3 = self.distortion
+        x, y = xd, yd
+        for _ in range(_UNDISTORT_ITERATIONS):
+            ex, ey = self._distort(x, y)
+            ex, ey = xd - ex, yd - ey
+            if max(np.abs(ex).max(initial=0), np.abs(ey).max(initial=0)) < _UNDISTORT_TOLERANCE:
+                break
+            r2 = x * x + y * y
+            radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+            growth = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))
+            xx = radial + growth * x * x + 2 * p1 * y + 6 * p2 * x
+            yy = radial + growth * y * y + 6 * p1 * y + 2 * p2 * x
+            xy = growth * x * y + 2 * p1 * x + 2 * p2 * y
+            determinant = xx * yy - xy * xy
+            x = x + (yy * ex - xy * ey) / determinant
+            y = y + (xx * ey - xy * ex) / determinant
+        return x, y
+
+    @model_validator(mode="after")
+    def _invertible(self) -> Self:
+        """Refuse a distortion that folds the image over itself: its pixels have no one ray."""
+        if _folds(self):
+            raise ValueError("distortion cannot be inverted over the whole image")
+        return self
+
+
+@lru_cache(maxsize=32)  # each frame says anew of which cameras it is
+def _folds(camera: CameraModel) -> bool:
+    u, v = np.meshgrid(np.linspace(0, camera.width - 1, 9), np.linspace(0, camera.height - 1, 9))
+    pixels = np.stack([u, v], axis=-1)
+    with np.errstate(all="ignore"):
+        off = np.abs(camera.project(camera.back_project(pixels, 1.0)) - pixels)
+    return not (off < _INVERTIBLE_PX).all()
+
+
+@lru_cache(maxsize=8)
+def _rays(camera: CameraModel) -> NDArray[np.float64]:
+    v, u = np.mgrid[:camera.height, :camera.width]
+    rays = camera.back_project(np.stack([u, v], axis=-1).astype(np.float64), 1.0)[..., :2].copy()
+    rays.setflags(write=False)
+    return rays
+
+
+class DepthToColor(_Model):
+    """The rigid transform X_color = rotation @ X_depth + translation."""
+
+    rotation: tuple[_Row, _Row, _Row] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    translation_mm: _Row = (0, 0, 0)
+
+    @field_validator("rotation")
+    @classmethod
+    def _proper(cls, rows: tuple[_Row, _Row, _Row]) -> tuple[_Row, _Row, _Row]:
+        R = np.array(rows)
+        if (np.abs(R @ R.T - np.eye(3)).max() > _ROTATION_TOLERANCE or np.linalg.det(R) < 0):
+            raise ValueError("must be a proper rotation (orthonormal rows, determinant +1)")
+        return rows
+
+    def apply(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Take (..., 3) points, mm, from the depth camera's frame to the colour camera's."""
+        moved: NDArray[np.float64] = points @ np.array(self.rotation).T + self.translation_mm
+        return moved
+
+
+class Calibration(_Model):
+    """Both cameras of a sensor and where they stand to each other."""
+
+    depth: CameraModel
+    color: CameraModel
+    depth_to_color: DepthToColor = DepthToColor()
+
+    @classmethod
+    def from_json(cls, text: str | bytes, *, name: str = "calibration") -> Self:
+        """Read the JSON of the frame format.
+
+        Raises
+        ------
+        CalibrationError
+            One line that names `name`, the field, and what is wrong with it.
+        """
+        try:
+            return cls.model_validate_json(text)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            where = ".".join(str(part) for part in first["loc"]) or "JSON"
+            raise CalibrationError(f"{name}: {where}: {first['msg']}") from error
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> Self:
+        """Read a `*.calibration.json` file.
+
+        Raises
+        ------
+        CalibrationError
+            Where the file cannot be read or is not a calibration.
+        """
+        try:
+            text = Path(path).read_bytes()
+        except OSError as error:
+            raise CalibrationError(f"{path}: {error.strerror or error}") from error
+        return cls.from_json(text, name=str(path))
+
+    def to_json(self) -> str:
+        """Write the JSON of the frame format."""
+        return self.model_dump_json()
