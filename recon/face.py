@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, FailFast
 
 from denseface.recon.settings import Settings
 
-__all__ = ["Box", "DenseCloud", "Face", "FaceCandidate", "PointCloud", "Report"]
+__all__ = ["Box", "DenseCloud", "Face", "FaceCandidate", "PointCloud", "Report", "Seeds"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +36,23 @@ class PointCloud:
 
     def __len__(self) -> int:
         return len(self.points)
+
+
+@dataclass(frozen=True, eq=False)
+class Seeds:
+    """The measured points of the face, in the order of the depth image's rows.
+
+    Attributes
+    ----------
+    points : (n, 3) float32, mm, depth camera frame
+    colors : (n, 3) uint8, RGB; the neighbours' mean where the colour camera does not see the
+        point, and along the outline where the background mixes in
+    pixels : (n, 2) int32, (row, column) in the depth image
+    """
+
+    points: NDArray[np.float32]
+    colors: NDArray[np.uint8]
+    pixels: NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)

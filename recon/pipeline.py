@@ -16,10 +16,11 @@ from denseface.recon.detail.detail import DetailedSurface, add_detail
 from denseface.recon.detection import detect_face
 from denseface.recon.errors import NoDepthError, TooLittleDepthError
 from denseface.recon.face import Face, PointCloud, Report
+from denseface.recon.intermediate import ColorSampler, Registration
 from denseface.recon.numerics.threads import one_blas_thread
 from denseface.recon.propagation.densify import densify
 from denseface.recon.propagation.uncertainty import noise_share
-from denseface.recon.registration import ColorSampler, Registration, register, sample_colors
+from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation.segment import segment_face, window_of_box
 from denseface.recon.settings import Settings
 from denseface.recon.surface.rbf import MIN_SEEDS, Surface, fit_surface

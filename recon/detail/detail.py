@@ -12,19 +12,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.recon.detail._detail_kernels import face_field, lay_under, shares, slopes
 from denseface.recon.detail.holes import fill_holes
 from denseface.recon.detail.mirror_plane import find_plane
-from denseface.recon.detail.rim import BROADER, Rim, broad_average, halved
+from denseface.recon.detail.rim import BROADER, Rim, broad_average
 from denseface.recon.detail.shading import shading_detail
 from denseface.recon.detail.symmetry import helped_by_mirror
-from denseface.recon.numerics.local_means import blurred, enlarged, local_means
+from denseface.recon.intermediate import ColorSampler
+from denseface.recon.numerics.bilinear import add_resampled
+from denseface.recon.numerics.filters import blurred, downsampled, upsampled
+from denseface.recon.numerics.normalized_convolution import normalized_convolution
 from denseface.recon.numerics.percentile import percentile
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, read_between, share_out
-from denseface.recon.propagation._image_kernels import add_between
-from denseface.recon.registration import ColorSampler
-from denseface.recon.surface._sheet_kernels import face_field, lay_under, shares, slopes
+from denseface.recon.support import Support
 from denseface.recon.surface.rbf import Surface
-from denseface.recon.surface.support import Support
 
 __all__ = ["DetailedSurface", "add_detail"]
 
@@ -74,7 +75,7 @@ class DetailedSurface:
         columns, rows = self.support.places(xs, ys)
         found = np.zeros((3, len(rows), len(columns)), np.float32)
         for one, known in zip(found, self.sheet, strict=True):
-            add_between(one, known, rows, columns)
+            add_resampled(one, known, rows, columns)
         return found[0], found[1], found[2]
 
 
@@ -108,7 +109,8 @@ def add_detail(
     cells = grid.halved().halved()
     counts, sums = cells.sums(rest)
     broad = broad_average(counts, sums, BROADER * radius / (4 * step), 16 * float(usual), rim, 2)
-    lay_under(detail, enlarged(broad, detail.shape), enlarged(rim.nearness, detail.shape), missing)
+    lay_under(detail, upsampled(broad, detail.shape), upsampled(rim.nearness, detail.shape),
+              missing)
     filled, hole = fill_holes(counts, sums, missing, rim, heights, detail, spacing)
     detail *= 1 - hole
 
@@ -124,7 +126,7 @@ def add_detail(
     kept = gain * detail[some]
     between = [(np.arange(side) / 2).astype(np.float32) for side in detail.shape]
     share = np.zeros_like(detail)
-    add_between(share, gain, *between)
+    add_resampled(share, gain, *between)
     detail *= share
     more = np.zeros_like(shown)
     if plane is not None:
@@ -136,12 +138,12 @@ def add_detail(
         slopes(surface, spacing, across, down)
         more += shading_detail(
             surface, shown * rim.within, (across, down), (xs[::2], ys[::2]), sampler)
-    add_between(detail, more, *between)
+    add_resampled(detail, more, *between)
 
-    smaller = halved(heights)
+    smaller = downsampled(heights)
     across, down = np.empty_like(smaller), np.empty_like(smaller)
     slopes(smaller, 2 * step, across, down)
-    detail += enlarged(rim.frayed_depth((across, down), spacing), detail.shape)
+    detail += upsampled(rim.frayed_depth((across, down), spacing), detail.shape)
     detail += filled
     sheet = np.empty((3, *detail.shape), np.float32)
     np.add(heights, detail, out=sheet[0])
@@ -193,8 +195,8 @@ def _gain(
     inner : 0-1, what counts as face
     narrow : where the detail is of narrow averages; where it is so nowhere, all of it tells
     """
-    local, = local_means(inner, _WINDOW_MM / (2 * step), detail * detail)
-    local = enlarged(local, detail.shape)
+    local, = normalized_convolution(inner, _WINDOW_MM / (2 * step), detail * detail)
+    local = upsampled(local, detail.shape)
     seen = local[(inner > 0) & narrow] if narrow.any() else local[inner > 0]
     noise = percentile(seen, _NOISE_PERCENTILE) if seen.size else 0.0
     gain = 1 - np.float32(noise) / np.maximum(local, np.float32(max(noise, 1e-12)))

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.detail._hole_kernels import lay_in, least_bent
-from denseface.recon.detail.rim import Rim, halved
-from denseface.recon.segmentation._kernels import large_parts
+from denseface.recon.detail.rim import Rim
+from denseface.recon.numerics.components import large_components
+from denseface.recon.numerics.filters import downsampled
 
 __all__ = ["fill_holes"]
 
@@ -51,9 +52,10 @@ def fill_holes(
     filled : as `missing`, mm: what is to be added to the heights there, times
     hole : 0-1, how much of a place is filled; both 0 where there is no hole
     """
-    away = halved(rim.away)
+    away = downsampled(rim.away)
     inside = away > 0
-    hole = large_parts((halved(halved(missing)) > _MISSING) & (away > _FROM_RIM), _LEAST_CELLS)
+    hole = large_components(
+        (downsampled(downsampled(missing)) > _MISSING) & (away > _FROM_RIM), _LEAST_CELLS)
     if not hole.any():
         none = np.zeros_like(missing)
         return none, none
@@ -64,7 +66,7 @@ def fill_holes(
     wanted[:, :3] = wanted[:, -3:] = 0
     _, *found, _ = cv2.connectedComponentsWithStats(wanted)
     parts, boxes = (np.asarray(one, np.int32) for one in found)
-    added = halved(halved(detail))
-    least_bent(counts, sums, halved(halved(heights)), added, parts, boxes, inside,
+    added = downsampled(downsampled(detail))
+    least_bent(counts, sums, downsampled(downsampled(heights)), added, parts, boxes, inside,
                _SMOOTHING / _CELL**2, _CELL * spacing)
     return lay_in(added, parts, missing)

@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.numerics.local_means import blurred
+from denseface.recon.numerics.filters import blurred, downsampled
 
-__all__ = ["BROADER", "Rim", "broad_average", "halved"]
+__all__ = ["BROADER", "Rim", "broad_average"]
 
 Image = NDArray[np.float32]
 
@@ -66,8 +66,8 @@ class Rim:
         """
         away = cv2.distanceTransform(support.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
         away = (away - np.float32(0.5)) * np.float32(step)
-        return cls(blurred(halved(support.astype(np.float32)), _AROUND / (2 * step)),
-                   halved(away))
+        return cls(blurred(downsampled(support.astype(np.float32)), _AROUND / (2 * step)),
+                   downsampled(away))
 
     @property
     def nearness(self) -> Image:
@@ -144,14 +144,6 @@ def _blur_matrix(side: int, sigma: float) -> Image:
     steps = np.arange(side)
     taps = np.exp(steps**2 / (-2 * sigma * sigma)) / (math.sqrt(2 * math.pi) * sigma)
     return taps.astype(np.float32)[np.abs(np.subtract.outer(steps, steps))]
-
-
-def halved(image: Image) -> Image:
-    """The mean of every four pixels; beyond the edge it goes on."""
-    rows, columns = image.shape
-    even = cv2.copyMakeBorder(image, 0, rows % 2, 0, columns % 2, cv2.BORDER_REPLICATE)
-    return np.asarray(cv2.resize(even, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA),
-                      np.float32)
 
 
 def _falling(values: Image, one: float, none: float) -> Image:

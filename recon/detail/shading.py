@@ -23,9 +23,9 @@ from denseface.recon.detail._shading_kernels import (
     weigh,
     weighted_points,
 )
-from denseface.recon.numerics._local_mean_kernels import divided
-from denseface.recon.numerics.local_means import blurred, enlarged, local_means
-from denseface.recon.registration import ColorSampler
+from denseface.recon.intermediate import ColorSampler
+from denseface.recon.numerics.filters import blurred, upsampled
+from denseface.recon.numerics.normalized_convolution import normalized, normalized_convolution
 
 __all__ = ["shading_detail", "shape_from_shading"]
 
@@ -106,17 +106,17 @@ def shape_from_shading(
     (rows, columns) float32, mm along z; zero where there is too little to find the light
     """
     across, down = slopes
-    brightness, = divided(blurred(only_seen(brightness, weight), _AVERAGED))
+    brightness, = normalized(blurred(only_seen(brightness, weight), _AVERAGED))
     light, median = find_light(*lit_places(brightness, weight, across, down, _SPARSE))
     if median <= 0:
         return np.zeros(weight.shape, np.float32)
     residuals, right, lower = (np.empty(weight.shape, np.float32) for _ in range(3))
     shade_residuals(brightness, across, down, light, _LEAST * median, residuals, right, lower)
     skin = ((weight > 0) & (np.abs(residuals) < np.float32(_NOT_SKIN))).astype(np.float32)
-    slow, = local_means(skin, _SLOW_MM / (2 * step), residuals)
-    residuals -= enlarged(slow, residuals.shape)
-    energy, = local_means(skin, _AROUND_MM / (2 * step), residuals * residuals)
-    weigh(residuals, right, lower, weight * skin, enlarged(energy, residuals.shape), _COLORED,
+    slow, = normalized_convolution(skin, _SLOW_MM / (2 * step), residuals)
+    residuals -= upsampled(slow, residuals.shape)
+    energy, = normalized_convolution(skin, _AROUND_MM / (2 * step), residuals * residuals)
+    weigh(residuals, right, lower, weight * skin, upsampled(energy, residuals.shape), _COLORED,
           _TOLD * step**2, step)
     return _solved(residuals, right, lower, step)
 

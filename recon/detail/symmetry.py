@@ -19,15 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.detail._mirror_kernels import mirror_image
-from denseface.recon.detail.mirror_plane import MirrorPlane
-from denseface.recon.numerics._local_mean_kernels import (
+from denseface.recon.detail._symmetry_kernels import (
     add_mirrored,
-    divided,
     halved_moments,
     halved_peaks,
     parts_kept,
 )
-from denseface.recon.numerics.local_means import blurred, enlarged
+from denseface.recon.detail.mirror_plane import MirrorPlane
+from denseface.recon.numerics.filters import blurred, upsampled
+from denseface.recon.numerics.normalized_convolution import normalized
 
 __all__ = ["helped_by_mirror"]
 
@@ -84,11 +84,11 @@ def helped_by_mirror(
     same = _same(halved_peaks(differences, blurred(differences, _DIFFERENT_MM / step),
                               _DIFFERENT / 2 / v), step)
     parts = parts_kept(blurred(moments, window / (2 * step)), same, v)
-    differs = enlarged(divided(blurred(gaps, _GAP_MM / (2 * step)))[0], hole.shape)
+    differs = upsampled(normalized(blurred(gaps, _GAP_MM / (2 * step)))[0], hole.shape)
     if hole.any():
-        around, = divided(blurred(gaps, _AROUND_HOLE_MM / (2 * step)))
-        differs += hole * (enlarged(around, hole.shape) - differs)
-    return add_mirrored(field, image, kept, hole, enlarged(parts, hole.shape), differs,
+        around, = normalized(blurred(gaps, _AROUND_HOLE_MM / (2 * step)))
+        differs += hole * (upsampled(around, hole.shape) - differs)
+    return add_mirrored(field, image, kept, hole, upsampled(parts, hole.shape), differs,
                         _BROAD * v, _LEAST)
 
 

@@ -15,8 +15,8 @@ from denseface.recon.detection._regions import CELLS, Region, regions_by_depth, 
 from denseface.recon.detection._relief import bulge_mm
 from denseface.recon.errors import FaceWithoutDepthError, NoFaceError
 from denseface.recon.face import Box, FaceCandidate
+from denseface.recon.intermediate import Registration
 from denseface.recon.numerics.percentile import percentile
-from denseface.recon.registration import Registration
 
 __all__ = ["FACE_WIDTH_MM", "Detection", "detect_face", "judge_box"]
 

@@ -10,7 +10,7 @@ from denseface.recon.detection._kernels import fill_layers, nearest_in_cells
 from denseface.recon.detection._relief_kernels import curved_cells
 from denseface.recon.errors import NoDepthError
 from denseface.recon.face import Box
-from denseface.recon.registration import Registration
+from denseface.recon.intermediate import Registration
 
 __all__ = ["CELLS", "Region", "regions_by_depth", "without_flat"]
 

@@ -1,4 +1,4 @@
-"""Binary images: discs, holes, openings; what an image holds where one is set. Taps of a blur."""
+"""Binary images: discs, holes, openings; what an image holds where one is set."""
 
 from typing import TypeVar
 
@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["at_pixels", "disc", "fill_holes", "gaussian", "opened"]
+__all__ = ["at_pixels", "disc", "fill_holes", "opened"]
 
 _Kind = TypeVar("_Kind", bound=np.generic)
 
@@ -21,12 +21,6 @@ def disc(radius: float) -> NDArray[np.uint8]:
     reach = int(radius)
     steps = np.arange(-reach, reach + 1)
     return (steps[:, None] ** 2 + steps**2 <= radius * radius).astype(np.uint8)
-
-
-def gaussian(sigma: float) -> NDArray[np.float32]:
-    """Give the taps of a Gaussian of that standard deviation, pixels, to thrice it each way."""
-    size = 2 * max(1, round(3 * sigma)) + 1
-    return np.asarray(cv2.getGaussianKernel(size, sigma, cv2.CV_32F), np.float32).ravel()
 
 
 def fill_holes(image: NDArray[np.uint8]) -> NDArray[np.uint8]:

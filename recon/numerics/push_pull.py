@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.numerics._push_pull_kernels import average, planes, scatter
-from denseface.recon.numerics.morphology import gaussian
+from denseface.recon.numerics.filters import gaussian_taps
 
 __all__ = ["average_missing", "average_neighbors"]
 
@@ -41,7 +41,7 @@ def average_neighbors(
         raise ValueError("colors must not be empty")
     sums = scatter(colors, np.ascontiguousarray(places, np.float32), *wanted.shape)
     image = np.zeros((*wanted.shape, 3), np.uint8)
-    average(sums, wanted, gaussian(radius), _LEAST_WEIGHT / spacing**2, image)
+    average(sums, wanted, gaussian_taps(radius), _LEAST_WEIGHT / spacing**2, image)
     return image
 
 
@@ -55,4 +55,4 @@ def average_missing(
     image : (rows, columns, 3) uint8, RGB; changed where `missing`
     known, missing : (rows, columns) bool; at least one is known
     """
-    average(planes(image, known), missing, gaussian(1.0), _LEAST_WEIGHT, image)
+    average(planes(image, known), missing, gaussian_taps(1.0), _LEAST_WEIGHT, image)

@@ -7,107 +7,20 @@ rows, then from row to row.
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.recon.numerics.bilinear import column_positions, read_row
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["above", "add_between", "collect", "unset"]
+__all__ = ["collect", "unset"]
 
 # Indices without a sign spare the compiler's question whether one counts from the end.
 _0, _1, _2, _3 = (np.uint64(k) for k in range(4))
 
 
 @compiled
-def add_between(
-    image: NDArray[np.float32], coarse: NDArray[np.float32], rows: NDArray[np.float32],
-    columns: NDArray[np.float32],
-) -> None:
-    """Add another image, bilinear, to one, (m, k).
-
-    rows, columns : (m,), (k,), places in `coarse`, inside it, rising
-    """
-    left, part = _places(columns, coarse.shape[1])
-    lines, known = np.empty((2, len(columns)), np.float32), -2
-    for i in range(len(rows)):
-        above = min(int(rows[i]), coarse.shape[0] - 2)
-        if above != known:
-            _read_rows(coarse, above, known, left, part, lines)
-            known = above
-        upper, lower, down = lines[above & 1], lines[1 - (above & 1)], rows[i] - np.float32(above)
-        own = image[i]
-        for j in range(len(columns)):
-            own[j] += upper[j] + down * (lower[j] - upper[j])
-
-
-@compiled
-def above(
-    coarse: NDArray[np.float32], rows: NDArray[np.float32], columns: NDArray[np.float32],
-    level: float,
-) -> NDArray[np.bool_]:
-    """Say where an image is above a level between its points, (m, k); places of `add_between`."""
-    left, part = _places(columns, coarse.shape[1])
-    lines, known = np.empty((2, len(columns)), np.float32), -2
-    out = np.empty((len(rows), len(columns)), np.bool_)
-    least = np.float32(level)
-    for i in range(len(rows)):
-        first = min(int(rows[i]), coarse.shape[0] - 2)
-        if first != known:
-            _read_rows(coarse, first, known, left, part, lines)
-            known = first
-        upper, lower, down = lines[first & 1], lines[1 - (first & 1)], rows[i] - np.float32(first)
-        own = out[i]
-        for j in range(len(columns)):
-            own[j] = upper[j] + down * (lower[j] - upper[j]) > least
-    return out
-
-
-@compiled
-def _read_rows(
-    image: NDArray[np.float32], first: int, known: int, left: NDArray[np.uint32],
-    part: NDArray[np.float32], lines: NDArray[np.float32],
-) -> None:
-    """Read a row of an image and the next between its points.
-
-    known : which row and its next were read before
-    lines : (2, k), in which an even row stands first, an odd one last
-    """
-    flat, wide, count = image.ravel(), np.uint64(image.shape[1]), np.uint64(len(left))
-    if first != known + 1:
-        _along(flat, np.uint64(first) * wide, left, part, _1, _0, count, lines[first & 1])
-    _along(flat, np.uint64(first + 1) * wide, left, part, _1, _0, count, lines[1 - (first & 1)])
-
-
-@compiled
-def _places(
-    columns: NDArray[np.float32], width: int
-) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
-    """Give `_along`'s places for columns of an image so wide."""
-    left, part = np.empty(len(columns), np.uint32), np.empty(len(columns), np.float32)
-    for j in range(len(columns)):
-        left[j] = min(int(columns[j]), width - 2)
-        part[j] = columns[j] - np.float32(left[j])
-    return left, part
-
-
-@compiled
-def _along(
-    image: NDArray[np.float32], begin: np.uint64, left: NDArray[np.uint32],
-    part: NDArray[np.float32], channels: np.uint64, first: np.uint64, end: np.uint64,
-    out: NDArray[np.float32],
-) -> None:
-    """Read a row of a flat image between its points; `left` and `part` of each value.
-
-    first, end : the first value that is wanted, and the first behind those
-    """
-    for j in range(first, end):
-        at = begin + left[j]
-        here = image[at]
-        out[j] = here + part[j] * (image[at + channels] - here)
-
-
-@compiled
 def _steps(
     every: int, channels: int, count: int
 ) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
-    """Give `_along`'s places for so many points, of which every so many are known."""
+    """Give `read_row`'s places for so many points, of which every so many are known."""
     left, part = np.empty(channels * count, np.uint32), np.empty(channels * count, np.float32)
     for j in range(count):
         for c in range(channels):
@@ -150,8 +63,8 @@ def collect(
     flat_sheet, flat_sigma, flat_support = sheet.ravel(), sigma.ravel(), support.ravel()
     x, known = xs.astype(np.float32), colors.astype(np.float32).ravel()
     color_left, color_part = _steps(every, 3, columns)
-    left, part = _places(sheet_columns, sheet.shape[2])
-    sigma_left, sigma_part = _places(sheet_columns / np.float32(each), sigma.shape[1])
+    left, part = column_positions(sheet_columns, sheet.shape[2])
+    sigma_left, sigma_part = column_positions(sheet_columns / np.float32(each), sigma.shape[1])
     # What is known of the row above and of the row below.
     c0, c1 = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
     z0, z1 = np.empty(columns, np.float32), np.empty(columns, np.float32)
@@ -171,9 +84,9 @@ def collect(
             c0, c1 = c1, c0
             first, end = _widest(firsts, ends, row, min(row + 2 * every, rows))
             if row == 0:
-                _along(known, _0, color_left, color_part, _3, _3 * first, _3 * end, c0)
-            _along(known, np.uint64(row // every + 1) * color_wide, color_left, color_part, _3,
-                   _3 * first, _3 * end, c1)
+                read_row(known, _0, color_left, color_part, _3, _3 * first, _3 * end, c0)
+            read_row(known, np.uint64(row // every + 1) * color_wide, color_left, color_part, _3,
+                     _3 * first, _3 * end, c1)
         upper = min(int(sheet_rows[row]), sheet.shape[1] - 2)
         if upper != upper_row:
             at, behind = np.uint64(upper) * wide, row + 1
@@ -183,20 +96,20 @@ def collect(
             if upper == upper_row + 1:
                 z0, z1, x0, x1, y0, y1 = z1, z0, x1, x0, y1, y0
             else:
-                _along(flat_sheet, at, left, part, _1, first, end, z0)
-                _along(flat_sheet, at + plane, left, part, _1, first, end, x0)
-                _along(flat_sheet, at + plane + plane, left, part, _1, first, end, y0)
+                read_row(flat_sheet, at, left, part, _1, first, end, z0)
+                read_row(flat_sheet, at + plane, left, part, _1, first, end, x0)
+                read_row(flat_sheet, at + plane + plane, left, part, _1, first, end, y0)
             at += wide
-            _along(flat_sheet, at, left, part, _1, first, end, z1)
-            _along(flat_sheet, at + plane, left, part, _1, first, end, x1)
-            _along(flat_sheet, at + plane + plane, left, part, _1, first, end, y1)
+            read_row(flat_sheet, at, left, part, _1, first, end, z1)
+            read_row(flat_sheet, at + plane, left, part, _1, first, end, x1)
+            read_row(flat_sheet, at + plane + plane, left, part, _1, first, end, y1)
             upper_row = upper
         node = int(sheet_rows[row] / np.float32(each))
         if node != upper_node:
             at = np.uint64(node) * sigma_wide
-            _along(flat_sigma, at, sigma_left, sigma_part, _1, _0, np.uint64(columns), s0)
-            _along(flat_sigma, at + sigma_wide, sigma_left, sigma_part, _1, _0,
-                   np.uint64(columns), s1)
+            read_row(flat_sigma, at, sigma_left, sigma_part, _1, _0, np.uint64(columns), s0)
+            read_row(flat_sigma, at + sigma_wide, sigma_left, sigma_part, _1, _0,
+                     np.uint64(columns), s1)
             upper_node = node
         line = np.uint64(row) * np.uint64(columns)
         first, end = firsts[row], ends[row]

@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.detail.detail import DetailedSurface
-from denseface.recon.face import DenseCloud
+from denseface.recon.face import DenseCloud, Seeds
+from denseface.recon.intermediate import ColorSampler
 from denseface.recon.numerics.push_pull import average_neighbors
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, places
 from denseface.recon.propagation._image_kernels import collect, unset
 from denseface.recon.propagation.uncertainty import sources_of_error, standard_error
-from denseface.recon.registration import ColorSampler
-from denseface.recon.segmentation.segment import Seeds
+from denseface.recon.support import Support
 from denseface.recon.surface.rbf import Surface
-from denseface.recon.surface.support import Support
 
 __all__ = ["densify"]
 

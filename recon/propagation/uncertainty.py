@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.numerics._push_pull_kernels import blur
-from denseface.recon.numerics.morphology import gaussian
+from denseface.recon.numerics.filters import gaussian_taps
 from denseface.recon.propagation._uncertainty_kernels import coarsen
 from denseface.recon.settings import Settings
 
@@ -114,7 +114,7 @@ def sources_of_error(
     planes = coarsen(points, support, heights, *slopes, origin, step, every)
     far = cv2.distanceTransform((planes[..., 2] == 0).astype(np.uint8), cv2.DIST_L2, 5)
     seeds, squares = planes[..., 2].sum(dtype=np.float64), planes[..., 3].sum(dtype=np.float64)
-    covered, slope, count, square = cv2.split(blur(planes, gaussian(_WINDOW / node)))
+    covered, slope, count, square = cv2.split(blur(planes, gaussian_taps(_WINDOW / node)))
     prior = np.float32(_PRIOR * node**2)
     noise = (square + prior * np.float32(squares / max(seeds, 1.0))) / (count + prior)
     hole = noise * np.maximum(np.float32(node) * far - 1, np.float32(0))

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["connect", "cut_beside", "cut_depth", "cut_under", "large_parts", "long_axis",
+__all__ = ["connect", "cut_beside", "cut_depth", "cut_under", "long_axis",
            "nearest_to", "row_medians", "within", "within_reach"]
 
 _EMPTY, _HIDDEN, _WANTED, _FOUND, _BLOCKED = 0, 1, 2, 3, 4
@@ -178,35 +178,6 @@ def connect(
         for column in range(columns):
             found[row, column] = kind[(row + 1) * wide + column + 1] == _FOUND
     return found
-
-
-@compiled
-def large_parts(image: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
-    """Keep the parts, whose pixels touch at sides or corners, of at least so many pixels."""
-    rows, columns = image.shape
-    left = image.copy()
-    kept = np.zeros((rows, columns), np.bool_)
-    part = np.empty(np.count_nonzero(image), np.int64)
-    for row in range(rows):
-        for column in range(columns):
-            if not left[row, column]:
-                continue
-            left[row, column] = False
-            part[0] = row * columns + column
-            done, count = 0, 1
-            while done < count:
-                i, j = part[done] // columns, part[done] % columns
-                done += 1
-                for k in range(max(i - 1, 0), min(i + 2, rows)):
-                    for m in range(max(j - 1, 0), min(j + 2, columns)):
-                        if left[k, m]:
-                            left[k, m] = False
-                            part[count] = k * columns + m
-                            count += 1
-            if count >= least:
-                for k in range(count):
-                    kept[part[k] // columns, part[k] % columns] = True
-    return kept
 
 
 @compiled

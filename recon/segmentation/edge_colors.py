@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.recon.intermediate import Registration
 from denseface.recon.numerics.morphology import at_pixels
 from denseface.recon.numerics.push_pull import average_missing
-from denseface.recon.registration import Registration
 from denseface.recon.segmentation._edge_color_kernels import box_sums, take_out
 
 __all__ = ["seed_colors"]

@@ -4,23 +4,21 @@ What counts as face is forehead to chin and ear to ear. Ears, hair and neck of t
 stay where they touch it; glasses, hands, walls, shoulders and other people may not.
 """
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.errors import FaceWithoutDepthError
-from denseface.recon.face import Box
+from denseface.recon.face import Box, Seeds
+from denseface.recon.intermediate import Registration
+from denseface.recon.numerics.components import large_components
 from denseface.recon.numerics.morphology import fill_holes, opened
 from denseface.recon.numerics.percentile import percentile
-from denseface.recon.registration import Registration
 from denseface.recon.segmentation._kernels import (
     connect,
     cut_beside,
     cut_depth,
     cut_under,
-    large_parts,
     long_axis,
     nearest_to,
     row_medians,
@@ -30,8 +28,7 @@ from denseface.recon.segmentation._kernels import (
 from denseface.recon.segmentation.depth_kmeans import split_depths
 from denseface.recon.segmentation.edge_colors import seed_colors
 
-__all__ = ["Seeds", "cluster_depths", "crop_to_box", "keep_face", "segment_face",
-           "window_of_box"]
+__all__ = ["cluster_depths", "crop_to_box", "keep_face", "segment_face", "window_of_box"]
 
 # The cascades' box ends inside the forehead and near the chin, and sits aside of a turned face:
 # how far a face reaches from its centre, in widths of the box.
@@ -94,23 +91,6 @@ _SPUR_MM = 30.0
 _ISLAND_SHARE = 0.15
 # Around the box, what may hide a part of it and what smooths its outline.
 _WINDOW_MARGIN_PX = 8
-
-
-@dataclass(frozen=True, eq=False)
-class Seeds:
-    """The measured points of the face, in the order of the depth image's rows.
-
-    Attributes
-    ----------
-    points : (n, 3) float32, mm, depth camera frame
-    colors : (n, 3) uint8, RGB; the neighbours' mean where the colour camera does not see the
-        point, and along the outline where the background mixes in
-    pixels : (n, 2) int32, (row, column) in the depth image
-    """
-
-    points: NDArray[np.float32]
-    colors: NDArray[np.uint8]
-    pixels: NDArray[np.int32]
 
 
 def segment_face(registered: Registration, box: Box, focal_px: float) -> Seeds:
@@ -260,7 +240,7 @@ def _frames_of_glasses(
     kernel = np.ones((2 * round(_WIRE_MM * px / 2) + 1,) * 2, np.uint8)
     behind = cv2.dilate(np.where(cluster, z, np.float32(0)), kernel)
     behind = cv2.erode(np.where(behind > 0, behind, np.float32(np.inf)), kernel)
-    wires = large_parts(cluster & (behind - z > _WIRE_STEP_MM), _WIRE_MM2 * px * px)
+    wires = large_components(cluster & (behind - z > _WIRE_STEP_MM), _WIRE_MM2 * px * px)
     if not wires.any():
         return wires
     faint = cluster & (behind - z > _WIRE_FAINT_MM)

@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.capture.calibration import DepthToColor
-from denseface.recon.registration import Registration, register
-from denseface.recon.segmentation.segment import Seeds
+from denseface.recon.face import Seeds
+from denseface.recon.intermediate import Registration
+from denseface.recon.registration import register
 from tests.unit.frames import calibration, camera, frame
 
 FOCAL = 300.0

@@ -12,11 +12,10 @@ from scipy.spatial import cKDTree
 from denseface.capture.calibration import CameraModel, DepthToColor
 from denseface.capture.frame import RgbdFrame
 from denseface.recon import Settings
-from denseface.recon.face import DenseCloud
+from denseface.recon.face import DenseCloud, Seeds
 from denseface.recon.pipeline import surface_of
 from denseface.recon.propagation.densify import densify
 from denseface.recon.registration import register, sample_colors
-from denseface.recon.segmentation.segment import Seeds
 from denseface.recon.settings import Neighbors
 from denseface.recon.surface.spacing import exact_spacing, mean_spacing
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from denseface.recon.propagation._image_kernels import add_between, collect, unset
+from denseface.recon.propagation._image_kernels import collect, unset
 
 
 def places(count):
@@ -57,16 +57,6 @@ def test_what_is_between_the_given_points_is_in_between(every, each, finer, shap
     np.testing.assert_allclose(errors, 2 + 0.3 * y - 0.1 * x, atol=1e-5)
     expected = cells @ (10, 3)
     np.testing.assert_array_equal(colors, np.column_stack([expected, expected, 200 - expected]))
-
-
-def test_what_is_added_is_read_between_its_points():
-    image = np.random.default_rng(0).normal(size=(9, 13)).astype(np.float32)
-    ramp = np.add.outer(0.2 * np.arange(4), 0.05 * np.arange(5)).astype(np.float32)
-    rows, columns = (np.linspace(0, last, count).astype(np.float32)
-                     for last, count in ((3, 9), (4, 13)))
-    expected = image + np.add.outer(0.2 * rows, 0.05 * columns)
-    add_between(image, ramp, rows, columns)
-    np.testing.assert_allclose(image, expected, atol=1e-5)
 
 
 def test_nothing_supported_is_nothing_collected():

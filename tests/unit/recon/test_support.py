@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from denseface.recon.propagation._image_kernels import above
-from denseface.recon.surface.support import Support
+from denseface.recon.numerics.bilinear import exceeds
+from denseface.recon.support import Support
 from tests.unit.recon.shapes import disc_seeds
 
 
@@ -113,7 +113,19 @@ def test_both_grids_agree_and_the_area_is_that_of_the_disc():
     assert area == pytest.approx(np.pi * 40**2, rel=0.05)
     columns, rows = support.places(support.xs, support.ys)
     np.testing.assert_array_equal(
-        support.inside, above(support.margin, rows, columns, 0.0))
+        support.inside, exceeds(support.margin, rows, columns, 0.0))
+
+
+def test_what_is_left_out_is_below_both_levels():
+    rng = np.random.default_rng(2)
+    margin = rng.normal(size=(9, 13)).astype(np.float32)
+    places = rng.random((9, 13)) < 0.5
+    found = Support(np.arange(13.0), np.arange(9.0), 1.0, np.zeros((9, 13), np.uint8), margin,
+                    0.3).without(places).margin
+    np.testing.assert_array_equal(found[~places], margin[~places])
+    level = np.float32(0.3)
+    np.testing.assert_allclose(
+        found[places], np.minimum(level - np.abs(margin[places] - level), 0), atol=1e-6)
 
 
 def test_what_is_left_out_ends_half_way_to_the_next_point():

@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
-from denseface.recon.numerics._local_mean_kernels import (
+from denseface.recon.detail._symmetry_kernels import (
     add_mirrored,
-    divided,
     halved_moments,
     halved_peaks,
-    halved_products,
     parts_kept,
 )
 
@@ -26,24 +24,6 @@ def quarters(image):
     whole = np.zeros((rows, columns))
     whole[:image.shape[0], :image.shape[1]] = image
     return whole.reshape(rows // 2, 2, columns // 2, 2).mean(axis=(1, 3))
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_weights_and_products_are_averaged_over_each_four(rng, shape):
-    weight, one, other = (rng.random(shape).astype(np.float32) for _ in range(3))
-    found = halved_products(weight, (one, other))
-    for plane, expected in enumerate((weight, weight * one, weight * other)):
-        np.testing.assert_allclose(found[..., plane], quarters(expected), rtol=1e-5)
-
-
-def test_a_weight_of_nearly_nothing_is_not_divided_by(rng):
-    planes = rng.random((5, 7, 3)).astype(np.float32)
-    planes[2, 3] = 0
-    found = divided(planes)
-    assert not found[:, 2, 3].any()
-    planes[2, 3, 0] = 1
-    np.testing.assert_allclose(found, np.moveaxis(planes[..., 1:] / planes[..., :1], -1, 0),
-                               rtol=1e-5)
 
 
 @pytest.mark.parametrize("shape", SHAPES)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from denseface.recon.surface._sheet_kernels import face_field, lay_under, left_out, shares, slopes
+from denseface.recon.detail._detail_kernels import face_field, lay_under, shares, slopes
 
 
 def numpys(heights, step):
@@ -33,17 +33,6 @@ def test_the_field_holds_every_second_point(shape):
     expected = np.stack(
         [heights[::2, ::2], facing, inner, detail[::2, ::2] * facing, seeded[::2, ::2]], axis=-1)
     np.testing.assert_allclose(field, expected, atol=1e-5)
-
-
-def test_what_is_left_out_is_below_both_levels():
-    rng = np.random.default_rng(2)
-    margin = rng.normal(size=(9, 13)).astype(np.float32)
-    places = rng.random((9, 13)) < 0.5
-    found = left_out(margin, places, 0.3)
-    np.testing.assert_array_equal(found[~places], margin[~places])
-    level = np.float32(0.3)
-    np.testing.assert_allclose(
-        found[places], np.minimum(level - np.abs(margin[places] - level), 0), atol=1e-6)
 
 
 def test_means_fade_and_what_is_missing_of_the_full_weight_is_told():

@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.numerics.local_means import blurred
+from denseface.recon.numerics.bilinear import exceeds
+from denseface.recon.numerics.filters import blurred
+from denseface.recon.numerics.jit import compiled
 from denseface.recon.numerics.morphology import disc, fill_holes
 from denseface.recon.numerics.scatter import bounds, mark
-from denseface.recon.propagation._image_kernels import above
-from denseface.recon.surface._sheet_kernels import left_out
 
 __all__ = ["Support"]
 
@@ -94,7 +94,7 @@ class Support:
 
     def without(self, places: NDArray[np.bool_]) -> Self:
         """Give the same without some of the grid's points, up to half of the way to the next."""
-        return replace(self, margin=left_out(self.margin, places, self.level))
+        return replace(self, margin=_left_out(self.margin, places, self.level))
 
     def places(
         self, xs: NDArray[np.float64], ys: NDArray[np.float64]
@@ -121,7 +121,7 @@ class Support:
         """
         xs, ys = (_axis(own[0], own[-1], step) for own in (self.xs, self.ys))
         columns, rows = self.places(xs, ys)
-        return xs, ys, above(self.margin, rows, columns, self.level)
+        return xs, ys, exceeds(self.margin, rows, columns, self.level)
 
 
 def _broadly_blurred(image: NDArray[np.uint8], sigma: float) -> NDArray[np.float32]:
@@ -141,3 +141,18 @@ def _broadly_blurred(image: NDArray[np.uint8], sigma: float) -> NDArray[np.float
 def _axis(low: float, high: float, step: float) -> NDArray[np.float64]:
     """Points from the least value to behind the largest, an even number."""
     return low + step * np.arange(2 * (int((high - low) / step) // 2 + 1), dtype=np.float64)
+
+
+
+@compiled
+def _left_out(
+    margin: NDArray[np.float32], places: NDArray[np.bool_], level: float
+) -> NDArray[np.float32]:
+    """Give a support's margin without some places: `Support.without`."""
+    flat, out = margin.ravel(), np.empty(margin.shape, np.float32)
+    some, given, middle = places.ravel(), out.ravel(), np.float32(level)
+    for i in range(np.uint64(len(flat))):
+        value = flat[i]
+        less = min(middle - abs(value - middle), np.float32(0))
+        given[i] = less if some[i] else value
+    return out

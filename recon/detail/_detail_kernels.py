@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["face_field", "lay_under", "left_out", "shares", "slopes"]
+__all__ = ["face_field", "lay_under", "shares", "slopes"]
 
 _1 = np.uint64(1)
 
@@ -98,18 +98,4 @@ def face_field(
             out[i, j, 0], out[i, j, 1] = heights[2 * i, 2 * j], facing
             out[i, j, 2], out[i, j, 3] = inner[i, j], detail[2 * i, 2 * j] * facing
             out[i, j, 4] = seeded[2 * i, 2 * j]
-    return out
-
-
-@compiled
-def left_out(
-    margin: NDArray[np.float32], places: NDArray[np.bool_], level: float
-) -> NDArray[np.float32]:
-    """Give a support's margin without some places: `Support.without`."""
-    flat, out = margin.ravel(), np.empty(margin.shape, np.float32)
-    some, given, middle = places.ravel(), out.ravel(), np.float32(level)
-    for i in range(np.uint64(len(flat))):
-        value = flat[i]
-        less = min(middle - abs(value - middle), np.float32(0))
-        given[i] = less if some[i] else value
     return out

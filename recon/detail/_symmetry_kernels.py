@@ -1,52 +1,15 @@
-"""Sums over each four pixels, and local moments of a face and its mirror image, compiled."""
+"""Local moments of a face and its mirror image, compiled."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["add_mirrored", "divided", "halved_moments", "halved_peaks", "halved_products",
-           "parts_kept"]
+__all__ = ["add_mirrored", "halved_moments", "halved_peaks", "parts_kept"]
 
 Image = NDArray[np.float32]
 
 _LEAST_SHARE = np.float32(1e-6)
-_QUARTER = np.float32(0.25)
-
-
-@compiled
-def halved_products(weight: Image, values: tuple[Image, ...]) -> Image:
-    """Average a weight, and each value times the weight, over each four pixels.
-
-    weight, values : (rows, columns) each; beyond the edge the weight is zero
-
-    Gives (rows, columns, 1 + values), half of the rows and columns, rounded up.
-    """
-    rows, columns = weight.shape
-    out = np.zeros(((rows + 1) // 2, (columns + 1) // 2, 1 + len(values)), np.float32)
-    for i in range(rows):
-        line, given = out[i // 2], weight[i]
-        for j in range(np.uint64(columns)):
-            line[j >> np.uint64(1), 0] += _QUARTER * given[j]
-    for k in range(len(values)):
-        value = values[k]
-        for i in range(rows):
-            line, given, shown = out[i // 2], weight[i], value[i]
-            for j in range(np.uint64(columns)):
-                line[j >> np.uint64(1), k + 1] += _QUARTER * given[j] * shown[j]
-    return out
-
-
-@compiled
-def divided(planes: Image) -> Image:
-    """Divide all planes but the first by it: (rows, columns, 1 + k) to (k, rows, columns)."""
-    rows, columns, count = planes.shape
-    out = np.empty((count - 1, rows, columns), np.float32)
-    for k in range(1, count):
-        for i in range(rows):
-            for j in range(columns):
-                out[k - 1, i, j] = planes[i, j, k] / max(planes[i, j, 0], _LEAST_SHARE)
-    return out
 
 
 @compiled

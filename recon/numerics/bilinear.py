@@ -1,0 +1,102 @@
+"""Images read between their points, on the crossings of some rows and columns, compiled.
+
+Bilinear: along the rows first, once for each row of the image, then from row to row.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from denseface.recon.numerics.jit import compiled
+
+__all__ = ["add_resampled", "column_positions", "exceeds", "read_row"]
+
+# Indices without a sign spare the compiler's question whether one counts from the end.
+_0, _1 = np.uint64(0), np.uint64(1)
+
+
+@compiled
+def add_resampled(
+    image: NDArray[np.float32], coarse: NDArray[np.float32], rows: NDArray[np.float32],
+    columns: NDArray[np.float32],
+) -> None:
+    """Add another image, bilinear, to one, (m, k).
+
+    rows, columns : (m,), (k,), places in `coarse`, inside it, rising
+    """
+    left, part = column_positions(columns, coarse.shape[1])
+    lines, known = np.empty((2, len(columns)), np.float32), -2
+    for i in range(len(rows)):
+        above = min(int(rows[i]), coarse.shape[0] - 2)
+        if above != known:
+            _read_rows(coarse, above, known, left, part, lines)
+            known = above
+        upper, lower, down = lines[above & 1], lines[1 - (above & 1)], rows[i] - np.float32(above)
+        own = image[i]
+        for j in range(len(columns)):
+            own[j] += upper[j] + down * (lower[j] - upper[j])
+
+
+@compiled
+def exceeds(
+    coarse: NDArray[np.float32], rows: NDArray[np.float32], columns: NDArray[np.float32],
+    level: float,
+) -> NDArray[np.bool_]:
+    """Say where an image is above a level between its points, (m, k); places of `add_resampled`."""
+    left, part = column_positions(columns, coarse.shape[1])
+    lines, known = np.empty((2, len(columns)), np.float32), -2
+    out = np.empty((len(rows), len(columns)), np.bool_)
+    least = np.float32(level)
+    for i in range(len(rows)):
+        first = min(int(rows[i]), coarse.shape[0] - 2)
+        if first != known:
+            _read_rows(coarse, first, known, left, part, lines)
+            known = first
+        upper, lower, down = lines[first & 1], lines[1 - (first & 1)], rows[i] - np.float32(first)
+        own = out[i]
+        for j in range(len(columns)):
+            own[j] = upper[j] + down * (lower[j] - upper[j]) > least
+    return out
+
+
+@compiled
+def _read_rows(
+    image: NDArray[np.float32], first: int, known: int, left: NDArray[np.uint32],
+    part: NDArray[np.float32], lines: NDArray[np.float32],
+) -> None:
+    """Read a row of an image and the next between its points.
+
+    known : which row and its next were read before
+    lines : (2, k), in which an even row stands first, an odd one last
+    """
+    flat, wide, count = image.ravel(), np.uint64(image.shape[1]), np.uint64(len(left))
+    if first != known + 1:
+        read_row(flat, np.uint64(first) * wide, left, part, _1, _0, count, lines[first & 1])
+    read_row(flat, np.uint64(first + 1) * wide, left, part, _1, _0, count, lines[1 - (first & 1)])
+
+
+@compiled
+def column_positions(
+    columns: NDArray[np.float32], width: int
+) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+    """Give `read_row`'s places for columns of an image so wide."""
+    left, part = np.empty(len(columns), np.uint32), np.empty(len(columns), np.float32)
+    for j in range(len(columns)):
+        left[j] = min(int(columns[j]), width - 2)
+        part[j] = columns[j] - np.float32(left[j])
+    return left, part
+
+
+@compiled
+def read_row(
+    image: NDArray[np.float32], begin: np.uint64, left: NDArray[np.uint32],
+    part: NDArray[np.float32], channels: np.uint64, first: np.uint64, end: np.uint64,
+    out: NDArray[np.float32],
+) -> None:
+    """Read a row of a flat image between its points; `left` and `part` of each value.
+
+    first, end : the first value that is wanted, and the first behind those
+    """
+    for j in range(first, end):
+        at = begin + left[j]
+        here = image[at]
+        out[j] = here + part[j] * (image[at + channels] - here)
