@@ -19,14 +19,14 @@ import zmq
 from denseface.recon.face import Face
 from denseface.service.client.events import Published, PublishedFace, PublishedPreview, preview_of
 from denseface.service.client.exchanges import (
-    UNCONNECTED_S,
+    SEND_RETRY_S,
+    Exchange,
     Exchanges,
     SendRequest,
     Step,
-    Talk,
-    checked,
     deadline,
     no_answer,
+    raise_if_failed,
 )
 from denseface.service.client.follower import TOPICS, Follower
 from denseface.service.errors import ClientClosedError, ClientTimeoutError, ProtocolError
@@ -37,7 +37,7 @@ from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable, publications_of
 from denseface.service.transport.connection import Credentials, connect
 from denseface.service.transport.sockets import send_parts
-from denseface.service.transport.subscription import LOOK_S, Subscription
+from denseface.service.transport.subscription import CHECK_INTERVAL_S, Subscription
 
 __all__ = ["AsyncClient"]
 
@@ -60,12 +60,12 @@ class AsyncClient:
         check_connectable(self.address)
         self._publications = publications_of(self.address)
         self._keys = Credentials.of(settings)
-        self._talks = Exchanges(settings.resend_s)
-        self._waiting: dict[int, asyncio.Future[Packet]] = {}
+        self._exchanges = Exchanges(settings.resend_s)
+        self._pending: dict[int, asyncio.Future[Packet]] = {}
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._socket, self._knock = connect(self._context, zmq.DEALER, self.address, self._keys)
-        self._watched: asyncio.AbstractEventLoop | None = None
-        self._signs: dict[int, asyncio.Event] = {}
+        self._socket, self._monitor = connect(self._context, zmq.DEALER, self.address, self._keys)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._readable_events: dict[int, asyncio.Event] = {}
         """Wakes who waits for a subscription, by the socket's descriptor."""
 
     async def __aenter__(self) -> Self:
@@ -80,27 +80,27 @@ class AsyncClient:
     def close(self) -> None:
         """Disconnect; harmless when repeated. Ends every iteration and every call under way."""
         self._unwatch()
-        for waiting in self._waiting.values():
+        for waiting in self._pending.values():
             if not waiting.done():
                 waiting.set_exception(
                     ClientClosedError(f"{self.address}: the client was closed"))
-        while self._signs:
-            descriptor, sign = self._signs.popitem()
+        while self._readable_events:
+            descriptor, readable = self._readable_events.popitem()
             asyncio.get_running_loop().remove_reader(descriptor)
-            sign.set()
+            readable.set()
         self._context.destroy(linger=0)
 
     async def press(self, capture_id: str | None = None, *, timeout: float = 15.0) -> str:
         """Take a frame now; see `Client.press`."""
-        return await self._carry_out(self._talks.press(capture_id, timeout))
+        return await self._run(self._exchanges.press(capture_id, timeout))
 
     async def get(self, capture_id: str, *, timeout: float = 60.0) -> Face:
         """Wait for a capture's face; see `Client.get`."""
-        return await self._carry_out(self._talks.get(capture_id, timeout))
+        return await self._run(self._exchanges.get(capture_id, timeout))
 
     async def status(self, *, timeout: float = 5.0) -> Status:
         """Ask who is there and what was done; see `Client.status`."""
-        return await self._carry_out(self._talks.status(timeout))
+        return await self._run(self._exchanges.status(timeout))
 
     async def faces(
         self, *, after: int | None = None, last: int | None = None, since: datetime | None = None,
@@ -116,87 +116,87 @@ class AsyncClient:
         timeout: float | None = None,
     ) -> AsyncIterator[Published]:
         """Follow all outcomes that are kept, in order; see `Client.published`."""
-        follow = Follower(self._talks, after, last, since)
-        with suppress(ClientClosedError), closing(self._ear(*TOPICS)) as ear:
-            await self._carry_out(follow.start(timeout), ear)
+        follower = Follower(self._exchanges, after, last, since)
+        with suppress(ClientClosedError), closing(self._subscribe(*TOPICS)) as subscription:
+            await self._run(follower.start(timeout), subscription)
             while True:
-                yield await self._carry_out(follow.next(timeout), ear)
+                yield await self._run(follower.next(timeout), subscription)
 
     async def previews(self, *, timeout: float | None = None) -> AsyncIterator[PublishedPreview]:
         """Follow what the sensor sees, always the newest; see `Client.previews`."""
-        with suppress(ClientClosedError), closing(self._ear(Topic.PREVIEW)) as ear:
+        with suppress(ClientClosedError), closing(self._subscribe(Topic.PREVIEW)) as subscription:
             while True:
                 until = deadline(timeout)
                 preview = None
                 while preview is None:
-                    await self._wait(ear, until - time.monotonic())
-                    preview = preview_of(ear.newest())
+                    await self._wait(subscription, until - time.monotonic())
+                    preview = preview_of(subscription.receive_latest())
                 yield preview
 
-    def _ear(self, *topics: Topic) -> Subscription:
+    def _subscribe(self, *topics: Topic) -> Subscription:
         self._check_open()
         return Subscription(self._context, self._publications, self._keys, topics)
 
-    async def _carry_out(self, talk: Talk[_T], ear: Subscription | None = None) -> _T:
+    async def _run(self, exchange: Exchange[_T], subscription: Subscription | None = None) -> _T:
         try:
-            step = next(talk)
+            step = next(exchange)
             while True:
                 try:
-                    came = await self._do(step, ear)
+                    came = await self._perform(step, subscription)
                 except ClientTimeoutError as error:
-                    step = talk.throw(error)
+                    step = exchange.throw(error)
                 else:
-                    step = talk.send(came)
+                    step = exchange.send(came)
         except StopIteration as end:
             result: _T = end.value
             return result
         finally:
-            talk.close()
+            exchange.close()
 
-    async def _do(self, step: Step, ear: Subscription | None) -> Packet | None:
+    async def _perform(self, step: Step, subscription: Subscription | None) -> Packet | None:
         if isinstance(step, SendRequest):
-            return await self._ask(step.message, step.timeout, ear)
-        if ear is None:
+            return await self._send_request(step.message, step.timeout, subscription)
+        if subscription is None:
             raise TypeError("there is no subscription to hear")
-        await self._wait(ear, step.timeout)
-        return ear.receive()
+        await self._wait(subscription, step.timeout)
+        return subscription.receive()
 
-    async def _ask(
-        self, message: Request, timeout: float, ear: Subscription | None = None
+    async def _send_request(
+        self, message: Request, timeout: float, subscription: Subscription | None = None
     ) -> Packet:
         """Send until answered, or until it is known that the hub lets us in no more."""
         self._check_open()
         parts = encode(Packet(message))
-        answer = self._waiting[message.request] = asyncio.get_running_loop().create_future()
+        answer = self._pending[message.request] = asyncio.get_running_loop().create_future()
         until = time.monotonic() + timeout
         try:
             while (left := until - time.monotonic()) > 0:
-                self._knock.check()
-                if ear:  # a key revoked meanwhile is cut off there, and not answered here
-                    ear.knock.check()
-                wait = self._resend_s if send_parts(self._socket, parts) else UNCONNECTED_S
+                self._monitor.check()
+                if subscription:  # a key revoked meanwhile is cut off there, and not answered here
+                    subscription.monitor.check()
+                wait = self._resend_s if send_parts(self._socket, parts) else SEND_RETRY_S
                 self._watch()
                 await asyncio.wait([answer], timeout=min(left, wait))
                 if answer.done():
-                    return checked(self.address, answer.result())
+                    return raise_if_failed(self.address, answer.result())
         finally:
-            del self._waiting[message.request]
+            del self._pending[message.request]
             if not answer.cancel() and not answer.cancelled():
                 answer.exception()  # seen, where the call was cancelled meanwhile
-            if not self._waiting:
+            if not self._pending:
                 self._unwatch()
         raise no_answer(self.address, timeout, keys=self._keys is not None)
 
     def _watch(self) -> None:
-        if self._watched is None:
-            self._watched = asyncio.get_running_loop()
-            self._watched.add_reader(self._socket.fileno(), self._take_answers)
+        if self._loop is None:
+            self._loop = asyncio.get_running_loop()
+            self._loop.add_reader(self._socket.fileno(), self._take_answers)
         self._take_answers()  # sending may have used up the descriptor's sign
 
     def _unwatch(self) -> None:
-        if self._watched is not None:
-            self._watched.remove_reader(self._socket.fileno())
-            self._watched = None
+        if self._loop is not None:
+            self._loop.remove_reader(self._socket.fileno())
+            self._loop = None
 
     def _take_answers(self) -> None:
         while True:
@@ -207,7 +207,7 @@ class AsyncClient:
                 return
             except ProtocolError:
                 continue
-            answer = self._waiting.get(getattr(packet.message, "request", 0))
+            answer = self._pending.get(getattr(packet.message, "request", 0))
             if answer is not None and not answer.done():
                 answer.set_result(packet)
 
@@ -215,10 +215,11 @@ class AsyncClient:
         if self._context.closed:
             raise ClientClosedError(f"{self.address}: the client was closed")
 
-    async def _wait(self, ear: Subscription, timeout: float) -> None:
+    async def _wait(self, subscription: Subscription, timeout: float) -> None:
         until = time.monotonic() + timeout
-        while not await self._readable(ear.socket, min(until - time.monotonic(), LOOK_S)):
-            ear.knock.check()
+        while not await self._readable(
+                subscription.socket, min(until - time.monotonic(), CHECK_INTERVAL_S)):
+            subscription.monitor.check()
             if time.monotonic() >= until:
                 raise ClientTimeoutError("nothing was published in the time allowed")
 
@@ -233,13 +234,13 @@ class AsyncClient:
             if left <= 0:
                 return False
             descriptor = socket.fileno()
-            sign = self._signs[descriptor] = asyncio.Event()
-            loop.add_reader(descriptor, sign.set)
+            readable = self._readable_events[descriptor] = asyncio.Event()
+            loop.add_reader(descriptor, readable.set)
             try:
-                await asyncio.wait_for(sign.wait(), left)
+                await asyncio.wait_for(readable.wait(), left)
             except TimeoutError:
                 continue
             finally:
-                if self._signs.pop(descriptor, None):  # else it may be another's by now
+                if self._readable_events.pop(descriptor, None):  # else it may be another's by now
                     loop.remove_reader(descriptor)
         raise ClientClosedError(f"{self.address}: the client was closed")

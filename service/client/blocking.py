@@ -25,14 +25,14 @@ from denseface.service.client.events import (
     preview_of,
 )
 from denseface.service.client.exchanges import (
-    UNCONNECTED_S,
+    SEND_RETRY_S,
+    Exchange,
     Exchanges,
     SendRequest,
     Step,
-    Talk,
-    checked,
     deadline,
     no_answer,
+    raise_if_failed,
 )
 from denseface.service.client.follower import TOPICS, Follower
 from denseface.service.errors import ClientClosedError, ClientTimeoutError, ProtocolError
@@ -44,7 +44,7 @@ from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable, publications_of
 from denseface.service.transport.connection import Credentials, connect
 from denseface.service.transport.sockets import send_parts
-from denseface.service.transport.subscription import LOOK_S, Subscription
+from denseface.service.transport.subscription import CHECK_INTERVAL_S, Subscription
 
 __all__ = ["Client", "Published", "PublishedFace", "PublishedFailure", "PublishedPreview"]
 
@@ -78,9 +78,9 @@ class Client:
         check_connectable(self.address)
         self._publications = publications_of(self.address)
         self._keys = Credentials.of(settings)
-        self._talks = Exchanges(settings.resend_s)
+        self._exchanges = Exchanges(settings.resend_s)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._socket, self._knock = connect(
+        self._socket, self._monitor = connect(
             self._context, zmq.DEALER, self.address, self._keys)
 
     def __enter__(self) -> Self:
@@ -114,7 +114,7 @@ class Client:
         LocalProtocolError
             The id is malformed.
         """
-        return self._carry_out(self._talks.press(capture_id, timeout))
+        return self._run(self._exchanges.press(capture_id, timeout))
 
     def get(self, capture_id: str, *, timeout: float = 60.0) -> Face:
         """Wait for a capture's face.
@@ -128,7 +128,7 @@ class Client:
         ClientTimeoutError
             It is not finished in `timeout` seconds.
         """
-        return self._carry_out(self._talks.get(capture_id, timeout))
+        return self._run(self._exchanges.get(capture_id, timeout))
 
     def faces(
         self, *, after: int | None = None, last: int | None = None, since: datetime | None = None,
@@ -163,11 +163,12 @@ class Client:
         LocalProtocolError
             More than one start is given, `last` is not positive or `since` has no zone.
         """
-        follow = Follower(self._talks, after, last, since)
-        with closing(Subscription(self._context, self._publications, self._keys, TOPICS)) as ear:
-            self._carry_out(follow.start(timeout), ear)
+        follower = Follower(self._exchanges, after, last, since)
+        with closing(Subscription(
+                self._context, self._publications, self._keys, TOPICS)) as subscription:
+            self._run(follower.start(timeout), subscription)
             while True:
-                yield self._carry_out(follow.next(timeout), ear)
+                yield self._run(follower.next(timeout), subscription)
 
     def previews(self, *, timeout: float | None = None) -> Iterator[PublishedPreview]:
         """Follow what the sensor sees, ten times a second at most: always the newest.
@@ -185,13 +186,13 @@ class Client:
             Nothing came in `timeout` seconds.
         """
         with closing(Subscription(
-                self._context, self._publications, self._keys, (Topic.PREVIEW,))) as ear:
+                self._context, self._publications, self._keys, (Topic.PREVIEW,))) as subscription:
             while True:
                 until = deadline(timeout)
                 preview = None
                 while preview is None:
-                    self._wait(ear, until - time.monotonic())
-                    preview = preview_of(ear.newest())
+                    self._wait(subscription, until - time.monotonic())
+                    preview = preview_of(subscription.receive_latest())
                 yield preview
 
     def status(self, *, timeout: float = 5.0) -> Status:
@@ -202,40 +203,41 @@ class Client:
         ClientTimeoutError
             The hub did not answer.
         """
-        return self._carry_out(self._talks.status(timeout))
+        return self._run(self._exchanges.status(timeout))
 
-    def _carry_out(self, talk: Talk[_T], ear: Subscription | None = None) -> _T:
+    def _run(self, exchange: Exchange[_T], subscription: Subscription | None = None) -> _T:
         try:
-            step = next(talk)
+            step = next(exchange)
             while True:
                 try:
-                    came = self._do(step, ear)
+                    came = self._perform(step, subscription)
                 except ClientTimeoutError as error:
-                    step = talk.throw(error)
+                    step = exchange.throw(error)
                 else:
-                    step = talk.send(came)
+                    step = exchange.send(came)
         except StopIteration as end:
             result: _T = end.value
             return result
 
-    def _do(self, step: Step, ear: Subscription | None) -> Packet | None:
+    def _perform(self, step: Step, subscription: Subscription | None) -> Packet | None:
         if isinstance(step, SendRequest):
-            return self._ask(step.message, step.timeout, ear)
-        if ear is None:
+            return self._send_request(step.message, step.timeout, subscription)
+        if subscription is None:
             raise TypeError("there is no subscription to hear")
-        self._wait(ear, step.timeout)
-        return ear.receive()
+        self._wait(subscription, step.timeout)
+        return subscription.receive()
 
     @staticmethod
-    def _wait(ear: Subscription, timeout: float) -> None:
+    def _wait(subscription: Subscription, timeout: float) -> None:
         until = time.monotonic() + timeout
-        while not ear.socket.poll(max(0, math.ceil(min(until - time.monotonic(), LOOK_S) * 1000))):
-            ear.knock.check()
+        while not subscription.socket.poll(
+                max(0, math.ceil(min(until - time.monotonic(), CHECK_INTERVAL_S) * 1000))):
+            subscription.monitor.check()
             if time.monotonic() >= until:
                 raise ClientTimeoutError("nothing was published in the time allowed")
 
-    def _ask(
-        self, message: messages.Request, timeout: float, ear: Subscription | None = None
+    def _send_request(
+        self, message: messages.Request, timeout: float, subscription: Subscription | None = None
     ) -> Packet:
         """Send until answered, or until it is known that the hub lets us in no more."""
         if self._context.closed:
@@ -243,14 +245,14 @@ class Client:
         parts = encode(Packet(message))
         until = time.monotonic() + timeout
         while (left := until - time.monotonic()) > 0:
-            self._knock.check()
-            if ear:  # a key revoked meanwhile is cut off there, and not answered here
-                ear.knock.check()
-            wait = self._resend_s if send_parts(self._socket, parts) else UNCONNECTED_S
+            self._monitor.check()
+            if subscription:  # a key revoked meanwhile is cut off there, and not answered here
+                subscription.monitor.check()
+            wait = self._resend_s if send_parts(self._socket, parts) else SEND_RETRY_S
             answer = self._answer(message.request, min(left, wait))
             if answer is None:
                 continue
-            return checked(self.address, answer)
+            return raise_if_failed(self.address, answer)
         raise no_answer(self.address, timeout, keys=self._keys is not None)
 
     def _answer(self, request: int, wait: float) -> Packet | None:

@@ -31,22 +31,22 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.wire import Packet
 
 __all__ = [
-    "UNCONNECTED_S",
+    "SEND_RETRY_S",
     "AwaitPublication",
+    "Exchange",
     "Exchanges",
     "SendRequest",
     "Step",
-    "Talk",
-    "ask",
-    "checked",
     "deadline",
     "expect",
     "no_answer",
+    "raise_if_failed",
+    "send_request",
 ]
 
 _T = TypeVar("_T")
 
-UNCONNECTED_S = 0.05
+SEND_RETRY_S = 0.05
 """Time between two tries to send while there is no connection, seconds."""
 _LONGEST_WAIT_S = 20.0
 """Longest time for which the hub is asked to hold an answer back, seconds."""
@@ -68,10 +68,10 @@ class AwaitPublication:
 
 
 Step = SendRequest | AwaitPublication
-Talk = Generator[Step, Packet | None, _T]
+Exchange = Generator[Step, Packet | None, _T]
 
 
-def ask(message: messages.Request, timeout: float) -> Talk[Packet]:
+def send_request(message: messages.Request, timeout: float) -> Exchange[Packet]:
     """Ask in the midst of a talk."""
     packet = yield SendRequest(message, timeout)
     if packet is None:
@@ -79,7 +79,7 @@ def ask(message: messages.Request, timeout: float) -> Talk[Packet]:
     return packet
 
 
-def checked(address: str, answer: Packet) -> Packet:
+def raise_if_failed(address: str, answer: Packet) -> Packet:
     """Give an answer back, unless the hub says that it cannot answer.
 
     Raises
@@ -122,7 +122,7 @@ class Exchanges:
         """Give the number of the next request."""
         return next(self._requests)
 
-    def press(self, capture_id: str | None, timeout: float) -> Talk[str]:
+    def press(self, capture_id: str | None, timeout: float) -> Exchange[str]:
         """See `Client.press`."""
         chosen = uuid.uuid4().hex if capture_id is None else capture_id
         try:
@@ -130,18 +130,18 @@ class Exchanges:
         except ValidationError as error:
             raise LocalProtocolError(
                 f"capture id {chosen!r}: expected letters, digits, - and _, at most 64") from error
-        answer = (yield from ask(message, timeout)).message
+        answer = (yield from send_request(message, timeout)).message
         if isinstance(answer, messages.PressRefused):
             raise PressRefusedError(f"press refused: {answer.message}", answer.reason)
         expect(answer, messages.PressAccepted)
         return chosen
 
-    def get(self, capture_id: str, timeout: float) -> Talk[Face]:
+    def get(self, capture_id: str, timeout: float) -> Exchange[Face]:
         """See `Client.get`."""
         until = time.monotonic() + timeout
         while True:
             left = until - time.monotonic()
-            answer = yield from ask(messages.GetFace(
+            answer = yield from send_request(messages.GetFace(
                 request=self.number(), capture_id=capture_id,
                 wait_s=min(max(left, 0.0), _LONGEST_WAIT_S)), left + self._resend_s)
             match answer.message:
@@ -157,9 +157,9 @@ class Exchanges:
                         raise outcome.error
                     return outcome.face
 
-    def status(self, timeout: float) -> Talk[messages.Status]:
+    def status(self, timeout: float) -> Exchange[messages.Status]:
         """See `Client.status`."""
-        answer = yield from ask(messages.GetStatus(request=self.number()), timeout)
+        answer = yield from send_request(messages.GetStatus(request=self.number()), timeout)
         return expect(answer.message, messages.Status)
 
     def start(self, last: int | None, since: datetime | None) -> messages.FindStart | None:

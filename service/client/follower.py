@@ -4,7 +4,13 @@ import time
 from datetime import datetime
 
 from denseface.service.client.events import Published, outcome_of
-from denseface.service.client.exchanges import AwaitPublication, Exchanges, Talk, ask, deadline
+from denseface.service.client.exchanges import (
+    AwaitPublication,
+    Exchange,
+    Exchanges,
+    deadline,
+    send_request,
+)
 from denseface.service.errors import ClientTimeoutError, LocalProtocolError, RemoteProtocolError
 from denseface.service.protocol.messages import (
     CaptureFailed,
@@ -23,7 +29,7 @@ __all__ = ["TOPICS", "Follower"]
 
 TOPICS = (Topic.FACES, Topic.STATUS)
 """What must be subscribed to."""
-_PATIENCE_S = 5.0
+_REQUEST_TIMEOUT_S = 5.0
 """Longest wait for one answer of a hub that may be restarting, seconds."""
 
 
@@ -44,41 +50,42 @@ class Follower:
     """
 
     def __init__(
-        self, talks: Exchanges, after: int | None = None, last: int | None = None,
+        self, exchanges: Exchanges, after: int | None = None, last: int | None = None,
         since: datetime | None = None,
     ) -> None:
         if (after is not None) + (last is not None) + (since is not None) > 1:
             raise LocalProtocolError("expected at most one of after, last and since")
-        self._talks = talks
+        self._exchanges = exchanges
         self._after = after
-        self._find = talks.start(last, since)
+        self._start_request = exchanges.start(last, since)
         self._epoch: str | None = None
         self._last = 0
         self._behind = True
 
-    def start(self, timeout: float | None) -> Talk[None]:
+    def start(self, timeout: float | None) -> Exchange[None]:
         """Find the place to start at; to be done once, when the subscription is made."""
         until = deadline(timeout)
-        message = self._find or GetStatus(request=self._talks.number())
-        found = (yield from self._patiently(message, until)).message
-        if not isinstance(found, StartAt if self._find else Status):
+        message = self._start_request or GetStatus(request=self._exchanges.number())
+        found = (yield from self._request_until(message, until)).message
+        if not isinstance(found, StartAt if self._start_request else Status):
             raise RemoteProtocolError(f"the hub answered with {found.kind} to {message.kind}")
         self._epoch = found.epoch
         self._last = found.sequence if self._after is None else self._after
 
-    def next(self, timeout: float | None) -> Talk[Published]:
+    def next(self, timeout: float | None) -> Exchange[Published]:
         """Wait for the next one."""
         until = deadline(timeout)
         while True:
-            packet = yield from (self._fetch(until) if self._behind else self._hear(until))
+            packet = yield from (
+                self._fetch(until) if self._behind else self._await_publication(until))
             if packet is not None:
                 outcome = outcome_of(packet)
                 self._last = outcome.sequence
                 return outcome
 
-    def _fetch(self, until: float) -> Talk[Packet | None]:
-        packet = yield from self._patiently(
-            GetNext(request=self._talks.number(), after=self._last), until)
+    def _fetch(self, until: float) -> Exchange[Packet | None]:
+        packet = yield from self._request_until(
+            GetNext(request=self._exchanges.number(), after=self._last), until)
         message = packet.message
         if not isinstance(message, FaceDone | CaptureFailed | NothingNewer):
             raise RemoteProtocolError(f"the hub answered with {message.kind} to get_next")
@@ -91,7 +98,7 @@ class Follower:
             return None
         return packet
 
-    def _hear(self, until: float) -> Talk[Packet | None]:
+    def _await_publication(self, until: float) -> Exchange[Packet | None]:
         packet = yield AwaitPublication(until - time.monotonic())
         if packet is None:
             self._behind = True
@@ -113,10 +120,11 @@ class Follower:
         self._epoch, self._last, self._behind = epoch, 0, True
         return True
 
-    def _patiently(self, message: Request, until: float) -> Talk[Packet]:
+    def _request_until(self, message: Request, until: float) -> Exchange[Packet]:
         while True:
             try:
-                return (yield from ask(message, min(_PATIENCE_S, until - time.monotonic())))
+                return (yield from send_request(
+                    message, min(_REQUEST_TIMEOUT_S, until - time.monotonic())))
             except ClientTimeoutError:
                 if time.monotonic() >= until:
                     raise

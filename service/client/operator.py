@@ -24,7 +24,7 @@ class Operator(Client):
         """
         after = 0
         while True:
-            answer = self._ask(
+            answer = self._send_request(
                 messages.ListDead(request=self._request(), after=after), timeout).message
             letters = expect(answer, messages.DeadLetters).letters
             yield from letters
@@ -69,7 +69,7 @@ class Operator(Client):
         """
         removed = 0
         while True:
-            answer = expect(self._ask(messages.Purge(
+            answer = expect(self._send_request(messages.Purge(
                 request=self._request(), capture_id=capture_id, before=before,
                 everything=everything), timeout).message, messages.Removed)
             removed += answer.removed
@@ -81,11 +81,11 @@ class Operator(Client):
     def _known(
         self, message: messages.RetryDead | messages.DropDead, timeout: float
     ) -> messages.Message:
-        answer = self._ask(message, timeout).message
+        answer = self._send_request(message, timeout).message
         if isinstance(answer, messages.CaptureUnknown):
             raise UnknownCaptureError(
                 f"capture {message.capture_id}: the hub has no such capture")
         return answer
 
     def _request(self) -> int:
-        return self._talks.number()
+        return self._exchanges.number()

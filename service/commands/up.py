@@ -29,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     from denseface.service.errors import AddressError
     from denseface.service.storage.folder_lock import check_folder
     from denseface.service.transport.addresses import check_bindable, is_local
-    from denseface.service.transport.listeners import guard
+    from denseface.service.transport.listeners import server_credentials
 
     settings = options.service_settings(args)
     if not is_local(settings.address):
@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     check_bindable(settings.address)
     check_folder(settings.data)  # the hub would say so too, but later, among others
     if settings.listen:
-        guard(settings)  # the hub would say so too, but later
+        server_credentials(settings)  # the hub would say so too, but later
     changed = options.recon_arguments(args)
     options.recon_settings(args)
     common = ["--address", settings.address, "--log", args.log]

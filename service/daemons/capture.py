@@ -35,7 +35,7 @@ from denseface.service.runtime.background import Background
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.settings import ServiceSettings
-from denseface.service.transport.hub_connection import HubLink
+from denseface.service.transport.hub_connection import HubConnection
 
 __all__ = ["run"]
 
@@ -59,7 +59,7 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None) ->
     sensor = Sensor(uri, calibration)
     with StopSignal() as stop, Background[RgbdFrame | None]("sensor") as driver:
         try:
-            with HubLink(settings, "capture") as link:
+            with HubConnection(settings, "capture") as link:
                 _Capture(settings, link, sensor, driver).serve(stop)
         finally:
             _close(driver, sensor)
@@ -89,7 +89,7 @@ class _Unsafe:
 
 class _Capture:
     def __init__(
-        self, settings: ServiceSettings, link: HubLink, sensor: Sensor,
+        self, settings: ServiceSettings, link: HubConnection, sensor: Sensor,
         driver: Background[RgbdFrame | None],
     ) -> None:
         self._settings = settings

@@ -52,16 +52,17 @@ def run(settings: ServiceSettings, recon: Settings) -> int:
     log = structlog.get_logger("hub")
     with StopSignal() as stop, FolderStore(settings.data) as store, WriterThreads() as writer, \
             Observer(settings.data) as observer, zmq.Context() as context:
-        refusals = Rejections(observer.figures.counters)
-        entrance = Listeners(context, settings, refusals, (stop, writer))
+        rejections = Rejections(observer.figures.counters)
+        listeners = Listeners(context, settings, rejections, (stop, writer))
         try:
-            hub = Hub(store, settings, recon, observer.figures, refusals, writer, time.monotonic())
-            loop = _Loop(entrance, hub, refusals, observer, writer)
-            log.info("listening", address=" ".join(entrance.addresses), data=str(settings.data))
+            hub = Hub(store, settings, recon, observer.figures, rejections, writer,
+                      time.monotonic())
+            loop = _Loop(listeners, hub, rejections, observer, writer)
+            log.info("listening", address=" ".join(listeners.addresses), data=str(settings.data))
             with _scrapes(settings, observer):
                 loop.serve(stop)
         finally:
-            entrance.close()
+            listeners.close()
         log.info("stopped")
         return stop.exit_status
 
@@ -70,24 +71,24 @@ def _scrapes(settings: ServiceSettings, observer: Observer) -> AbstractContextMa
     if settings.metrics is None:
         return nullcontext()
     from denseface.service.monitoring.health import Health, unwritable
-    from denseface.service.monitoring.http_server import ScrapeServer
+    from denseface.service.monitoring.http_server import MetricsServer
     from denseface.service.monitoring.prometheus import Metrics
 
-    health = Health(observer.board, settings, lambda: unwritable(settings.data))
-    server = ScrapeServer(settings.metrics, Metrics(observer.board).render, health.report)
+    health = Health(observer.latest, settings, lambda: unwritable(settings.data))
+    server = MetricsServer(settings.metrics, Metrics(observer.latest).render, health.report)
     structlog.get_logger("hub").info("metrics", url=f"{server.url}/metrics")
     return server
 
 
 class _Loop:
     def __init__(
-        self, entrance: Listeners, hub: Hub, refusals: Rejections, observer: Observer,
+        self, listeners: Listeners, hub: Hub, rejections: Rejections, observer: Observer,
         writer: WriterThreads,
     ) -> None:
         self._writer = writer
-        self._entrance = entrance
+        self._listeners = listeners
         self._hub = hub
-        self._refusals = refusals
+        self._rejections = rejections
         self._observer = observer
         self._log = structlog.get_logger("hub")
 
@@ -96,16 +97,16 @@ class _Loop:
         while not stop:
             if (now := time.monotonic()) >= due:
                 self._hub.was_away(now - due)
-                subscriptions = self._entrance.subscriptions()
+                subscriptions = self._listeners.subscriptions()
                 watched = subscriptions[Topic.PREVIEW] > 0
                 due = now + (PERIOD_S if watched else _TICK_S)
-                if self._entrance.tick():
+                if self._listeners.tick():
                     self._drop_revoked()
                 self._hub.show(wanted=watched)
                 outputs = self._hub.tick(now)
-                self._observer.ticked(now, outputs, subscriptions)
+                self._observer.record_tick(now, outputs, subscriptions)
                 self._give_out(outputs)
-            for incoming in self._entrance.receive(max(0, math.ceil((due - now) * 1000))):
+            for incoming in self._listeners.receive(max(0, math.ceil((due - now) * 1000))):
                 self._take_in(incoming)
             if self._writer.any_ended():
                 self._give_out(self._hub.written(time.monotonic()))
@@ -115,7 +116,7 @@ class _Loop:
 
     def _drop_revoked(self) -> None:
         for peer in self._hub.peers():
-            if not self._entrance.knows(peer):
+            if not self._listeners.is_allowed(peer):
                 self._give_out(self._hub.unreachable(peer, "its key or its roles changed"))
 
     def _take_in(self, incoming: Incoming) -> None:
@@ -123,14 +124,14 @@ class _Loop:
         try:
             packet = decode_to_hub(incoming.parts)
         except RemoteProtocolError as error:
-            self._refusals.note(error.reason, **who, detail=str(error))
+            self._rejections.note(error.reason, **who, detail=str(error))
             return
         message, sender = packet.message, incoming.sender
         own = (incoming.key != "" and isinstance(message, messages.GetFace)
                and self._hub.pressed_by(message.capture_id) == incoming.key)
         lacks = missing_role(sender.roles, message, own=own)
         if lacks:
-            self._refusals.note("role", **who, detail=lacks)
+            self._rejections.note("role", **who, detail=lacks)
             self._give_out([_denied(incoming, message, lacks)])
             return
         self._give_out(self._hub.receive(
@@ -138,7 +139,7 @@ class _Loop:
 
     def _give_out(self, outputs: list[Output], caused_by: Packet | None = None) -> None:
         for step in steps(outputs):
-            self._observer.saw(time.monotonic(), caused_by, step)
+            self._observer.record(time.monotonic(), caused_by, step)
             self._send(step)
             caused_by = None
 
@@ -151,7 +152,7 @@ class _Loop:
                 continue
             if isinstance(output, Publish):
                 self._publish(output.topic, parts)
-            elif not self._entrance.send(output.peer, parts):
+            elif not self._listeners.send(output.peer, parts):
                 self._give_out(self._hub.unreachable(output.peer))
             elif name := _SENT.get(output.packet.message.kind):
                 failpoint(name)
@@ -159,7 +160,7 @@ class _Loop:
     def _publish(self, topic: Topic, parts: Sequence[Buffer]) -> None:
         if topic is Topic.FACES:
             failpoint("hub.outcome.publishing")
-        if not self._entrance.publish(topic, parts):
+        if not self._listeners.publish(topic, parts):
             self._observer.figures.counters.add("drops", topic)
         if topic is Topic.FACES:
             failpoint("hub.outcome.published")

@@ -29,7 +29,7 @@ from denseface.service.runtime.signals import StopSignal
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable
 from denseface.service.transport.connection import Credentials
-from denseface.service.transport.hub_connection import HubLink
+from denseface.service.transport.hub_connection import HubConnection
 
 __all__ = ["run", "warm"]
 
@@ -56,7 +56,7 @@ def run(settings: ServiceSettings) -> int:
         warm()
         structlog.get_logger("worker").info("warm", seconds=round(time.monotonic() - begun, 2))
         with Background[Face]("recon") as compute:
-            with HubLink(settings, "worker") as link:
+            with HubConnection(settings, "worker") as link:
                 worker = _Worker(settings, link, compute)
                 worker.serve(stop)
                 worker.finish()
@@ -73,7 +73,7 @@ def warm() -> None:
 
 class _Worker:
     def __init__(
-        self, settings: ServiceSettings, link: HubLink, compute: Background[Face]
+        self, settings: ServiceSettings, link: HubConnection, compute: Background[Face]
     ) -> None:
         self._settings = settings
         self._link = link

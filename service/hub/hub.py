@@ -56,25 +56,25 @@ class Hub:
     settings : time-outs and limits
     recon : settings of every job accepted from now on
     figures : what the status says of this process
-    refusals : counts what was not let through
+    rejections : counts what was refused
     writer : writes the files; what it has ended is taken at each call
     opened : since when sensors can reach it, seconds
     """
 
     def __init__(
         self, store: Store, settings: ServiceSettings, recon: Settings,
-        figures: Figures | None = None, refusals: Rejections | None = None,
+        figures: Figures | None = None, rejections: Rejections | None = None,
         writer: Writer | None = None, opened: float = -math.inf,
     ) -> None:
         self._store = store
         self._writer = writer = writer or InlineWriter()
         self._figures = figures or Figures()
-        self._refusals = refusals or Rejections(self._figures.counters)
+        self._rejections = rejections or Rejections(self._figures.counters)
         self._settings = settings
         self._roster = Peers()
         self._outcomes = Outcomes(store, self._remake)
         self._jobs = Jobs(store, writer, self._roster, settings.attempts,
-                          self._outcomes.concluded, self._refusals)
+                          self._outcomes.concluded, self._rejections)
         self._intake = Presses(store, writer, self._roster, settings, recon, settings_hash(recon),
                               self._jobs.add, opened + settings.silence_s)
         self._keeper = Maintenance(
@@ -262,7 +262,7 @@ class Hub:
         if known is None:
             self._log.info("worker ready", name=name)
         elif credit <= known.credit:
-            self._refusals.note("replayed", name=name, detail=f"credit {credit}")
+            self._rejections.note("replayed", name=name, detail=f"credit {credit}")
         self._roster.worker_ready(peer, name, credit, now)
 
     def _gone(self, peer: bytes, reason: str) -> Iterator[Output]:
@@ -284,7 +284,7 @@ class Hub:
             pressed=len(self._intake), queued=self._jobs.queued, working=self._jobs.working,
             done=counts.get(CaptureState.DONE, 0), failed=counts.get(CaptureState.FAILED, 0),
             dead=counts.get(CaptureState.DEAD, 0),
-            refused=self._refusals.counts(),
+            refused=self._rejections.counts(),
             presses_refused=counters.labels("press_refused"),
             since_start={name: count for name, label, count in counters.items() if not label},
             latencies={stage: messages.Latency(

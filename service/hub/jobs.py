@@ -32,14 +32,14 @@ class Jobs:
 
     def __init__(
         self, store: Store, writer: Writer, roster: Peers, attempts: int,
-        concluded: Callable[[str], Iterator[Output]], refusals: Rejections,
+        concluded: Callable[[str], Iterator[Output]], rejections: Rejections,
     ) -> None:
         """Take up what the store has unfinished; `concluded` announces an outcome."""
         self._store = store
         self._roster = roster
         self._attempts = attempts
         self._concluded = concluded
-        self._refusals = refusals
+        self._rejections = rejections
         self._queue = deque(store.unfinished())
         self._reasons: dict[str, tuple[str, str]] = {}
         self._faces = UnsavedFaces(store, writer)
@@ -239,7 +239,8 @@ class Jobs:
                           else "its answer was lost")
                 self._retry(one, "RemoteProtocolError", reason)
         if not useful:
-            self._refusals.note("replayed", capture_id=capture_id, detail=f"{event}, not asked for")
+            self._rejections.note(
+                "replayed", capture_id=capture_id, detail=f"{event}, not asked for")
         return useful
 
     def _of_use(

@@ -1,9 +1,87 @@
 """What the hub's process knows of itself: counts, times, sizes."""
 
-from denseface.service.monitoring.counters import Counters
-from denseface.service.monitoring.latencies import Latencies
+from bisect import bisect_left
+from collections import Counter
+from dataclasses import dataclass, field
+from itertools import pairwise
 
-__all__ = ["Figures"]
+__all__ = ["BUCKETS_S", "Counters", "Figures", "Histogram", "Latencies"]
+
+BUCKETS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0,
+             60.0)
+"""Upper ends of the buckets, seconds; one without an end comes after."""
+_MOST_STAGES = 32
+"""Some names come from workers."""
+
+
+class Counters:
+    """Plain numbers by name and label, all of one process, from zero at its start."""
+
+    def __init__(self) -> None:
+        self._counts: Counter[tuple[str, str]] = Counter()
+
+    def add(self, name: str, label: str = "", by: int = 1) -> None:
+        """Count something that happened; names and labels come from a fixed set."""
+        self._counts[name, label] += by
+
+    def labels(self, name: str) -> dict[str, int]:
+        """Give the counts of one name by label, in order of the labels."""
+        return {label: count for (known, label), count in sorted(self._counts.items())
+                if known == name}
+
+    def items(self) -> list[tuple[str, str, int]]:
+        """Give name, label and count of all, sorted."""
+        return [(name, label, count) for (name, label), count in sorted(self._counts.items())]
+
+
+@dataclass
+class Histogram:
+    """Times of one stage."""
+
+    counts: list[int] = field(default_factory=lambda: [0] * (len(BUCKETS_S) + 1))
+    """How many fell into each bucket alone."""
+    total_s: float = 0.0
+
+    @property
+    def count(self) -> int:
+        """How many there were."""
+        return sum(self.counts)
+
+    def add(self, seconds: float) -> None:
+        """Count one."""
+        self.counts[bisect_left(BUCKETS_S, seconds)] += 1
+        self.total_s += seconds
+
+    def quantile_s(self, share: float) -> float:
+        """Give the time that so much of them took at most, linear within a bucket, seconds.
+
+        Beyond the last bucket it is that bucket's end; 0 where there were none.
+        """
+        wanted = share * self.count
+        below = 0
+        for number, (low, high) in zip(self.counts, pairwise((0.0, *BUCKETS_S)), strict=False):
+            if number and below + number >= wanted:
+                return low + (high - low) * (wanted - below) / number
+            below += number
+        return BUCKETS_S[-1] if below < self.count else 0.0
+
+
+class Latencies:
+    """Histograms by stage, of one process, since its start."""
+
+    def __init__(self) -> None:
+        self._stages: dict[str, Histogram] = {}
+
+    def observe(self, stage: str, seconds: float) -> None:
+        """Count a time; one that is negative or of too many stages is left out."""
+        if seconds < 0 or (stage not in self._stages and len(self._stages) >= _MOST_STAGES):
+            return
+        self._stages.setdefault(stage, Histogram()).add(seconds)
+
+    def stages(self) -> dict[str, Histogram]:
+        """Give a copy of all, in order of their first time."""
+        return {stage: Histogram(list(one.counts), one.total_s)
+                for stage, one in self._stages.items()}
 
 
 class Figures:

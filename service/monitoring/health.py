@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from denseface.service.monitoring.board import Board
+from denseface.service.monitoring.observer import Snapshot
 from denseface.service.settings import ServiceSettings
 
 __all__ = ["Health", "unwritable"]
@@ -17,19 +17,20 @@ _MIB = 2**20
 
 
 class Health:
-    """Judges what the board shows; for any thread.
+    """Judges the hub's last snapshot; for any thread.
 
     Parameters
     ----------
+    latest : gives the last snapshot, None before there is one
     unwritable : says why nothing can be written, None where it can
-    clock : seconds, the board's
+    clock : seconds, the snapshots'
     """
 
     def __init__(
-        self, board: Board, settings: ServiceSettings, unwritable: Callable[[], str | None],
-        clock: Callable[[], float] = time.monotonic,
+        self, latest: Callable[[], Snapshot | None], settings: ServiceSettings,
+        unwritable: Callable[[], str | None], clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._board = board
+        self._latest = latest
         self._settings = settings
         self._unwritable = unwritable
         self._clock = clock
@@ -37,25 +38,26 @@ class Health:
 
     def report(self) -> tuple[bool, dict[str, Any]]:
         """Say whether all is well, and what is missing."""
-        missing = list(self._missing())
-        status = self._board.picture.status if self._board.picture else None
+        snapshot = self._latest()
+        status = snapshot.status if snapshot else None
+        missing = self._missing(snapshot)
         return not missing, {
             "healthy": not missing, "missing": missing,
             "version": status.hub_version if status else None,
             "sensors": len(status.sensors) if status else 0,
             "workers": len(status.workers) if status else 0}
 
-    def _missing(self) -> list[str]:
-        picture, found = self._board.picture, []
-        if picture is None:
+    def _missing(self, snapshot: Snapshot | None) -> list[str]:
+        found = []
+        if snapshot is None:
             found.append("hub: has not said how it is yet")
-        elif (silence := self._clock() - picture.taken) > self._stall_s:
+        elif (silence := self._clock() - snapshot.taken) > self._stall_s:
             found.append(f"hub: has not said how it is for {silence:.0f} s")
         if why := self._unwritable():
             found.append(f"store: {why}")
-        if picture is None:
+        if snapshot is None:
             return found
-        status, reserve = picture.status, self._settings.reserve_mib
+        status, reserve = snapshot.status, self._settings.reserve_mib
         if status.free_bytes is None:
             found.append("disk: its free room is not known")
         elif status.free_bytes < reserve * _MIB:

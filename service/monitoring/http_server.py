@@ -16,7 +16,7 @@ from prometheus_client import CONTENT_TYPE_LATEST
 
 from denseface.service.errors import AddressError
 
-__all__ = ["ScrapeServer"]
+__all__ = ["MetricsServer"]
 
 _MOST_CLIENTS = 8
 _REQUEST_S = 2.0
@@ -24,7 +24,7 @@ _REQUEST_S = 2.0
 _MAX_REQUEST_BYTES = 16 * 1024
 
 
-class ScrapeServer:
+class MetricsServer:
     """Answers until closed; whoever is slow or talks nonsense is cut off, and nobody waits for it.
 
     Parameters

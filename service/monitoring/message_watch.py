@@ -6,8 +6,7 @@ The hub's state machine knows nothing of it: every stage of a capture shows in i
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from denseface.service.monitoring.counters import Counters
-from denseface.service.monitoring.latencies import Latencies
+from denseface.service.monitoring.figures import Figures
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, Publish, Send
 from denseface.service.protocol.wire import Packet
@@ -31,14 +30,14 @@ class MessageWatch:
     Times are those of the hub's clock, after it has done what a message asked for.
     """
 
-    def __init__(self, counters: Counters, latencies: Latencies) -> None:
-        self._counters = counters
-        self._latencies = latencies
+    def __init__(self, figures: Figures) -> None:
+        self._counters = figures.counters
+        self._latencies = figures.latencies
         self._captures: dict[str, _Times] = {}
         self._refused: dict[tuple[bytes, str, int], None] = {}
         """Presses that were told so: a repeat is told again."""
 
-    def saw(self, now: float, packet: Packet | None, outputs: Sequence[Output]) -> None:
+    def record(self, now: float, packet: Packet | None, outputs: Sequence[Output]) -> None:
         """Take note of a message and of all that it brought about; of no message at a tick.
 
         Parameters

@@ -2,28 +2,42 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 import structlog
 
-from denseface.service.monitoring.board import Board, Picture
-from denseface.service.monitoring.figures import Figures
+from denseface.service.monitoring.figures import Figures, Histogram
 from denseface.service.monitoring.message_watch import MessageWatch
 from denseface.service.protocol.messages import Status
 from denseface.service.protocol.outgoing import Output, Publish
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 
-__all__ = ["Observer", "folder_bytes"]
+__all__ = ["Observer", "Snapshot", "folder_bytes"]
 
 _MEASURE_S = 60.0
-"""Time between two looks at how much is kept, seconds."""
+"""Interval between measurements of the data folder, seconds."""
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The hub at one moment, its last heartbeat; nothing in it changes any more."""
+
+    taken: float
+    """Seconds of `time.monotonic`."""
+    status: Status
+    counts: tuple[tuple[str, str, int], ...]
+    """Name, label, number."""
+    stages: dict[str, Histogram]
+    subscriptions: dict[str, int] = field(default_factory=dict)
+    """By topic."""
 
 
 class Observer:
-    """Is told by the hub's loop what happens.
+    """Is told by the hub's loop what happens, and shows it to other threads as a snapshot.
 
     Parameters
     ----------
@@ -32,11 +46,11 @@ class Observer:
 
     def __init__(self, data: Path) -> None:
         self.figures = Figures()
-        self.board = Board()
-        self._watch = MessageWatch(self.figures.counters, self.figures.latencies)
+        self._snapshot: Snapshot | None = None
+        self._watch = MessageWatch(self.figures)
         self._data = data
-        self._measure = Background[int]("usage")
-        self._measure_due = 0.0
+        self._measurement = Background[int]("usage")
+        self._next_measurement = 0.0
 
     def __enter__(self) -> Self:
         return self
@@ -45,34 +59,38 @@ class Observer:
         self, kind: type[BaseException] | None, error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._measure.close()
+        self._measurement.close()
 
-    def saw(self, now: float, packet: Packet | None, outputs: Sequence[Output]) -> None:
+    def latest(self) -> Snapshot | None:
+        """Give the last snapshot, None before there is one; for any thread."""
+        return self._snapshot
+
+    def record(self, now: float, packet: Packet | None, outputs: Sequence[Output]) -> None:
         """Take note of what a message, or a tick where there is none, brought about."""
-        self._watch.saw(now, packet, outputs)
+        self._watch.record(now, packet, outputs)
 
-    def ticked(
+    def record_tick(
         self, now: float, outputs: Sequence[Output], subscriptions: Mapping[str, int]
     ) -> None:
-        """Show how things stand, at each status that a tick gave out."""
-        self._measured(now)
+        """Take a snapshot at each status that a tick gave out."""
+        self._measure_folder(now)
         for output in outputs:
             message = output.packet.message
             if isinstance(output, Publish) and isinstance(message, Status):
-                self.board.picture = Picture(
+                self._snapshot = Snapshot(
                     now, message, tuple(self.figures.counters.items()),
                     self.figures.latencies.stages(), dict(subscriptions))
 
-    def _measured(self, now: float) -> None:
-        if self._measure.ended():
+    def _measure_folder(self, now: float) -> None:
+        if self._measurement.ended():
             try:
-                self.figures.kept_bytes = self._measure.take()
+                self.figures.kept_bytes = self._measurement.take()
             except OSError as error:
                 structlog.get_logger("hub").warning(
                     "what is kept cannot be measured", reason=str(error))
-        elif not self._measure and now >= self._measure_due:
-            self._measure_due = now + _MEASURE_S
-            self._measure.start(lambda: folder_bytes(self._data))
+        elif not self._measurement and now >= self._next_measurement:
+            self._next_measurement = now + _MEASURE_S
+            self._measurement.start(lambda: folder_bytes(self._data))
 
 
 def folder_bytes(folder: Path) -> int:

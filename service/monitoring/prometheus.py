@@ -1,6 +1,6 @@
 """The hub's figures as Prometheus metrics."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import accumulate
 
 from prometheus_client import CollectorRegistry, ProcessCollector, generate_latest
@@ -12,8 +12,8 @@ from prometheus_client.core import (
 )
 from prometheus_client.registry import Collector
 
-from denseface.service.monitoring.board import Board, Picture
-from denseface.service.monitoring.latencies import BUCKETS_S, Histogram
+from denseface.service.monitoring.figures import BUCKETS_S, Histogram
+from denseface.service.monitoring.observer import Snapshot
 
 __all__ = ["COUNTERS", "Metrics"]
 
@@ -37,10 +37,15 @@ _PREFIX = "denseface_"
 
 
 class Metrics(Collector):
-    """Renders what the board shows; for any thread."""
+    """Renders the hub's last snapshot; for any thread.
 
-    def __init__(self, board: Board) -> None:
-        self._board = board
+    Parameters
+    ----------
+    latest : gives the last snapshot, None before there is one
+    """
+
+    def __init__(self, latest: Callable[[], Snapshot | None]) -> None:
+        self._latest = latest
         self._registry = CollectorRegistry(auto_describe=False)
         self._registry.register(self)
         ProcessCollector(registry=self._registry)
@@ -51,16 +56,16 @@ class Metrics(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """Give the families; none before the hub's first status."""
-        picture = self._board.picture
-        if picture is not None:
-            yield from _counters(picture)
-            yield from _gauges(picture)
-            yield _latencies(picture.stages)
+        snapshot = self._latest()
+        if snapshot is not None:
+            yield from _counters(snapshot)
+            yield from _gauges(snapshot)
+            yield _latencies(snapshot.stages)
 
 
-def _counters(picture: Picture) -> Iterator[Metric]:
+def _counters(snapshot: Snapshot) -> Iterator[Metric]:
     for name, (metric, label, text) in COUNTERS.items():
-        found = {one: count for known, one, count in picture.counts if known == name}
+        found = {one: count for known, one, count in snapshot.counts if known == name}
         family = CounterMetricFamily(_PREFIX + metric, text, labels=[label] if label else [])
         if label is None:
             family.add_metric([], sum(found.values()))
@@ -69,13 +74,13 @@ def _counters(picture: Picture) -> Iterator[Metric]:
         yield family
 
 
-def _gauges(picture: Picture) -> Iterator[Metric]:
-    status = picture.status
+def _gauges(snapshot: Snapshot) -> Iterator[Metric]:
+    status = snapshot.status
     yield _family("in_flight", "Captures without an outcome.", "state", {
         "pressed": status.pressed, "queued": status.queued, "working": status.working})
     yield _family("kept_captures", "Captures kept in the data folder.", "state", {
         "done": status.done, "failed": status.failed, "dead": status.dead})
-    yield _family("subscriptions", "Subscriptions.", "topic", picture.subscriptions)
+    yield _family("subscriptions", "Subscriptions.", "topic", snapshot.subscriptions)
     yield _one("sensors", "Sensors alive.", len(status.sensors))
     yield _one("workers", "Workers alive.", len(status.workers))
     if status.free_bytes is not None:

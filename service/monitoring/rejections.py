@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import structlog
 
-from denseface.service.monitoring.counters import Counters
+from denseface.service.monitoring.figures import Counters
 
 __all__ = ["Rejections"]
 
@@ -34,7 +34,7 @@ class Rejections:
         self._log = structlog.get_logger("hub")
 
     def counts(self) -> dict[str, int]:
-        """Give the number of refusals by reason."""
+        """Give the number of rejections by reason."""
         return self._counters.labels("refused")
 
     def note(self, reason: str, **who: object) -> None:

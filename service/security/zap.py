@@ -31,11 +31,11 @@ class Authenticator:
     """
 
     def __init__(
-        self, context: "zmq.Context[zmq.Socket[bytes]]", keyring: AllowList, refusals: Rejections,
+        self, context: "zmq.Context[zmq.Socket[bytes]]", keyring: AllowList, rejections: Rejections,
         admits: Callable[[Allowed, bytes], bool],
     ) -> None:
         self._keyring = keyring
-        self._refusals = refusals
+        self._rejections = rejections
         self._admits = admits
         # A ROUTER: one question that goes wrong does not block the next, as with a REP.
         self.socket = context.socket(zmq.ROUTER)
@@ -61,21 +61,21 @@ class Authenticator:
 
     def _user(self, request: list[bytes]) -> Allowed | None:
         if len(request) != 7 or request[0] != _VERSION:
-            self._refusals.note("handshake", detail="not a request of ZAP 1.0")
+            self._rejections.note("handshake", detail="not a request of ZAP 1.0")
             return None
         _, _, domain, address, _, mechanism, key = request
         where = address.decode("ascii", "replace")
         if mechanism != b"CURVE" or len(key) != 32:
-            self._refusals.note(
+            self._rejections.note(
                 "handshake", address=where, detail=f"mechanism {mechanism[:16]!r}, not CURVE")
             return None
         public = zmq.utils.z85.encode(key).decode()
         user = self._keyring.get(public)
         if user is None:
-            self._refusals.note("unknown key", address=where, key=public)
+            self._rejections.note("unknown key", address=where, key=public)
             return None
         if not self._admits(user, domain):
-            self._refusals.note(
+            self._rejections.note(
                 "role", address=where, key=user.name, detail="no topic for its roles")
             return None
         return user

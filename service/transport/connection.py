@@ -16,9 +16,9 @@ from denseface.service.transport.sockets import open_socket
 
 __all__ = ["ConnectionMonitor", "Credentials", "connect"]
 
-_SURE = 3
+_MIN_BROKEN_OFF = 3
 """Handshakes that break off in a row until it is said why: a hub may have ended in one."""
-_REDIAL_S = 2.0
+_RECONNECT_S = 2.0
 """Time until a daemon that was refused knocks again, seconds: it may be allowed meanwhile."""
 _E = zmq.Event
 _EVENTS = (_E.HANDSHAKE_SUCCEEDED | _E.HANDSHAKE_FAILED_AUTH | _E.HANDSHAKE_FAILED_PROTOCOL
@@ -51,7 +51,7 @@ class Credentials:
             raise KeyFileError(f"{settings.address}: one key without the other: expected {missing}")
         return cls(read_pair(key), read_public(hub))
 
-    def show(self, socket: "zmq.Socket[bytes]") -> None:
+    def apply(self, socket: "zmq.Socket[bytes]") -> None:
         """Have a socket use them when it connects."""
         socket.set(zmq.CURVE_SERVERKEY, self.hub.encode())
         socket.set(zmq.CURVE_PUBLICKEY, self.pair.public.encode())
@@ -67,7 +67,7 @@ class ConnectionMonitor:
         self._keys = keys
         self._monitor = socket.get_monitor_socket(int(_EVENTS))
         self._broken_off = 0
-        self._redial_at: float | None = None
+        self._reconnect_at: float | None = None
         self.refused: KeyRefusedError | None = None
         """Why the hub does not let us in; None where it did, or is not there."""
 
@@ -77,8 +77,8 @@ class ConnectionMonitor:
         while self._monitor.poll(0):
             said = parse_monitor_message(self._monitor.recv_multipart())
             self._note(zmq.Event(said["event"]), said["value"])
-        if self._redial_at is not None and time.monotonic() >= self._redial_at:
-            self._redial()
+        if self._reconnect_at is not None and time.monotonic() >= self._reconnect_at:
+            self._reconnect()
         return self.refused is not None and str(self.refused) != before
 
     def check(self) -> None:
@@ -86,7 +86,7 @@ class ConnectionMonitor:
         self.read()
         if self.refused:
             refused, self.refused = self.refused, None
-            self._redial()
+            self._reconnect()
             raise refused
 
     def close(self) -> None:
@@ -97,7 +97,7 @@ class ConnectionMonitor:
 
     def _note(self, event: zmq.Event, value: int) -> None:
         if event is _E.HANDSHAKE_SUCCEEDED:
-            self.refused, self._broken_off, self._redial_at = None, 0, None
+            self.refused, self._broken_off, self._reconnect_at = None, 0, None
             return
         if event is _E.HANDSHAKE_FAILED_AUTH:
             self.refused = KeyRefusedError(
@@ -107,14 +107,14 @@ class ConnectionMonitor:
             self.refused = self._mismatch()
         else:
             self._broken_off += value in (errno.EPIPE, errno.ECONNRESET)
-            if self._broken_off >= _SURE:
+            if self._broken_off >= _MIN_BROKEN_OFF:
                 self.refused = self._mismatch()
             return
         # libzmq takes these two for final and would not try again.
-        self._redial_at = time.monotonic() + _REDIAL_S
+        self._reconnect_at = time.monotonic() + _RECONNECT_S
 
-    def _redial(self) -> None:
-        self._redial_at = None
+    def _reconnect(self) -> None:
+        self._reconnect_at = None
         self._broken_off = 0
         with suppress(zmq.ZMQError):
             self._socket.disconnect(self._address)
@@ -138,7 +138,7 @@ def connect(
         # Nothing is queued for a hub that is not there: it would arrive stale.
         socket.set(zmq.IMMEDIATE, 1)
     if keys:
-        keys.show(socket)
-    knock = ConnectionMonitor(socket, address, keys)
+        keys.apply(socket)
+    monitor = ConnectionMonitor(socket, address, keys)
     socket.connect(address)
-    return socket, knock
+    return socket, monitor

@@ -13,7 +13,7 @@ from zmq.utils.monitor import parse_monitor_message
 
 from denseface.service.monitoring.rejections import Rejections
 
-__all__ = ["Handshakes", "address_of"]
+__all__ = ["HandshakeMonitor", "address_of"]
 
 _BURST = 64
 _E = zmq.Event
@@ -27,11 +27,11 @@ _DETAILS = {
 }
 
 
-class Handshakes:
+class HandshakeMonitor:
     """Listens to what libzmq says of one listening socket's connections."""
 
-    def __init__(self, listening: "zmq.Socket[bytes]", refusals: Rejections) -> None:
-        self._refusals = refusals
+    def __init__(self, listening: "zmq.Socket[bytes]", rejections: Rejections) -> None:
+        self._rejections = rejections
         self._listening = listening
         self.socket = listening.get_monitor_socket(int(_EVENTS))
         self._open: dict[int, str] = {}
@@ -72,18 +72,18 @@ class Handshakes:
         elif event is _E.DISCONNECTED:
             self._ended(self._open.pop(value, None))
         elif value == errno.EFAULT:  # and libzmq goes on to keep the connection shut
-            self._refusals.note("handshake", detail="no authenticator")
+            self._rejections.note("handshake", detail="no authenticator")
         else:
             self._failed = _DETAILS.get(value, f"{value:#x}")  # DISCONNECTED follows
 
     def _ended(self, address: str | None) -> None:
         failed, self._failed = self._failed, None
         if failed:
-            self._refusals.note("handshake", address=address, detail=failed)
+            self._rejections.note("handshake", address=address, detail=failed)
         elif address and self._unknown:
             self._unknown -= 1
         elif address:
-            self._refusals.note("handshake", address=address, detail="not ZeroMQ, or broken off")
+            self._rejections.note("handshake", address=address, detail="not ZeroMQ, or broken off")
 
 
 def address_of(descriptor: int) -> str:

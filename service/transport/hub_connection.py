@@ -20,13 +20,13 @@ from denseface.service.transport.addresses import check_connectable
 from denseface.service.transport.connection import Credentials, connect
 from denseface.service.transport.sockets import send_parts
 
-__all__ = ["HubLink"]
+__all__ = ["HubConnection"]
 
 _RETRY_S = 0.1
 """Time between two tries to reach a hub that is not there, seconds."""
 
 
-class HubLink:
+class HubConnection:
     """Sends heartbeats by itself while `packets` waits."""
 
     def __init__(self, settings: ServiceSettings, name: str) -> None:
@@ -35,7 +35,7 @@ class HubLink:
         self._heartbeat_s = settings.heartbeat_s
         self._log = structlog.get_logger(name)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._socket, self._knock = connect(
+        self._socket, self._monitor = connect(
             self._context, zmq.DEALER, settings.address, keys)
         self._denied = ""
 
@@ -72,8 +72,8 @@ class HubLink:
             if (now := time.monotonic()) >= due:
                 sent = self.send(Heartbeat(holding=holding()))
                 due = now + (self._heartbeat_s if sent else min(_RETRY_S, self._heartbeat_s))
-                if self._knock.read():
-                    self._log.error("not let in", reason=str(self._knock.refused))
+                if self._monitor.read():
+                    self._log.error("not let in", reason=str(self._monitor.refused))
                 yield None
             ready = dict(poller.poll(max(0, math.ceil((due - time.monotonic()) * 1000))))
             if stop.fileno() in ready:

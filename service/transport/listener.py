@@ -21,7 +21,7 @@ from denseface.service.security.keys import KeyPair
 from denseface.service.security.permissions import EVERY_ROLE, TOPICS
 from denseface.service.security.zap import DOMAIN, TOPICS_DOMAIN
 from denseface.service.transport.addresses import publications_of, socket_file
-from denseface.service.transport.handshakes import Handshakes
+from denseface.service.transport.handshakes import HandshakeMonitor
 from denseface.service.transport.sockets import (
     TooLongError,
     open_socket,
@@ -30,7 +30,7 @@ from denseface.service.transport.sockets import (
     send_parts,
 )
 
-__all__ = ["Guard", "Incoming", "Listener"]
+__all__ = ["Incoming", "Listener", "ServerCredentials"]
 
 _TOKEN_BYTES = 8
 _LOCAL = bytes(_TOKEN_BYTES)
@@ -44,12 +44,12 @@ _BURST = 32
 
 
 @dataclass(frozen=True)
-class Guard:
+class ServerCredentials:
     """What a guarded door needs."""
 
     pair: KeyPair
     """The hub's own."""
-    keyring: AllowList
+    allow_list: AllowList
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Listener:
 
     Parameters
     ----------
-    guard : where None, whoever can open the address has every role
+    credentials : where None, whoever can open the address has every role
 
     Raises
     ------
@@ -84,13 +84,13 @@ class Listener:
     """
 
     def __init__(
-        self, context: "zmq.Context[zmq.Socket[bytes]]", address: str, guard: Guard | None,
-        refusals: Rejections,
+        self, context: "zmq.Context[zmq.Socket[bytes]]", address: str,
+        credentials: ServerCredentials | None, rejections: Rejections,
     ) -> None:
         self.address = address
-        self._guard = guard
-        self._refusals = refusals
-        self._monitors: list[Handshakes] = []
+        self._credentials = credentials
+        self._rejections = rejections
+        self._monitors: list[HandshakeMonitor] = []
         self._subscribed: set[bytes] = set()
         """Tokens of the keys that subscribed since the publisher was bound."""
         self._revoked = 0
@@ -138,15 +138,15 @@ class Listener:
                 return
             except TooLongError as error:
                 user = self._user(error.first)
-                self._refusals.note("oversized", key=user.name if user else None,
+                self._rejections.note("oversized", key=user.name if user else None,
                                     address=_address(error.first), detail=str(error))
                 continue
             if user := self._known(first):
-                token, key = (user.token, user.fingerprint) if self._guard else (_LOCAL, "")
+                token, key = (user.token, user.fingerprint) if self._credentials else (_LOCAL, "")
                 yield Incoming(token + first.bytes, [part.buffer for part in parts], user, key,
                                _address(first))
 
-    def listen(self) -> None:
+    def read_events(self) -> None:
         """Take note of who subscribes, of who leaves and of who was not let in."""
         for monitor in self._monitors:
             monitor.read()
@@ -156,14 +156,14 @@ class Listener:
             except zmq.Again:
                 return
             except TooLongError as error:
-                self._refusals.note("malformed", address=_address(error.first),
+                self._rejections.note("malformed", address=_address(error.first),
                                     detail="sent to the publications")
                 continue
             self._subscription(first)
 
     def send(self, peer: bytes, parts: Sequence[Buffer]) -> bool:
         """Send to a peer; False where it cannot be reached, or its key was revoked."""
-        if not self.knows(peer):
+        if not self.is_allowed(peer):
             return False
         try:
             return send_parts(self._router, [peer[_TOKEN_BYTES:], *parts])
@@ -176,20 +176,20 @@ class Listener:
         """Send to all who subscribed to a topic; False where one at least could not take it."""
         return publish_parts(self._publisher, [topic.encode(), *parts])
 
-    def knows(self, peer: bytes) -> bool:
+    def is_allowed(self, peer: bytes) -> bool:
         """Say whether a peer's key is allowed still, with the roles that it had."""
         token = peer[:_TOKEN_BYTES]
-        return self._guard.keyring.holds(token) if self._guard else token == _LOCAL
+        return self._credentials.allow_list.holds(token) if self._credentials else token == _LOCAL
 
-    def cut_revoked(self) -> None:
+    def disconnect_revoked(self) -> None:
         """Cut off the keys that are allowed no more, if they subscribed or do not fall silent."""
         if self._revoked > _FLOOD:
-            self._cut(self._router)
+            self._unbind(self._router)
         self._revoked = 0
-        if self._guard and not all(map(self._guard.keyring.holds, self._subscribed)):
-            self._cut(self._publisher)
+        if self._credentials and not all(map(self._credentials.allow_list.holds, self._subscribed)):
+            self._unbind(self._publisher)
 
-    def bind_again(self) -> None:
+    def rebind(self) -> None:
         """Open what was cut."""
         for socket, address in list(self._unbound.items()):
             # Not free before libzmq's own thread has closed it: tried again at the next tick.
@@ -197,20 +197,20 @@ class Listener:
                 socket.bind(address)
                 del self._unbound[socket]
 
-    def cut_all(self) -> bool:
+    def disconnect_all(self) -> bool:
         """End every connection from another machine; those that may come back will.
 
         False where that was done already and the door is not yet open again.
         """
-        if self._guard is None or len(self._unbound) == 2:
+        if self._credentials is None or len(self._unbound) == 2:
             return False
         for socket in (self._router, self._publisher):
-            self._cut(socket)
+            self._unbind(socket)
         for monitor in self._monitors:
             monitor.forget()
         return True
 
-    def _cut(self, socket: "zmq.Socket[bytes]") -> None:
+    def _unbind(self, socket: "zmq.Socket[bytes]") -> None:
         """End all connections of a socket: one alone cannot be.
 
         The others come back by themselves in less than a second, pass the authenticator again and
@@ -224,30 +224,30 @@ class Listener:
             self._subscribed.clear()
 
     def _bind(self, socket: "zmq.Socket[bytes]", address: str, domain: bytes) -> None:
-        if self._guard:
+        if self._credentials:
             socket.set(zmq.CURVE_SERVER, 1)
-            socket.set(zmq.CURVE_SECRETKEY, self._guard.pair.secret.encode())
+            socket.set(zmq.CURVE_SECRETKEY, self._credentials.pair.secret.encode())
             socket.set(zmq.ZAP_ENFORCE_DOMAIN, 1)
             socket.set(zmq.ZAP_DOMAIN, domain)
             socket.set(zmq.HANDSHAKE_IVL, _HANDSHAKE_MS)
             if socket is self._publisher:
                 socket.set(zmq.LINGER, 0)  # nothing more for a key that is cut off
-            self._monitors.append(Handshakes(socket, self._refusals))
+            self._monitors.append(HandshakeMonitor(socket, self._rejections))
         try:
             socket.bind(address)
         except zmq.ZMQError as error:
             raise AddressError(f"{address}: {zmq.strerror(error.errno or 0)}") from error
 
     def _user(self, first: zmq.Frame) -> Allowed | None:
-        if self._guard is None:
+        if self._credentials is None:
             return _ANYONE
-        return self._guard.keyring.get(_property(first, "User-Id"))
+        return self._credentials.allow_list.get(_property(first, "User-Id"))
 
     def _known(self, first: zmq.Frame) -> Allowed | None:
         user = self._user(first)
         if user is None:
             self._revoked += 1
-            self._refusals.note("revoked key", address=_address(first),
+            self._rejections.note("revoked key", address=_address(first),
                                 key=_property(first, "User-Id"))
         return user
 
@@ -267,10 +267,10 @@ class Listener:
         if user is None:
             return
         if said[:1] != b"\1" or topic is None:
-            self._refusals.note("malformed", key=user.name, address=_address(first),
+            self._rejections.note("malformed", key=user.name, address=_address(first),
                                 detail=f"no topic {name[:32]!r}")
         elif not user.roles & TOPICS[topic]:
-            self._refusals.note("role", key=user.name, address=_address(first),
+            self._rejections.note("role", key=user.name, address=_address(first),
                                 detail=f"topic {topic}")
         else:
             self._subscribed.add(user.token)

@@ -18,9 +18,9 @@ from denseface.service.security.permissions import TOPICS
 from denseface.service.security.zap import TOPICS_DOMAIN, Authenticator
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_bindable, is_local, socket_file
-from denseface.service.transport.listener import Guard, Incoming, Listener
+from denseface.service.transport.listener import Incoming, Listener, ServerCredentials
 
-__all__ = ["Listeners", "guard", "guarded_addresses"]
+__all__ = ["Listeners", "guarded_addresses", "server_credentials"]
 
 
 class _Wakes(Protocol):
@@ -28,23 +28,23 @@ class _Wakes(Protocol):
 
 
 class Listeners:
-    """Opens every door that the settings name.
+    """Opens every listener that the settings name.
 
     Raises
     ------
     AddressError, KeyFileError, HubRunningError
-        Where a door cannot be opened, or other machines could reach it and there are no keys.
+        Where a listener cannot be opened, or other machines could reach it and there are no keys.
     """
 
     def __init__(
         self, context: "zmq.Context[zmq.Socket[bytes]]", settings: ServiceSettings,
-        refusals: Rejections, wakes: Sequence[_Wakes],
+        rejections: Rejections, wakes: Sequence[_Wakes],
     ) -> None:
-        self._keyring: AllowList | None = None
+        self._allow_list: AllowList | None = None
         self._changes = 0
         self._authenticator: Authenticator | None = None
-        self._doors: list[Listener] = []
-        self._refusals = refusals
+        self._listeners: list[Listener] = []
+        self._rejections = rejections
         self._memory = MemoryWatch(settings.memory_mb << 20)
         self._descriptors = DescriptorWatch()
         self._poller = zmq.Poller()
@@ -54,55 +54,55 @@ class Listeners:
             guarded = guarded_addresses(settings)
             if settings.address not in guarded:
                 check_bindable(settings.address)
-                self._doors.append(Listener(context, settings.address, None, refusals))
+                self._listeners.append(Listener(context, settings.address, None, rejections))
             if guarded:
-                keys = guard(settings)
-                self._keyring = keys.keyring
-                self._authenticator = Authenticator(context, keys.keyring, refusals, _admits)
+                keys = server_credentials(settings)
+                self._allow_list = keys.allow_list
+                self._authenticator = Authenticator(context, keys.allow_list, rejections, _admits)
                 self._poller.register(self._authenticator.socket, zmq.POLLIN)
-                self._doors += [Listener(context, one, keys, refusals) for one in guarded]
+                self._listeners += [Listener(context, one, keys, rejections) for one in guarded]
         except BaseException:
             self.close()
             raise
-        for door in self._doors:
-            for socket in door.sockets:
+        for listener in self._listeners:
+            for socket in listener.sockets:
                 self._poller.register(socket, zmq.POLLIN)
 
     @property
     def addresses(self) -> list[str]:
         """Where the hub listens."""
-        return [door.address for door in self._doors]
+        return [listener.address for listener in self._listeners]
 
     def close(self) -> None:
         """Close all doors; the authenticator last."""
-        for door in self._doors:
-            door.close()
+        for listener in self._listeners:
+            listener.close()
         if self._authenticator:
             self._authenticator.close()
         self._memory.close()
 
     def tick(self) -> bool:
         """Look at the allow-list; True where peers may have been cut off."""
-        if self._keyring is None:
+        if self._allow_list is None:
             return False
-        self._keyring.refresh()
-        changed = self._keyring.changes != self._changes
-        self._changes = self._keyring.changes
-        for door in self._doors:
-            door.cut_revoked()
+        self._allow_list.refresh()
+        changed = self._allow_list.changes != self._changes
+        self._changes = self._allow_list.changes
+        for listener in self._listeners:
+            listener.disconnect_revoked()
         if used := self._memory.beyond():
-            self._cut_all("memory", f"{used >> 20} MB in use")
+            self._disconnect_all("memory", f"{used >> 20} MB in use")
         if used := self._descriptors.beyond():
-            self._cut_all("connections", f"{used} descriptors in use")
+            self._disconnect_all("connections", f"{used} descriptors in use")
         else:  # libzmq ends the process where it has no descriptor to bind with
-            for door in self._doors:
-                door.bind_again()
+            for listener in self._listeners:
+                listener.rebind()
         return changed
 
-    def _cut_all(self, reason: str, detail: str) -> None:
-        cut = [door.cut_all() for door in self._doors]
+    def _disconnect_all(self, reason: str, detail: str) -> None:
+        cut = [listener.disconnect_all() for listener in self._listeners]
         if any(cut):
-            self._refusals.note(reason, detail=f"{detail}: all connections from others are cut")
+            self._rejections.note(reason, detail=f"{detail}: all connections from others are cut")
 
     def receive(self, timeout_ms: int) -> Iterator[Incoming]:
         """Wait, then give the messages that have come.
@@ -115,34 +115,35 @@ class Listeners:
         if self._authenticator and self._authenticator.socket.closed:
             raise AuthenticatorStoppedError("the authenticator has stopped: nobody can come in")
         ready = dict(self._poller.poll(timeout_ms))
-        if self._keyring and ready:
-            self._keyring.refresh()  # what was revoked a moment ago is refused already
+        if self._allow_list and ready:
+            self._allow_list.refresh()  # what was revoked a moment ago is refused already
         if self._authenticator and self._authenticator.socket in ready:
             self._authenticator.answer()
-        for number, door in enumerate(self._doors):
-            router, *others = door.sockets
+        for number, listener in enumerate(self._listeners):
+            router, *others = listener.sockets
             if router in ready:
-                for one in door.receive():
+                for one in listener.receive():
                     yield replace(one, peer=bytes([number]) + one.peer)
             if any(one in ready for one in others):
-                door.listen()
+                listener.read_events()
 
     def send(self, peer: bytes, parts: Sequence[Buffer]) -> bool:
         """Send to a peer; False where it cannot be reached, or its key was revoked."""
-        return self._doors[peer[0]].send(peer[1:], parts)
+        return self._listeners[peer[0]].send(peer[1:], parts)
 
     def publish(self, topic: Topic, parts: Sequence[Buffer]) -> bool:
         """Send to all who subscribed to a topic; False where one at least could not take it."""
-        taken = [door.publish(topic, parts) for door in self._doors]
+        taken = [listener.publish(topic, parts) for listener in self._listeners]
         return all(taken)
 
     def subscriptions(self) -> dict[str, int]:
         """Give how many subscriptions there are to each topic."""
-        return {topic: sum(door.subscriptions[topic] for door in self._doors) for topic in Topic}
+        return {topic: sum(listener.subscriptions[topic] for listener in self._listeners)
+                for topic in Topic}
 
-    def knows(self, peer: bytes) -> bool:
+    def is_allowed(self, peer: bytes) -> bool:
         """Say whether a peer's key is allowed still, with the roles that it had."""
-        return self._doors[peer[0]].knows(peer[1:])
+        return self._listeners[peer[0]].is_allowed(peer[1:])
 
 
 def guarded_addresses(settings: ServiceSettings) -> list[str]:
@@ -160,7 +161,7 @@ def guarded_addresses(settings: ServiceSettings) -> list[str]:
         settings.address, *settings.listen]
 
 
-def guard(settings: ServiceSettings) -> Guard:
+def server_credentials(settings: ServiceSettings) -> ServerCredentials:
     """Read the hub's key and its allow-list.
 
     Raises
@@ -176,12 +177,12 @@ def guard(settings: ServiceSettings) -> Guard:
         raise AddressError(
             f"{address}: refused, it is not local to this machine: others are only let in with "
             f"CURVE security, and there is no hub key {path}; `denseface keys new {HUB}` makes one")
-    keyring = AllowList(settings.keys)
-    if not len(keyring):
+    allow_list = AllowList(settings.keys)
+    if not len(allow_list):
         raise AddressError(
             f"{address}: refused, no key is allowed in {settings.keys / 'allowed'}; "
             "`denseface keys allow NAME KEY ROLE` lets one in")
-    return Guard(read_pair(path), keyring)
+    return ServerCredentials(read_pair(path), allow_list)
 
 
 def _admits(user: Allowed, domain: bytes) -> bool:

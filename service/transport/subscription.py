@@ -9,9 +9,9 @@ from denseface.service.protocol.wire import MAX_HEADER_BYTES, MAX_PARTS, Packet,
 from denseface.service.transport.connection import Credentials, connect
 from denseface.service.transport.sockets import receive_parts
 
-__all__ = ["LOOK_S", "Subscription"]
+__all__ = ["CHECK_INTERVAL_S", "Subscription"]
 
-LOOK_S = 1.0
+CHECK_INTERVAL_S = 1.0
 """Time between two looks whether the hub still lets us in, seconds."""
 
 
@@ -22,14 +22,14 @@ class Subscription:
         self, context: "zmq.Context[zmq.Socket[bytes]]", address: str, keys: Credentials | None,
         topics: tuple[Topic, ...],
     ) -> None:
-        self.socket, self.knock = connect(context, zmq.SUB, address, keys)
+        self.socket, self.monitor = connect(context, zmq.SUB, address, keys)
         for topic in topics:
             self.socket.subscribe(topic)
 
     def close(self) -> None:
         """Hear no more; harmless when repeated."""
         if not self.socket.closed:
-            self.knock.close()
+            self.monitor.close()
             self.socket.close(linger=0)
 
     def receive(self) -> Packet | None:
@@ -46,7 +46,7 @@ class Subscription:
         except ProtocolError:
             return None
 
-    def newest(self) -> Packet | None:
+    def receive_latest(self) -> Packet | None:
         """Give the last of what has come, pass over the rest; raises as `receive`."""
         packet = self.receive()
         try:

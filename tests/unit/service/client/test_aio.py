@@ -183,8 +183,8 @@ def test_a_call_that_is_cancelled_leaves_the_client_as_it_was(hub):
             call.cancel()
             with pytest.raises(asyncio.CancelledError):
                 await call
-            assert client._waiting == {}
-            assert client._watched is None
+            assert client._pending == {}
+            assert client._loop is None
             hub.deaf = set()
             assert await client.press("c") == "c"
 
@@ -201,7 +201,7 @@ def test_an_iteration_that_is_cancelled_ends_its_subscription(hub):
                             await anext(one)
                 await waited(hub, lambda: hub.subscribers(Topic.FACES) == 0
                              and hub.subscribers(Topic.PREVIEW) == 0)
-            assert client._signs == {}
+            assert client._readable_events == {}
 
     run(main())
 

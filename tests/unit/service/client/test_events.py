@@ -61,16 +61,16 @@ class FakeHub:
                 return Packet(messages.StartAt(
                     epoch=self.epoch, sequence=len(self.outcomes) - last))
 
-    def carry_out(self, talk):
+    def run(self, exchange):
         try:
-            step = next(talk)
+            step = next(exchange)
             while True:
                 try:
                     came = self.do(step)
                 except ClientTimeoutError as error:
-                    step = talk.throw(error)
+                    step = exchange.throw(error)
                 else:
-                    step = talk.send(came)
+                    step = exchange.send(came)
         except StopIteration as end:
             return end.value
 
@@ -81,65 +81,65 @@ def hub():
 
 
 def following(hub, **start):
-    follow = Follower(Exchanges(2.0), **start)
-    hub.carry_out(follow.start(60))
-    return follow
+    follower = Follower(Exchanges(2.0), **start)
+    hub.run(follower.start(60))
+    return follower
 
 
 @pytest.fixture
-def follow(hub):
-    follow = following(hub)
+def follower(hub):
+    follower = following(hub)
     with pytest.raises(ClientTimeoutError):
-        hub.carry_out(follow.next(60))
+        hub.run(follower.next(60))
     hub.asked.clear()
-    return follow
+    return follower
 
 
-def ids(hub, follow, count):
-    return [hub.carry_out(follow.next(60)).capture_id for _ in range(count)]
+def ids(hub, follower, count):
+    return [hub.run(follower.next(60)).capture_id for _ in range(count)]
 
 
-def test_what_is_published_is_not_asked_for(hub, follow):
+def test_what_is_published_is_not_asked_for(hub, follower):
     hub.conclude()
     hub.conclude()
-    assert ids(hub, follow, 2) == ["a1", "a2"]
+    assert ids(hub, follower, 2) == ["a1", "a2"]
     assert hub.asked == []
 
 
-def test_a_gap_is_filled(hub, follow):
+def test_a_gap_is_filled(hub, follower):
     hub.conclude(published=False)
     hub.conclude(published=False)
     hub.conclude()
     hub.conclude()
-    assert ids(hub, follow, 4) == ["a1", "a2", "a3", "a4"]
+    assert ids(hub, follower, 4) == ["a1", "a2", "a3", "a4"]
 
 
-def test_a_repeated_publication_is_seen_once(hub, follow):
+def test_a_repeated_publication_is_seen_once(hub, follower):
     hub.conclude()
     hub.publish(hub.outcomes[0])
     hub.conclude()
-    assert ids(hub, follow, 2) == ["a1", "a2"]
+    assert ids(hub, follower, 2) == ["a1", "a2"]
 
 
-def test_the_last_one_missed_is_known_from_the_status(hub, follow):
+def test_the_last_one_missed_is_known_from_the_status(hub, follower):
     hub.conclude(published=False)
     hub.publish(hub.status())
-    assert ids(hub, follow, 1) == ["a1"]
+    assert ids(hub, follower, 1) == ["a1"]
 
 
-def test_another_store_starts_over(hub, follow):
+def test_another_store_starts_over(hub, follower):
     hub.conclude()
-    assert ids(hub, follow, 1) == ["a1"]
+    assert ids(hub, follower, 1) == ["a1"]
     hub.epoch, hub.outcomes = "b", []
     hub.conclude(published=False)
     hub.conclude()
-    assert ids(hub, follow, 2) == ["b1", "b2"]
+    assert ids(hub, follower, 2) == ["b1", "b2"]
 
 
-def test_garbage_is_taken_for_something_missed(hub, follow):
+def test_garbage_is_taken_for_something_missed(hub, follower):
     hub.conclude(published=False)
     hub.published.append(None)
-    assert ids(hub, follow, 1) == ["a1"]
+    assert ids(hub, follower, 1) == ["a1"]
 
 
 def test_a_start_in_the_past_gives_all_since(hub):
@@ -148,7 +148,7 @@ def test_a_start_in_the_past_gives_all_since(hub):
     assert ids(hub, following(hub, after=1), 2) == ["a2", "a3"]
 
 
-def test_numbers_that_were_removed_are_not_waited_for(hub, follow, monkeypatch):
+def test_numbers_that_were_removed_are_not_waited_for(hub, follower, monkeypatch):
     for _ in range(3):
         hub.conclude(published=False)
     monkeypatch.setattr(hub, "next", lambda after: hub.asked.append(after) or
@@ -156,7 +156,7 @@ def test_numbers_that_were_removed_are_not_waited_for(hub, follow, monkeypatch):
     hub.publish(hub.status())
     hub.publish(hub.status())
     hub.conclude()
-    assert ids(hub, follow, 1) == ["a4"]
+    assert ids(hub, follower, 1) == ["a4"]
     assert hub.asked == [0]
 
 
@@ -166,19 +166,19 @@ def test_a_start_is_asked_for(hub):
     assert ids(hub, following(hub, last=1), 1) == ["a2"]
 
 
-def test_a_hub_that_is_away_is_waited_for(hub, follow):
+def test_a_hub_that_is_away_is_waited_for(hub, follower):
     hub.away = 2
     hub.conclude(published=False)
     hub.publish(hub.status())
-    assert ids(hub, follow, 1) == ["a1"]
+    assert ids(hub, follower, 1) == ["a1"]
 
 
-def test_but_no_longer_than_allowed(hub, follow):
+def test_but_no_longer_than_allowed(hub, follower):
     hub.away = 10**9
     hub.conclude(published=False)
     hub.publish(hub.status())
     with pytest.raises(ClientTimeoutError, match="away"):
-        hub.carry_out(follow.next(0.0))
+        hub.run(follower.next(0.0))
 
 
 @pytest.mark.parametrize("start", [{"after": 1, "last": 1}, {"last": 0}])

@@ -13,7 +13,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from denseface.service.errors import AddressError
-from denseface.service.monitoring.http_server import ScrapeServer
+from denseface.service.monitoring.http_server import MetricsServer
 from denseface.service.runtime.loopback import loopback_place
 
 
@@ -34,7 +34,7 @@ def asked():
 
 @pytest.fixture
 def server(asked):
-    with ScrapeServer(("127.0.0.1", 0), lambda: b"figures 1\n", asked.health) as server:
+    with MetricsServer(("127.0.0.1", 0), lambda: b"figures 1\n", asked.health) as server:
         yield server
 
 
@@ -85,7 +85,7 @@ def test_other_verbs_are_not_known(server):
 @given(st.binary(max_size=200))
 @hypothesis_settings(deadline=None, max_examples=40)
 def test_garbage_ends_the_connection_alone(data):
-    with ScrapeServer(("127.0.0.1", 0), lambda: b"figures 1\n", Asked().health) as server:
+    with MetricsServer(("127.0.0.1", 0), lambda: b"figures 1\n", Asked().health) as server:
         raw(server, data)
         assert get(server, "/metrics")[0] == 200
 
@@ -139,7 +139,7 @@ def test_more_clients_than_there_is_room_for_are_turned_away(server):
 
 def test_a_port_in_use_is_one_line(server):
     with pytest.raises(AddressError, match=r"^--metrics 127.0.0.1:\d+: Address already in use$"):
-        ScrapeServer(place(server), bytes, Asked().health)
+        MetricsServer(place(server), bytes, Asked().health)
 
 
 @pytest.mark.parametrize(("given", "place"), [

@@ -30,14 +30,14 @@ class WatchedBench(Bench):
     def __init__(self, store):
         self.figures = Figures()
         super().__init__(Hub(store, SETTINGS, Settings(), self.figures), store)
-        self.watch = MessageWatch(self.figures.counters, self.figures.latencies)
+        self.watch = MessageWatch(self.figures)
 
     def say(self, peer, message, arrays=None):
         packet = Packet(message, arrays or {})
         outputs = self.hub.receive(self.now, peer, packet)
         self.now += 0.5
         for step in steps(outputs):
-            self.watch.saw(self.now, packet, step)
+            self.watch.record(self.now, packet, step)
             self.now += 0.25
         self.now -= 0.25
         return self._sent(outputs)
@@ -45,7 +45,7 @@ class WatchedBench(Bench):
     def wait(self, seconds):
         self.now += seconds
         outputs = self.hub.tick(self.now)
-        self.watch.saw(self.now, None, outputs)
+        self.watch.record(self.now, None, outputs)
         return self._sent(outputs)
 
     def counted(self):
@@ -159,7 +159,7 @@ def test_a_worker_s_stage_names_are_limited(bench):
 def test_the_times_of_captures_that_never_end_are_let_go_of(bench):
     for number in range(10_100):
         packet = Packet(messages.Take(capture_id=f"c{number}"))
-        bench.watch.saw(0.0, None, [messages_to(packet)])
+        bench.watch.record(0.0, None, [messages_to(packet)])
     assert len(bench.watch._captures) == 10_000
 
 

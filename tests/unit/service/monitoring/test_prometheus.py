@@ -3,9 +3,9 @@
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from denseface.service.monitoring.board import Board, Picture
+from denseface.service.monitoring.figures import Latencies
 from denseface.service.monitoring.health import Health, unwritable
-from denseface.service.monitoring.latencies import Latencies
+from denseface.service.monitoring.observer import Snapshot
 from denseface.service.monitoring.prometheus import COUNTERS, Metrics
 from denseface.service.protocol.messages import Status
 from denseface.service.settings import ServiceSettings
@@ -21,26 +21,24 @@ def status(**changed):
 
 
 @pytest.fixture
-def board():
+def snapshot():
     latencies = Latencies()
     for seconds in (0.3, 0.3, 100.0):
         latencies.observe("press_to_published", seconds)
-    board = Board()
-    board.picture = Picture(
+    return Snapshot(
         100.0, status(), (("accepted", "", 9), ("press_refused", "disk", 2), ("drops", "faces", 1),
                    ("refused", "unknown key", 7)), latencies.stages(), {"faces": 1, "preview": 0})
-    return board
 
 
-def samples(board):
-    text = Metrics(board).render().decode()
+def samples(snapshot):
+    text = Metrics(lambda: snapshot).render().decode()
     return {(one.name, *sorted(one.labels.values())): one.value
             for family in text_string_to_metric_families(text) for one in family.samples
             if one.name.startswith("denseface_")}
 
 
-def test_all_that_the_board_shows_is_rendered(board):
-    found = samples(board)
+def test_all_that_the_snapshot_holds_is_rendered(snapshot):
+    found = samples(snapshot)
     assert found["denseface_accepted_total",] == 9
     assert found["denseface_presses_refused_total", "disk"] == 2
     assert found["denseface_refused_total", "unknown key"] == 7
@@ -60,8 +58,8 @@ def test_all_that_the_board_shows_is_rendered(board):
     assert found["denseface_latency_seconds_sum", "press_to_published"] == pytest.approx(100.6)
 
 
-def test_what_never_happened_is_zero_so_that_alarms_can_be_set(board):
-    found = samples(board)
+def test_what_never_happened_is_zero_so_that_alarms_can_be_set(snapshot):
+    found = samples(snapshot)
     plain = [metric for metric, label, _ in COUNTERS.values() if label is None]
     assert len(plain) > 5
     for metric in plain:
@@ -69,15 +67,15 @@ def test_what_never_happened_is_zero_so_that_alarms_can_be_set(board):
 
 
 def test_nothing_is_known_before_the_first_status():
-    assert samples(Board()) == {}
+    assert samples(None) == {}
 
 
-def judged(board, *, now=100.5, why=None):
-    return Health(board, SETTINGS, lambda: why, lambda: now).report()
+def judged(snapshot, *, now=100.5, why=None):
+    return Health(lambda: snapshot, SETTINGS, lambda: why, lambda: now).report()
 
 
-def test_all_is_well(board):
-    assert judged(board) == (True, {
+def test_all_is_well(snapshot):
+    assert judged(snapshot) == (True, {
         "healthy": True, "missing": [], "version": "1.2", "sensors": 1, "workers": 2})
 
 
@@ -87,16 +85,15 @@ def test_all_is_well(board):
     ({"free_bytes": 99 * 2**20}, "disk: 99 MiB free, 100 MiB are to stay free"),
     ({"free_bytes": None}, "disk: its free room is not known"),
 ])
-def test_what_is_missing_has_a_name(board, changed, missing):
-    board.picture = Picture(100.0, status(**changed), (), {})
-    well, said = judged(board)
+def test_what_is_missing_has_a_name(snapshot, changed, missing):
+    well, said = judged(Snapshot(100.0, status(**changed), (), {}))
     assert (well, said["healthy"], said["missing"]) == (False, False, [missing])
 
 
-def test_a_hub_that_is_silent_a_store_and_everything(board):
-    assert judged(board, now=130.0)[1]["missing"] == ["hub: has not said how it is for 30 s"]
-    assert judged(board, why="no")[1]["missing"] == ["store: no"]
-    assert judged(Board(), why="no") == (False, {
+def test_a_hub_that_is_silent_a_store_and_everything(snapshot):
+    assert judged(snapshot, now=130.0)[1]["missing"] == ["hub: has not said how it is for 30 s"]
+    assert judged(snapshot, why="no")[1]["missing"] == ["store: no"]
+    assert judged(None, why="no") == (False, {
         "healthy": False, "missing": ["hub: has not said how it is yet", "store: no"],
         "version": None, "sensors": 0, "workers": 0})
 

@@ -5,7 +5,7 @@ from typing import get_args
 import pytest
 
 from denseface.recon.settings import Settings
-from denseface.service.monitoring.counters import Counters
+from denseface.service.monitoring.figures import Counters
 from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.payload import FrameHeader
@@ -81,12 +81,12 @@ def test_a_presser_gets_what_it_pressed(role, own, may):
 
 def test_refusals_are_all_counted_and_not_all_logged(capsys):
     counters, now = Counters(), [0.0]
-    refusals = Rejections(counters, lambda: now[0])
+    rejections = Rejections(counters, lambda: now[0])
     for _ in range(1000):
-        refusals.note("role", key="a")
-    refusals.note("malformed", key="b")
+        rejections.note("role", key="a")
+    rejections.note("malformed", key="b")
     now[0] = 60.0
-    refusals.note("role", key="a")
+    rejections.note("role", key="a")
     logged = [line for line in capsys.readouterr().out.splitlines() if "refused" in line]
     assert len(logged) == 7
     assert "more_unsaid=995" in logged[-1]

@@ -7,7 +7,7 @@ import pytest
 import zmq
 
 from denseface.service.errors import AddressError, KeyFileError
-from denseface.service.monitoring.counters import Counters
+from denseface.service.monitoring.figures import Counters
 from denseface.service.monitoring.rejections import Rejections
 from denseface.service.runtime.memory import MemoryWatch
 from denseface.service.security.allow_list import Role, allow, revoke
@@ -47,14 +47,14 @@ def _address(host="127.0.0.1"):
     return f"tcp://{f'[{host}]' if ':' in host else host}:{free_port(host)}"
 
 
-def _until(entrance, true):
+def _until(listeners, true):
     deadline = time.monotonic() + 20
-    heard = []
-    while not true(heard):
+    received = []
+    while not true(received):
         assert time.monotonic() < deadline
-        entrance.tick()
-        heard += entrance.receive(10)
-    return heard
+        listeners.tick()
+        received += listeners.receive(10)
+    return received
 
 
 def test_a_door_on_the_other_loopback(context):
@@ -62,60 +62,60 @@ def test_a_door_on_the_other_loopback(context):
         address = _address("::1")
     except OSError:
         pytest.skip("this machine has no IPv6")
-    door = Listener(context, address, None, Rejections(Counters()))
-    dealer, knock = connect(context, zmq.DEALER, address, None)
+    listener = Listener(context, address, None, Rejections(Counters()))
+    dealer, monitor = connect(context, zmq.DEALER, address, None)
     try:
         dealer.send(b"hello")
-        assert door.sockets[0].poll(10_000)
-        (incoming,) = door.receive()
+        assert listener.sockets[0].poll(10_000)
+        (incoming,) = listener.receive()
         assert incoming.parts == [b"hello"]
         assert incoming.sender.roles == frozenset(Role)
-        assert door.send(incoming.peer, [b"back"])
+        assert listener.send(incoming.peer, [b"back"])
         assert dealer.poll(10_000)
     finally:
-        knock.close()
+        monitor.close()
         dealer.close()
-        door.close()
+        listener.close()
 
 
 def test_an_address_in_use_is_named(context):
     address = _address()
-    door = Listener(context, address, None, Rejections(Counters()))
+    listener = Listener(context, address, None, Rejections(Counters()))
     with pytest.raises(AddressError, match=rf"^{address}: Address already in use$"):
         Listener(context, address, None, Rejections(Counters()))
-    door.close()
+    listener.close()
 
 
 def test_who_was_refused_comes_in_once_allowed(context, wakes, tmp_path, monkeypatch):
     """After a refusal libzmq alone would never knock again."""
-    monkeypatch.setattr("denseface.service.transport.connection._REDIAL_S", 0.1)
+    monkeypatch.setattr("denseface.service.transport.connection._RECONNECT_S", 0.1)
     _, hub_key = new_pair(tmp_path, "hub")
     secret, public = new_pair(tmp_path, "late")
     allow(tmp_path, "other", KeyPair.made().public, frozenset({Role.WORKER}))
-    address, refusals = _address(), Rejections(Counters())
+    address, rejections = _address(), Rejections(Counters())
     settings = ServiceSettings(address=address, key=secret, hub_key=hub_key)
-    doors = ServiceSettings(address=_address(), listen=(address,), keys=tmp_path)
-    entrance = Listeners(context, doors, refusals, [wakes])
-    dealer, knock = connect(context, zmq.DEALER, address, Credentials.of(settings))
+    hub_settings = ServiceSettings(address=_address(), listen=(address,), keys=tmp_path)
+    listeners = Listeners(context, hub_settings, rejections, [wakes])
+    dealer, monitor = connect(context, zmq.DEALER, address, Credentials.of(settings))
     try:
-        _until(entrance, lambda _: knock.read() or knock.refused)
-        assert "does not let this key in" in str(knock.refused)
-        assert refusals.counts()["unknown key"] >= 1
+        _until(listeners, lambda _: monitor.read() or monitor.refused)
+        assert "does not let this key in" in str(monitor.refused)
+        assert rejections.counts()["unknown key"] >= 1
         one = allow(tmp_path, "late", read_public(public), frozenset({Role.WORKER}))
-        _until(entrance, lambda _: knock.read() or not knock.refused)
+        _until(listeners, lambda _: monitor.read() or not monitor.refused)
         dealer.send(b"hello")
-        (incoming,) = _until(entrance, lambda heard: heard)
+        (incoming,) = _until(listeners, lambda received: received)
         assert (incoming.sender, incoming.key) == (one, one.fingerprint)
-        assert entrance.knows(incoming.peer)
-        assert entrance.send(incoming.peer, [b"back"])
+        assert listeners.is_allowed(incoming.peer)
+        assert listeners.send(incoming.peer, [b"back"])
         revoke(tmp_path, "late")
-        assert entrance.tick()
-        assert not entrance.knows(incoming.peer)
-        assert not entrance.send(incoming.peer, [b"back"])
+        assert listeners.tick()
+        assert not listeners.is_allowed(incoming.peer)
+        assert not listeners.send(incoming.peer, [b"back"])
     finally:
-        knock.close()
+        monitor.close()
         dealer.close(linger=0)
-        entrance.close()
+        listeners.close()
 
 
 def test_keys_are_for_other_machines(tmp_path):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from denseface.service.monitoring.latencies import BUCKETS_S, Histogram, Latencies
+from denseface.service.monitoring.figures import BUCKETS_S, Histogram, Latencies
 
 
 def test_each_time_falls_into_the_bucket_that_ends_at_or_above_it():
