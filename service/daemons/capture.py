@@ -12,12 +12,14 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
+import numpy as np
 import structlog
+from numpy.typing import NDArray
 
 from denseface.capture import CaptureError, RgbdFrame
 from denseface.capture.errors import SensorError
-from denseface.service.daemons.sensor import Sensor
-from denseface.service.daemons.shrink import shrunk
+from denseface.service.daemons.sensor import SensorReader
 from denseface.service.protocol.messages import (
     Announce,
     Frame,
@@ -29,7 +31,7 @@ from denseface.service.protocol.messages import (
     Take,
     TakePreview,
 )
-from denseface.service.protocol.payload import FrameHeader, PreviewHeader
+from denseface.service.protocol.payload import MAX_PREVIEW_SIDE, FrameHeader, PreviewHeader
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.failpoints import failpoint
@@ -56,7 +58,8 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None) ->
     CaptureError
         Where the source cannot be opened, or a live sensor went away.
     """
-    sensor = Sensor(uri, calibration)
+    cv2.setNumThreads(1)
+    sensor = SensorReader(uri, calibration)
     with StopSignal() as stop, Background[RgbdFrame | None]("sensor") as driver:
         try:
             with HubConnection(settings, "capture") as link:
@@ -66,7 +69,7 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None) ->
         return stop.exit_status
 
 
-def _close(driver: Background[RgbdFrame | None], sensor: Sensor) -> None:
+def _close(driver: Background[RgbdFrame | None], sensor: SensorReader) -> None:
     if not driver.ends_within(_CLOSING_S):
         structlog.get_logger("capture").error("the driver hangs", source=sensor.uri)
         os._exit(1)
@@ -89,7 +92,7 @@ class _Unsafe:
 
 class _Capture:
     def __init__(
-        self, settings: ServiceSettings, link: HubConnection, sensor: Sensor,
+        self, settings: ServiceSettings, link: HubConnection, sensor: SensorReader,
         driver: Background[RgbdFrame | None],
     ) -> None:
         self._settings = settings
@@ -120,7 +123,7 @@ class _Capture:
                 self._driver.start(self._sensor.take)
             elif self._preview_asked and not self._driver and not self._unsafe:
                 self._looking = True
-                self._driver.start(self._sensor.look)
+                self._driver.start(self._sensor.peek)
             self._send_again()
 
     def _receive(self, packet: Packet) -> None:
@@ -183,7 +186,7 @@ class _Capture:
             raise error
 
     def _send_preview(self, frame: RgbdFrame) -> None:
-        image = shrunk(frame.color)
+        image = _preview_image(frame.color)
         height, width, _ = image.shape
         self._link.send(PreviewFrame(preview=PreviewHeader(
             width=width, height=height, timestamp_us=frame.color_timestamp_us)),
@@ -209,3 +212,11 @@ class _Capture:
                 self._log.warning("frame not acknowledged, sent again", capture_id=capture_id,
                                   next_in_s=unsafe.pause_s)
                 self._send_once_more(capture_id)
+
+
+def _preview_image(color: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Shrink (h, w, 3) by a whole factor, to no side above `MAX_PREVIEW_SIDE`: means of areas."""
+    height, width = color.shape[:2]
+    factor = -(-max(height, width) // MAX_PREVIEW_SIDE)
+    size = max(width // factor, 1), max(height // factor, 1)
+    return np.asarray(cv2.resize(color, size, interpolation=cv2.INTER_AREA), np.uint8)

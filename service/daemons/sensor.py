@@ -1,4 +1,4 @@
-"""A source as the capture process uses it: without an end, and to be looked at before a press."""
+"""A source as the capture process reads it: without an end, and with a look ahead for previews."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,75 +7,75 @@ from typing import Protocol, runtime_checkable
 from denseface.capture import CaptureError, RgbdFrame, Source, open_source
 from denseface.capture.errors import SensorError, UnreadableSourceError
 
-__all__ = ["Sensor"]
+__all__ = ["SensorReader"]
 
 
 @runtime_checkable
-class _Live(Protocol):
+class _LiveSource(Protocol):
     """A source that goes on by itself."""
 
     def flush(self) -> None:
-        """Throw away what waits."""
+        """Discard the frames that wait."""
 
 
-class Sensor:
-    """All methods but `live` are called in the driver's thread."""
+class SensorReader:
+    """Reads frames of a sensor or recording; all but `live` is called in the driver's thread."""
 
     def __init__(self, uri: str, calibration: Path | None) -> None:
         self.uri = uri
         self._calibration = calibration
         self._source: Source | None = None
         self._frames: Iterator[RgbdFrame] = iter(())
-        self._ahead: RgbdFrame | CaptureError | None = None
-        """What the next `take` gives of a recording, where it was looked at before."""
-        self._looked = False
+        self._peeked: RgbdFrame | CaptureError | None = None
+        """What the next `take` gives of a recording, after a `peek`."""
+        self._flush_due = False
 
     @property
     def live(self) -> bool:
-        """Say whether it shows the world rather than a recording."""
-        return isinstance(self._source, _Live)
+        """Whether the source shows the world rather than a recording."""
+        return isinstance(self._source, _LiveSource)
 
     def open(self) -> None:
         """Open the source; raises as `open_source`."""
         self._source = open_source(self.uri, calibration=self._calibration)
 
     def take(self) -> RgbdFrame:
-        """Give the next frame of a recording, over and over; the newest of a live sensor.
+        """Give the newest frame of a live sensor; of a recording the next one, over and over.
 
         Raises
         ------
         CaptureError
             Where there is none.
         """
-        ahead, self._ahead = self._ahead, None
-        if isinstance(ahead, CaptureError):
-            raise ahead
-        if ahead is not None:
-            return ahead
-        if self._looked and isinstance(self._source, _Live):
-            self._source.flush()  # what was not looked at since is from before the press
-        self._looked = False
+        peeked, self._peeked = self._peeked, None
+        if isinstance(peeked, CaptureError):
+            raise peeked
+        if peeked is not None:
+            return peeked
+        if self._flush_due and isinstance(self._source, _LiveSource):
+            self._source.flush()  # frames that wait since the last preview are older than the press
+        self._flush_due = False
         return self._next()
 
-    def look(self) -> RgbdFrame:
-        """Give the frame that the next `take` gives of a recording; the newest of a live sensor.
+    def peek(self) -> RgbdFrame:
+        """Give the newest frame of a live sensor; of a recording the one that `take` gives next.
 
-        Raises as `take`; what is wrong with a recording, the next `take` says again.
+        Raises as `take`; an error of a recording is raised again by the next `take`.
         """
-        self._looked = True
+        self._flush_due = True
         if self.live:
             return self._next()
-        if self._ahead is None:
+        if self._peeked is None:
             try:
-                self._ahead = self._next()
+                self._peeked = self._next()
             except CaptureError as error:
-                self._ahead = error
-        if isinstance(self._ahead, CaptureError):
-            raise self._ahead
-        return self._ahead
+                self._peeked = error
+        if isinstance(self._peeked, CaptureError):
+            raise self._peeked
+        return self._peeked
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the source, where it is open."""
         if self._source is not None:
             self._source.close()
 

@@ -1,9 +1,10 @@
 """The capture process: a press goes before a preview, whatever the driver is at."""
 
+import numpy as np
 import pytest
 
 from denseface.capture.errors import SensorError, UnreadableSourceError
-from denseface.service.daemons.capture import _Capture
+from denseface.service.daemons.capture import _Capture, _preview_image
 from denseface.service.protocol import messages
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
@@ -91,8 +92,8 @@ class Eye:
     def take(self):
         return self._give("take")
 
-    def look(self):
-        return self._give("look")
+    def peek(self):
+        return self._give("peek")
 
     def _give(self, name):
         self.calls.append(name)
@@ -110,7 +111,7 @@ def served(eye, *script):
 
 
 def test_a_preview_is_sent_once_when_it_is_asked_for():
-    assert served(Eye(live=True), LOOK, ENDED) == (["preview_frame"], ["look"])
+    assert served(Eye(live=True), LOOK, ENDED) == (["preview_frame"], ["peek"])
 
 
 def test_a_press_goes_before_a_preview_that_is_asked_for_with_it():
@@ -119,18 +120,18 @@ def test_a_press_goes_before_a_preview_that_is_asked_for_with_it():
 
 
 def test_what_a_live_sensor_gives_for_a_preview_is_for_the_press_that_came_meanwhile():
-    assert served(Eye(live=True), LOOK, take("a"), ENDED) == (["a", "preview_frame"], ["look"])
+    assert served(Eye(live=True), LOOK, take("a"), ENDED) == (["a", "preview_frame"], ["peek"])
 
 
 def test_a_second_press_goes_before_the_preview_too():
     assert served(Eye(live=True), LOOK, take("a"), take("b"), ENDED, ENDED) == (
-        ["a", "b", "preview_frame"], ["look", "take"])
+        ["a", "b", "preview_frame"], ["peek", "take"])
 
 
 def test_a_recording_s_press_takes_the_frame_that_was_looked_at():
-    # `Sensor.take` gives it at once; the preview that is owed shows the one after.
+    # `SensorReader.take` gives it at once; the preview that is owed shows the one after.
     assert served(Eye(live=False), LOOK, take("a"), ENDED, ENDED, safe("a"), ENDED) == (
-        ["a", "preview_frame"], ["look", "take", "look"])
+        ["a", "preview_frame"], ["peek", "take", "peek"])
 
 
 def test_no_preview_while_a_frame_is_not_safe():
@@ -151,11 +152,30 @@ def test_a_frame_that_is_not_acknowledged_is_sent_again_at_growing_intervals(mon
 
 def test_a_preview_that_fails_is_no_frame_that_fails():
     error = UnreadableSourceError("damaged")
-    assert served(Eye(error, live=False), LOOK, ENDED) == ([], ["look"])
+    assert served(Eye(error, live=False), LOOK, ENDED) == ([], ["peek"])
     assert served(Eye(error, live=False), LOOK, take("a"), ENDED, ENDED) == (
-        ["a"], ["look", "take"])
+        ["a"], ["peek", "take"])
 
 
 def test_a_sensor_that_went_away_ends_the_process_at_a_preview_too():
     with pytest.raises(SensorError, match="unplugged"):
         served(Eye(SensorError("unplugged"), live=True), LOOK, ENDED)
+
+
+@pytest.mark.parametrize(("shape", "small"), [
+    ((480, 640), (240, 320)), ((1024, 1280), (256, 320)), ((240, 320), (240, 320)),
+    ((7, 10), (7, 10)), ((1000, 3), (250, 1)), ((321, 321), (160, 160)), ((1, 5000), (1, 312))])
+def test_a_preview_is_small_enough_to_send(shape, small):
+    image = np.full((*shape, 3), (1, 100, 255), np.uint8)
+    found = _preview_image(image)
+    assert (found.shape, found.dtype) == ((*small, 3), np.uint8)
+    assert (found == (1, 100, 255)).all()
+
+
+@pytest.mark.parametrize("factor", [2, 3, 4])
+def test_a_pixel_of_a_preview_is_the_mean_of_those_it_covers(factor):
+    rng = np.random.default_rng(factor)
+    image = rng.integers(0, 256, (240 * factor, 320 * factor, 3), np.uint8)
+    image.flags.writeable = False  # as those of a frame are
+    means = image.reshape(240, factor, 320, factor, 3).mean((1, 3))
+    assert np.abs(_preview_image(image) - means).max() <= 0.5

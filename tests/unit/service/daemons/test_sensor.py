@@ -1,0 +1,87 @@
+"""A source read without an end, with a look ahead for previews."""
+
+from pathlib import Path
+
+import pytest
+
+from denseface.capture.errors import SensorError, UnreadableSourceError
+from denseface.service.daemons import sensor
+from denseface.service.daemons.sensor import SensorReader
+from tests.unit.service.faces import small_frame
+
+
+class Recording:
+    """A source of three frames, the second time of none."""
+
+    uri = "x"
+
+    def __init__(self):
+        self.frames = [small_frame(seed) for seed in range(3)]
+        self.closed = False
+
+    def __iter__(self):
+        yield from self.frames
+
+    def close(self):
+        self.closed = True
+
+
+class LiveCamera(Recording):
+    """Goes on for ever, and notes what was thrown away."""
+
+    flushed = 0
+
+    def __iter__(self):
+        number = 0
+        while True:
+            number += 1
+            yield small_frame(number)
+
+    def flush(self):
+        self.flushed += 1
+
+
+def opened(monkeypatch, source):
+    monkeypatch.setattr(sensor, "open_source", lambda *_, **__: source)
+    reader = SensorReader("x", Path("unused"))
+    reader.open()
+    return reader
+
+
+def test_what_is_seen_of_a_recording_is_what_the_next_press_gives(monkeypatch):
+    source = Recording()
+    reader = opened(monkeypatch, source)
+    assert not reader.live
+    assert reader.peek() is reader.peek() is source.frames[0]
+    assert reader.take() is source.frames[0]
+    assert reader.take() is source.frames[1]
+    assert reader.peek() is source.frames[2]
+    assert [reader.take() is one for one in (source.frames[2], source.frames[0])] == [True, True]
+    reader.close()
+    assert source.closed
+
+
+def test_what_is_wrong_with_a_recording_the_press_hears_too(monkeypatch):
+    source = Recording()
+    source.frames = []
+    reader = opened(monkeypatch, source)
+    for call in (reader.peek, reader.peek, reader.take):
+        with pytest.raises(UnreadableSourceError, match="holds no pair"):
+            call()
+
+
+def test_a_press_after_a_look_gets_nothing_from_before_it(monkeypatch):
+    source = LiveCamera()
+    reader = opened(monkeypatch, source)
+    assert reader.live
+    reader.take()
+    assert source.flushed == 0
+    reader.peek()
+    reader.peek()
+    reader.take()
+    assert source.flushed == 1
+
+
+def test_a_source_that_is_not_open_says_so():
+    with pytest.raises(SensorError, match="is not open"):
+        SensorReader("x", None).take()
