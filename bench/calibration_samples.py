@@ -16,7 +16,7 @@ from denseface.capture import RgbdFrame
 from denseface.recon import Preset, ReconstructionError, reconstruct
 from denseface.recon.face import Face
 from denseface.recon.propagation import densify
-from denseface.recon.propagation.uncertainty import Sources, sources_of_error
+from denseface.recon.propagation.uncertainty import VarianceComponents, variance_components
 from tests.simulator import KINECT_CALIBRATED, Person, Scene, Truth, head_names, simulate
 
 __all__ = ["CHOOSING", "REPORTING", "Samples", "frames", "sample"]
@@ -45,7 +45,7 @@ class Samples:
     error : (m,) mm along the viewing ray, signed
     distance : (m,) mm from the true surface; NaN where it was not asked for
     sigma, z : (m,) mm
-    sources : (m, 4) mm^2, `Sources`' noise, hole, slope and rim
+    components : (m, 4) mm^2, `VarianceComponents`' noise, hole, slope and rim
     hole, rim : (m,) bool
     everywhere : (m,) bool, drawn from all points; the others were added to have enough in holes
     """
@@ -54,7 +54,7 @@ class Samples:
     distance: Floats
     sigma: Floats
     z: Floats
-    sources: Floats
+    components: Floats
     hole: NDArray[np.bool_]
     rim: NDArray[np.bool_]
     everywhere: NDArray[np.bool_]
@@ -82,10 +82,10 @@ def frames(heads: tuple[str, ...], count: int, seed: int) -> Iterator[tuple[Rgbd
 
 
 @dataclass(frozen=True, eq=False)
-class _Kept:
-    """Sources with the place of their first node, (x, y), and the distance of nodes, mm."""
+class _PlacedComponents:
+    """Variance components, (x, y) of their first node, and the distance of nodes, mm."""
 
-    sources: Sources
+    components: VarianceComponents
     origin: tuple[float, float]
     step: float
 
@@ -93,14 +93,14 @@ class _Kept:
         """Interpolate them at points, (n, 3) to (n, 4)."""
         x, y = ((points[:, axis] - self.origin[axis]) / self.step for axis in (0, 1))
         return np.column_stack([map_coordinates(
-            plane.astype(np.float64), (y, x), order=1, mode="nearest") for plane in (
-                self.sources.noise, self.sources.hole, self.sources.slope, self.sources.rim)])
+            getattr(self.components, name).astype(np.float64), (y, x), order=1, mode="nearest")
+            for name in ("noise", "hole", "slope", "rim")])
 
 
 def sample(frame: RgbdFrame, truth: Truth, preset: Preset, *, distance: bool) -> Samples | None:
     """Reconstruct a frame and draw some of its points; None where it gives no face."""
     try:
-        with _sources_kept() as kept:
+        with _recorded_components() as recorded:
             case = Case("", frame, truth, reconstruct(frame, with_preset(preset)))
     except ReconstructionError:
         return None
@@ -119,7 +119,7 @@ def sample(frame: RgbdFrame, truth: Truth, preset: Preset, *, distance: bool) ->
                   else np.full(len(points), np.nan)),
         sigma=dense.sigma[chosen].astype(np.float64),
         z=points[:, 2].astype(np.float64),
-        sources=kept[0].at(points),
+        components=recorded[0].at(points),
         hole=case.hole[chosen],
         rim=_rim(case.face)[chosen],
         everywhere=everywhere[chosen],
@@ -127,18 +127,18 @@ def sample(frame: RgbdFrame, truth: Truth, preset: Preset, *, distance: bool) ->
 
 
 @contextmanager
-def _sources_kept() -> Iterator[list[_Kept]]:
-    """Keep what `reconstruct` makes sigma of; it is not in the face."""
-    kept: list[_Kept] = []
+def _recorded_components() -> Iterator[list[_PlacedComponents]]:
+    """Record what `reconstruct` makes sigma of; it is not in the face."""
+    recorded: list[_PlacedComponents] = []
 
-    def keep(*arguments: Any) -> Sources:
-        found = sources_of_error(*arguments)
+    def record(*arguments: Any) -> VarianceComponents:
+        found = variance_components(*arguments)
         *_, origin, step, _ = arguments
-        kept.append(_Kept(found, origin, step * found.every))
+        recorded.append(_PlacedComponents(found, origin, step * found.every))
         return found
 
-    with mock.patch.object(densify, "sources_of_error", keep):
-        yield kept
+    with mock.patch.object(densify, "variance_components", record):
+        yield recorded
 
 
 def _rim(face: Face) -> NDArray[np.bool_]:

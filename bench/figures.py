@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from bench.cases import Case
-from bench.tally import BINS, Tally
+from bench.error_summary import BINS, ErrorSummary
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -45,13 +45,13 @@ def error_maps(case: Case, errors: dict[str, NDArray[np.float64]], path: Path) -
     _save(figure, path, 72)
 
 
-def error_histogram(tallies: list[Tally], path: Path) -> None:
+def error_histogram(summaries: list[ErrorSummary], path: Path) -> None:
     """Draw the share of points by error, 0-5.5 mm, the range of the paper's Figure 9."""
     figure, axis = plt.subplots(figsize=(8, 5), layout="constrained")
     width = BINS[1] - BINS[0]
-    for tally in tallies:
-        ours = tally.name.startswith("ours")
-        axis.stairs(100 * tally.counts / tally.points / width, BINS, label=tally.name,
+    for summary in summaries:
+        ours = summary.name.startswith("ours")
+        axis.stairs(100 * summary.counts / summary.points / width, BINS, label=summary.name,
                     linewidth=1.8 if ours else 0.9, linestyle="-" if ours else "--")
     axis.set(xlim=(0, GROSS_MM), yscale="log", ylim=(0.02, 200),
              xlabel="distance from the true surface, mm", ylabel="points, % per mm")

@@ -8,7 +8,7 @@ from bench.cases import Case
 from denseface.recon import Settings
 from denseface.recon.pipeline import surface_of
 from denseface.recon.propagation.densify import densify
-from denseface.recon.propagation.uncertainty import noise_share
+from denseface.recon.propagation.uncertainty import noise_fraction
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation.segment import segment_face
 from denseface.recon.surface.spacing import mean_spacing
@@ -34,6 +34,6 @@ def after_segmentation(case: Case, known: Settings) -> Callable[[], object]:
     def call() -> object:
         spacing = mean_spacing(seeds.points, seeds.pixels, known.neighbors)
         surface = surface_of(seeds.points, spacing, known, sampler)
-        return densify(seeds, surface, spacing, known.ratio, noise_share(known), sampler)
+        return densify(seeds, surface, spacing, known.ratio, noise_fraction(known), sampler)
 
     return call

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from bench.cases import Case, recorded, simulated, with_preset
+from bench.error_summary import HEADINGS, ErrorSummary
 from bench.flags import add_flags, check_flags, open_pcl
 from bench.literal import exact_interpolation
 from bench.machine import describe
 from bench.pcl_peer import Pcl
 from bench.peer_methods import griddata_points, inpaint_points, poisson_points, rbf_points
-from bench.tally import HEADINGS, Tally
 from denseface.recon import Preset, reconstruct
 
 __all__: list[str] = []
@@ -88,11 +88,11 @@ def _methods(pcl: Pcl | None, *, more: bool) -> Iterator[_Method]:
 
 
 def _run(cases: Iterable[Case], methods: list[_Method]) -> tuple[
-        dict[str, list[Tally]], dict[str, NDArray[np.float64]], Case | None, int]:
-    """Every method on every frame, by turns: tallies, error map of one frame, frames."""
-    tallies = {m.name: [Tally(f"{m.name}, {v}" if v else m.name) for v in m.variants]
-               for m in methods}
-    raw = Tally("raw seeds (the sensor)")
+        dict[str, list[ErrorSummary]], dict[str, NDArray[np.float64]], Case | None, int]:
+    """Every method on every frame, by turns: summaries, error map of one frame, frames."""
+    summaries = {m.name: [ErrorSummary(f"{m.name}, {v}" if v else m.name) for v in m.variants]
+                 for m in methods}
+    raw = ErrorSummary("raw seeds (the sensor)")
     maps: dict[str, NDArray[np.float64]] = {}
     mapped: Case | None = None
     count = 0
@@ -104,22 +104,22 @@ def _run(cases: Iterable[Case], methods: list[_Method]) -> tuple[
         chosen = case.name == _MAP_OF or mapped is None
         mapped = case if chosen else mapped
         for method in methods:
-            for tally, run in zip(tallies[method.name], method.variants.values(), strict=True):
+            for summary, run in zip(summaries[method.name], method.variants.values(), strict=True):
                 points, took = run(case)
                 errors = case.errors(points)
-                tally.add(errors, case.hole, ours, took)
+                summary.add(errors, case.hole, ours, took)
                 if chosen:
-                    maps[tally.name] = errors
+                    maps[summary.name] = errors
         print(f"{case.name}: {len(case.seeds):,} seeds, {len(ours):,} places, "
               f"{case.hole.sum():,} in holes", file=sys.stderr, flush=True)
-    return {raw.name: [raw], **tallies}, maps, mapped, count
+    return {raw.name: [raw], **summaries}, maps, mapped, count
 
 
-def _print_table(tallies: list[Tally]) -> None:
+def _print_table(summaries: list[ErrorSummary]) -> None:
     print("| " + " | ".join(HEADINGS) + " |")
     print("|" + " --- |" * len(HEADINGS))
-    for tally in tallies:
-        print(tally.row(), flush=True)
+    for summary in summaries:
+        print(summary.row(), flush=True)
 
 
 def _print_literal(case: Case) -> None:

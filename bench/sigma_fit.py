@@ -13,7 +13,7 @@ from scipy.optimize import brentq, minimize
 
 from bench.calibration_samples import Samples
 from denseface.recon import Preset, Settings
-from denseface.recon.propagation.uncertainty import average_cutoff, cutoff
+from denseface.recon.propagation.uncertainty import averaging_cutoff, fit_cutoff
 
 __all__ = ["fitted"]
 
@@ -32,22 +32,22 @@ def fitted(samples: dict[Preset, Samples]) -> dict[str, float]:
     The rim of a fit alone, without detail, is that of the other two presets.
     """
     best = samples[Preset.BEST]
-    share, hole, slope, rim = _most_likely(best.sources, best)
-    alone = [_most_likely(samples[preset].sources, samples[preset])[3] for preset in _FITS_ALONE]
+    share, hole, slope, rim = _most_likely(best.components, best)
+    alone = [_most_likely(samples[preset].components, samples[preset])[3] for preset in _FITS_ALONE]
     found = {"_HOLE": hole / share, "_SLOPE": slope, "_RIM": rim,
              "_RIM_ALONE": math.sqrt(math.prod(alone))}
     scale = math.sqrt(math.prod(_scale(preset, samples[preset], found)
                                 for preset in _FITS_ALONE))
     settings = Settings.of(Preset.BEST)
-    base = scale * cutoff(settings.r0_factor, settings.smoothing) ** 2
-    detail = scale * average_cutoff(settings.detail_factor or math.inf) ** 2
+    base = scale * fit_cutoff(settings.r0_factor, settings.smoothing) ** 2
+    detail = scale * averaging_cutoff(settings.detail_factor or math.inf) ** 2
     return found | {"_SHARE": scale, "_DETAIL_PART": (share - base) / detail}
 
 
-def _most_likely(sources: Floats, of: Samples) -> Floats:
-    """Give the nonnegative coefficients of the sources, (k,)."""
-    size = sources.mean(axis=0)
-    parts, squares = sources / size, of.error**2
+def _most_likely(components: Floats, of: Samples) -> Floats:
+    """Give the nonnegative coefficients of the components, (k,)."""
+    size = components.mean(axis=0)
+    parts, squares = components / size, of.error**2
     weights = np.where(of.rim, _RIM_WEIGHT, 1.0)
     weights /= weights.sum()
 
@@ -62,16 +62,16 @@ def _most_likely(sources: Floats, of: Samples) -> Floats:
     start = np.full(parts.shape[1], -math.log(parts.shape[1]))
     found = np.exp(minimize(cost, start, jac=True, method="L-BFGS-B",
                             bounds=[(-14, 6)] * len(start)).x) / size
-    return np.asarray(found * _balanced(sources @ found, of) ** 2)
+    return np.asarray(found * _balanced(components @ found, of) ** 2)
 
 
 def _scale(preset: Preset, of: Samples, known: dict[str, float]) -> float:
     """Give what balances a preset of one fit, where all else is known: its share by (h / L)^2."""
-    noise = of.sources[:, 0] + known["_HOLE"] * of.sources[:, 1]
-    rest = of.sources[:, 2:] @ [known["_SLOPE"], known["_RIM_ALONE"]]
+    noise = of.components[:, 0] + known["_HOLE"] * of.components[:, 1]
+    rest = of.components[:, 2:] @ [known["_SLOPE"], known["_RIM_ALONE"]]
     settings = Settings.of(preset)
     share = brentq(lambda share: _imbalance(np.sqrt(share * noise + rest), of), 0.01, 20)
-    return float(share) / cutoff(settings.r0_factor, settings.smoothing) ** 2
+    return float(share) / fit_cutoff(settings.r0_factor, settings.smoothing) ** 2
 
 
 def _balanced(variance: Floats, of: Samples) -> float:

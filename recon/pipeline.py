@@ -19,7 +19,7 @@ from denseface.recon.face import Face, PointCloud, Report
 from denseface.recon.intermediate import ColorSampler, Registration
 from denseface.recon.numerics.threads import one_blas_thread
 from denseface.recon.propagation.densify import densify
-from denseface.recon.propagation.uncertainty import noise_share
+from denseface.recon.propagation.uncertainty import noise_fraction
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation.segment import segment_face, window_of_box
 from denseface.recon.settings import Settings
@@ -73,7 +73,7 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     sampler = partial(sample_colors, frame, registered)
     surface = surface_of(seeds.points, spacing, settings, sampler)
     clock.lap("rbf")
-    dense = densify(seeds, surface, spacing, settings.ratio, noise_share(settings),
+    dense = densify(seeds, surface, spacing, settings.ratio, noise_fraction(settings),
                     sampler)
     clock.lap("propagation")
     initial = PointCloud(seeds.points, seeds.colors)

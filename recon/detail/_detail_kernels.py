@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["face_field", "lay_under", "shares", "slopes"]
+__all__ = ["blend_toward", "face_field", "shares", "slopes"]
 
 _1 = np.uint64(1)
 
@@ -60,7 +60,7 @@ def shares(
 
 
 @compiled
-def lay_under(
+def blend_toward(
     detail: NDArray[np.float32], broad: NDArray[np.float32], nearness: NDArray[np.float32],
     missing: NDArray[np.float32],
 ) -> None:
@@ -79,7 +79,7 @@ def face_field(
     heights: NDArray[np.float32], detail: NDArray[np.float32], seeded: NDArray[np.float32],
     inner: NDArray[np.float32], step: float,
 ) -> NDArray[np.float32]:
-    """Give the field that a face is mirrored in, (rows, columns, 5); see `helped_by_mirror`.
+    """Give the field that a face is mirrored in, (rows, columns, 5); see `symmetry_correction`.
 
     heights, detail, seeded : (2 rows, 2 columns), of which every second point counts
     inner : (rows, columns), weight as a mirror image

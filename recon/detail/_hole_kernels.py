@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["lay_in", "least_bent"]
+__all__ = ["interpolate_filled", "minimize_bending"]
 
 # So often it is found, each time with the slopes of the one before.
 _TIMES = 2
@@ -25,7 +25,7 @@ _CUBIC = np.array([[-t + 2 * t**2 - t**3, 2 - 5 * t**2 + 3 * t**3,
 
 
 @compiled
-def least_bent(
+def minimize_bending(
     counts: NDArray[np.float32], sums: NDArray[np.float32], base: NDArray[np.float32],
     added: NDArray[np.float32], labels: NDArray[np.int32], boxes: NDArray[np.int32],
     inside: NDArray[np.bool_], smoothing: float, step: float,
@@ -151,12 +151,12 @@ def _solve(A: NDArray[np.float64], b: NDArray[np.float64]) -> None:
 
 
 @compiled
-def lay_in(
+def interpolate_filled(
     added: NDArray[np.float32], labels: NDArray[np.int32], share: NDArray[np.float32],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Give at four times as many points what cells say, times a share, and the share itself.
 
-    added, labels : (rows, columns), of cells, as of `least_bent`
+    added, labels : (rows, columns), of cells, as of `minimize_bending`
     share : four times as many points each way, or up to three fewer
 
     Both are zero where there is no hole.

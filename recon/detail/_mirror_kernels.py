@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from denseface.recon.numerics.jit import compiled
 from denseface.recon.numerics.linear_solve import solved
 
-__all__ = ["facing_points", "mirror_costs", "mirror_image", "most_curved", "refine_plane"]
+__all__ = ["mirror_costs", "mirror_image", "principal_curvature_angle", "refine_plane",
+           "sample_points"]
 
 
 @compiled
-def facing_points(
+def sample_points(
     field: NDArray[np.float32], origin: NDArray[np.float64], step: float, every: int,
     facing: float,
 ) -> NDArray[np.float64]:
@@ -37,7 +38,7 @@ def facing_points(
 
 
 @compiled
-def most_curved(points: NDArray[np.float64]) -> float:
+def principal_curvature_angle(points: NDArray[np.float64]) -> float:
     """Give the direction across the view in which points about their middle curve away most.
 
     points : (n, 3); gives the angle from x toward y

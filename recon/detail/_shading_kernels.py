@@ -5,14 +5,22 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["along_light", "brightness_of", "descend", "from_along_light", "only_seen",
-           "shade_residuals", "weigh", "weighted_points"]
+__all__ = [
+    "apply_jacobian",
+    "apply_jacobian_transpose",
+    "brightness_image",
+    "conjugate_gradient_step",
+    "grid_points",
+    "masked_brightness",
+    "shading_residuals",
+    "weigh",
+]
 
 Image = NDArray[np.float32]
 
 
 @compiled
-def weighted_points(
+def grid_points(
     weight: Image, xs: NDArray[np.float64], ys: NDArray[np.float64], heights: Image
 ) -> Image:
     """Give the points of a grid whose weight is not zero, (n, 3), row by row."""
@@ -27,10 +35,10 @@ def weighted_points(
 
 
 @compiled
-def brightness_of(
+def brightness_image(
     colors: NDArray[np.uint8], seen: NDArray[np.bool_], table: Image, full: int, weight: Image
 ) -> Image:
-    """Put the linear brightness of `weighted_points` back on their grid; 0 elsewhere.
+    """Put the linear brightness of `grid_points` back on their grid; 0 elsewhere.
 
     Parameters
     ----------
@@ -56,7 +64,7 @@ def brightness_of(
 
 
 @compiled
-def only_seen(brightness: Image, weight: Image) -> Image:
+def masked_brightness(brightness: Image, weight: Image) -> Image:
     """Give (rows, columns, 2): 1, and the brightness, where the weight is not zero; else 0."""
     out = np.zeros((*weight.shape, 2), np.float32)
     for i in range(weight.shape[0]):
@@ -67,7 +75,7 @@ def only_seen(brightness: Image, weight: Image) -> Image:
 
 
 @compiled
-def shade_residuals(
+def shading_residuals(
     brightness: Image, across: Image, down: Image, light: NDArray[np.float32], least: float,
     residuals: Image, by_across: Image, by_down: Image,
 ) -> None:
@@ -77,7 +85,7 @@ def shade_residuals(
     ----------
     brightness : (rows, columns), linear
     across, down : (rows, columns), dz/dx and dz/dy
-    light : (9,), as `lit_places`
+    light : (9,), as `sample_harmonics`
     least : less light is taken for so much
     residuals : written to, about the logarithm of brightness over light: 2 (a - b) / (a + b)
     by_across, by_down : written to, how the light's logarithm changes with dz/dx and dz/dy
@@ -141,7 +149,7 @@ def weigh(
 
 
 @compiled
-def along_light(heights: Image, right: Image, lower: Image, out: Image) -> None:
+def apply_jacobian(heights: Image, right: Image, lower: Image, out: Image) -> None:
     """Write a height's differences along x and y, weighted by `right` and `lower`, and summed.
 
     All (rows, columns); the outermost places of `out` are left alone.
@@ -154,8 +162,8 @@ def along_light(heights: Image, right: Image, lower: Image, out: Image) -> None:
 
 
 @compiled
-def from_along_light(values: Image, right: Image, lower: Image, out: Image) -> None:
-    """Write the transpose of `along_light` times values."""
+def apply_jacobian_transpose(values: Image, right: Image, lower: Image, out: Image) -> None:
+    """Write the transpose of `apply_jacobian` times values."""
     rows, columns = values.shape
     for i in range(1, rows - 1):
         for j in range(1, columns - 1):
@@ -165,7 +173,7 @@ def from_along_light(values: Image, right: Image, lower: Image, out: Image) -> N
 
 
 @compiled
-def descend(
+def conjugate_gradient_step(
     rest: Image, smooth: Image, variance: float, right: Image, lower: Image, way: Image,
     smooth_way: Image, heights: Image, last: float,
 ) -> float:
@@ -175,7 +183,7 @@ def descend(
     ----------
     rest : what is left of the right side, changed
     smooth : the same, blurred; times the variance it is times the preconditioner
-    right, lower : as of `along_light`
+    right, lower : as of `apply_jacobian`
     way : where to, changed; smooth_way : the same times the preconditioner, kept beside it
     heights : the solution so far, changed
     last : what the step before gave; any number at first, with ways of zero
@@ -196,8 +204,8 @@ def descend(
             way[i, j] = share * way[i, j] + rest[i, j]
             smooth_way[i, j] = share * smooth_way[i, j] + factor * smooth[i, j]
     along, image = np.zeros((rows, columns), np.float32), np.zeros((rows, columns), np.float32)
-    along_light(smooth_way, right, lower, along)
-    from_along_light(along, right, lower, image)
+    apply_jacobian(smooth_way, right, lower, along)
+    apply_jacobian_transpose(along, right, lower, image)
     norm = np.float32(0)
     for i in range(rows):
         for j in range(columns):

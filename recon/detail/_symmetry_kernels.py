@@ -14,7 +14,7 @@ _LEAST_SHARE = np.float32(1e-6)
 
 @compiled
 def halved_moments(field: Image, image: Image, hole: Image) -> tuple[Image, Image, Image]:
-    """Give what `helped_by_mirror` averages, the first and the last as sums over each four pixels.
+    """Give what `symmetry_correction` averages, first and last as sums over each four pixels.
 
     field : (rows, columns, 5) and image : (5, rows, columns), as there; hole : (rows, columns)
 
@@ -94,7 +94,7 @@ def add_mirrored(
     field: Image, image: Image, kept: Image, hole: Image, parts: Image, differs: Image,
     broad: float, least: float,
 ) -> Image:
-    """Give what the mirror image adds, (rows, columns), mm along z: see `helped_by_mirror`.
+    """Give what the mirror image adds, (rows, columns), mm along z: see `symmetry_correction`.
 
     parts : (rows, columns, 3), as of `parts_kept`; differs : (rows, columns), mm^2, how far the
         broad fits of both sides are apart

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.detail._detail_kernels import face_field, lay_under, shares, slopes
+from denseface.recon.detail._detail_kernels import blend_toward, face_field, shares, slopes
 from denseface.recon.detail.holes import fill_holes
 from denseface.recon.detail.mirror_plane import find_plane
-from denseface.recon.detail.rim import BROADER, Rim, broad_average
+from denseface.recon.detail.rim import BROADER, Rim, iterated_average
 from denseface.recon.detail.shading import shading_detail
-from denseface.recon.detail.symmetry import helped_by_mirror
+from denseface.recon.detail.symmetry import symmetry_correction
 from denseface.recon.intermediate import ColorSampler
 from denseface.recon.numerics.bilinear import add_resampled
 from denseface.recon.numerics.filters import blurred, downsampled, upsampled
@@ -57,7 +57,7 @@ class DetailedSurface:
     noise : standard deviation of the seeds about the surface, mm
     """
 
-    sheet: Image
+    surface_grid: Image
     support: Support
     noise: float
 
@@ -74,7 +74,7 @@ class DetailedSurface:
         """
         columns, rows = self.support.places(xs, ys)
         found = np.zeros((3, len(rows), len(columns)), np.float32)
-        for one, known in zip(found, self.sheet, strict=True):
+        for one, known in zip(found, self.surface_grid, strict=True):
             add_resampled(one, known, rows, columns)
         return found[0], found[1], found[2]
 
@@ -98,18 +98,18 @@ def add_detail(
     xs, ys, step, support = supported.xs, supported.ys, supported.step, supported.inside
     columns, rows = (((points[:, axis] - low) / step).astype(np.float32)
                      for axis, low in ((0, xs[0]), (1, ys[0])))
-    grid = _Seeded(columns, rows, support.shape)
+    grid = _SeedGrid(columns, rows, support.shape)
     heights = base.heights(xs, ys)
     rest = points[:, 2] - grid.at_seeds(heights)
     usual = np.float32((step / spacing) ** 2)
-    weight, detail = (blurred(one, _unshared(radius / step)) for one in grid.sums(rest))
+    weight, detail = (blurred(one, _blur_after_scatter(radius / step)) for one in grid.sums(rest))
     seeded, missing = shares(weight, detail, float(usual) * _FADING, float(usual) * _FULL)
     rim = Rim.of(support, step / spacing)
     # So broad an average needs no more than every fourth point.
     cells = grid.halved().halved()
     counts, sums = cells.sums(rest)
-    broad = broad_average(counts, sums, BROADER * radius / (4 * step), 16 * float(usual), rim, 2)
-    lay_under(detail, upsampled(broad, detail.shape), upsampled(rim.nearness, detail.shape),
+    broad = iterated_average(counts, sums, BROADER * radius / (4 * step), 16 * float(usual), rim, 2)
+    blend_toward(detail, upsampled(broad, detail.shape), upsampled(rim.nearness, detail.shape),
               missing)
     filled, hole = fill_holes(counts, sums, missing, rim, heights, detail, spacing)
     detail *= 1 - hole
@@ -130,8 +130,8 @@ def add_detail(
     detail *= share
     more = np.zeros_like(shown)
     if plane is not None:
-        more = helped_by_mirror(field, kept, filled[some], hole[some], plane, noise, _WINDOW_MM,
-                                origin, spacing)
+        more = symmetry_correction(field, kept, filled[some], hole[some], plane, noise,
+                                   _WINDOW_MM, origin, spacing)
     if sampler is not None:
         surface = heights[some] + detail[some] + filled[some] + more
         across, down = np.empty_like(surface), np.empty_like(surface)
@@ -143,15 +143,16 @@ def add_detail(
     smaller = downsampled(heights)
     across, down = np.empty_like(smaller), np.empty_like(smaller)
     slopes(smaller, 2 * step, across, down)
-    detail += upsampled(rim.frayed_depth((across, down), spacing), detail.shape)
+    detail += upsampled(rim.fraying_correction((across, down), spacing), detail.shape)
     detail += filled
-    sheet = np.empty((3, *detail.shape), np.float32)
-    np.add(heights, detail, out=sheet[0])
-    slopes(sheet[0], step, sheet[1], sheet[2])
-    return DetailedSurface(sheet, supported, noise=float((rest - grid.at_seeds(detail)).std()))
+    surface_grid = np.empty((3, *detail.shape), np.float32)
+    np.add(heights, detail, out=surface_grid[0])
+    slopes(surface_grid[0], step, surface_grid[1], surface_grid[2])
+    noise_mm = float((rest - grid.at_seeds(detail)).std())
+    return DetailedSurface(surface_grid, supported, noise_mm)
 
 
-class _Seeded:
+class _SeedGrid:
     """Seeds over an image.
 
     Parameters
@@ -164,11 +165,11 @@ class _Seeded:
     def __init__(self, columns: Image, rows: Image, shape: tuple[int, ...]) -> None:
         self.columns, self.rows, self.shape = columns, rows, shape
 
-    def halved(self) -> "_Seeded":
+    def halved(self) -> "_SeedGrid":
         """The same over an image of which each pixel is four of these."""
         half = np.float32(0.5)
         columns, rows = (half * (one - half) for one in (self.columns, self.rows))
-        return _Seeded(columns, rows, ((self.shape[0] + 1) // 2, (self.shape[1] + 1) // 2))
+        return _SeedGrid(columns, rows, ((self.shape[0] + 1) // 2, (self.shape[1] + 1) // 2))
 
     def sums(self, values: Image) -> tuple[Image, Image]:
         """Sum the seeds, and their values, each shared among the four pixels around it."""
@@ -181,7 +182,7 @@ class _Seeded:
         return read_between(image, self.columns, self.rows)
 
 
-def _unshared(sigma: float) -> float:
+def _blur_after_scatter(sigma: float) -> float:
     """The radius of a blur, less what sharing a value among four pixels has blurred already."""
     return math.sqrt(sigma * sigma - BILINEAR_VARIANCE)
 

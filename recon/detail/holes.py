@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.detail._hole_kernels import lay_in, least_bent
+from denseface.recon.detail._hole_kernels import interpolate_filled, minimize_bending
 from denseface.recon.detail.rim import Rim
 from denseface.recon.numerics.components import large_components
 from denseface.recon.numerics.filters import downsampled
@@ -67,6 +67,6 @@ def fill_holes(
     _, *found, _ = cv2.connectedComponentsWithStats(wanted)
     parts, boxes = (np.asarray(one, np.int32) for one in found)
     added = downsampled(downsampled(detail))
-    least_bent(counts, sums, downsampled(downsampled(heights)), added, parts, boxes, inside,
+    minimize_bending(counts, sums, downsampled(downsampled(heights)), added, parts, boxes, inside,
                _SMOOTHING / _CELL**2, _CELL * spacing)
-    return lay_in(added, parts, missing)
+    return interpolate_filled(added, parts, missing)

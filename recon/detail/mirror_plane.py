@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.detail._mirror_kernels import (
-    facing_points,
     mirror_costs,
-    most_curved,
+    principal_curvature_angle,
     refine_plane,
+    sample_points,
 )
 
 __all__ = ["MirrorPlane", "find_plane"]
@@ -77,7 +77,7 @@ def find_plane(
     -------
     None where the face shows too little of one of its sides.
     """
-    points = facing_points(
+    points = sample_points(
         field, np.asarray(origin), step, max(1, round(_DENSE_MM / step)), _FACING)
     if len(points) < _LEAST_POINTS:
         return None
@@ -85,7 +85,7 @@ def find_plane(
     points -= middle
     start = np.array([*origin, 0.0]) - middle
     some = points[::round((_SPARSE_MM / _DENSE_MM) ** 2)]
-    turn = most_curved(some)
+    turn = principal_curvature_angle(some)
     level = np.array([math.cos(turn), math.sin(turn), 0.0])
     normals = np.cos(_TURNS)[:, None] * level + np.sin(_TURNS)[:, None] * (0.0, 0.0, 1.0)
     costs = mirror_costs(field, start, step, some, normals, _OFFSETS, _FAR_MM**2,

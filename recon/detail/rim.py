@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.filters import blurred, downsampled
 
-__all__ = ["BROADER", "Rim", "broad_average"]
+__all__ = ["BROADER", "Rim", "iterated_average"]
 
 Image = NDArray[np.float32]
 
@@ -72,7 +72,7 @@ class Rim:
     @property
     def nearness(self) -> Image:
         """How much the broad average counts, 0-1."""
-        return _falling(self.away, _ALONE, _NONE)
+        return _smoothstep(self.away, _ALONE, _NONE)
 
     @property
     def within(self) -> Image:
@@ -80,7 +80,7 @@ class Rim:
         share = (self.away - np.float32(_BEHIND)) / np.float32(_OWN - _BEHIND)
         return np.asarray(np.clip(share, 0, 1), np.float32)
 
-    def frayed_depth(self, slopes: tuple[Image, Image], spacing: float) -> Image:
+    def fraying_correction(self, slopes: tuple[Image, Image], spacing: float) -> Image:
         """Give what is to be added to the depths: a shift toward the rim, times the slope.
 
         Parameters
@@ -103,7 +103,7 @@ class Rim:
         return np.asarray(shift * np.clip(outward_slope, 0, _STEEPEST), np.float32)
 
 
-def broad_average(
+def iterated_average(
     seeds: Image, values: Image, radius: float, usual: float, rim: Rim, finer: int
 ) -> Image:
     """Average what the seeds show, then what that leaves of them, and so on.
@@ -136,7 +136,7 @@ def broad_average(
     inside, total = (
         np.asarray(cv2.resize(one, None, fx=finer, fy=finer, interpolation=cv2.INTER_LINEAR),
                    np.float32)[:rows, :columns] for one in (inside, total))
-    return inside + _falling(rim.away, 0, _AT_RIM) * (total - inside)
+    return inside + _smoothstep(rim.away, 0, _AT_RIM) * (total - inside)
 
 
 def _blur_matrix(side: int, sigma: float) -> Image:
@@ -146,7 +146,7 @@ def _blur_matrix(side: int, sigma: float) -> Image:
     return taps.astype(np.float32)[np.abs(np.subtract.outer(steps, steps))]
 
 
-def _falling(values: Image, one: float, none: float) -> Image:
+def _smoothstep(values: Image, one: float, none: float) -> Image:
     """1 up to a value, 0 from another on, smooth between (3 t^2 - 2 t^3)."""
     t = np.clip((np.float32(none) - values) / np.float32(none - one), 0, 1)
     return np.asarray(t * t * (3 - 2 * t), np.float32)

@@ -13,16 +13,16 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.detail._light_kernels import find_light, lit_places
 from denseface.recon.detail._shading_kernels import (
-    brightness_of,
-    descend,
-    from_along_light,
-    only_seen,
-    shade_residuals,
+    apply_jacobian_transpose,
+    brightness_image,
+    conjugate_gradient_step,
+    grid_points,
+    masked_brightness,
+    shading_residuals,
     weigh,
-    weighted_points,
 )
+from denseface.recon.detail._spherical_harmonics import fit_lighting, sample_harmonics
 from denseface.recon.intermediate import ColorSampler
 from denseface.recon.numerics.filters import blurred, upsampled
 from denseface.recon.numerics.normalized_convolution import normalized, normalized_convolution
@@ -76,11 +76,11 @@ def shading_detail(
     -------
     (rows, columns) float32, mm along z
     """
-    points = weighted_points(weight, *places, heights)
+    points = grid_points(weight, *places, heights)
     if not len(points):
         return np.zeros_like(heights)
     weight = weight.copy()
-    brightness = brightness_of(*sampler(points), _LINEAR, _FULL, weight)
+    brightness = brightness_image(*sampler(points), _LINEAR, _FULL, weight)
     return shape_from_shading(brightness, weight, slopes, float(places[0][1] - places[0][0]))
 
 
@@ -106,12 +106,12 @@ def shape_from_shading(
     (rows, columns) float32, mm along z; zero where there is too little to find the light
     """
     across, down = slopes
-    brightness, = normalized(blurred(only_seen(brightness, weight), _AVERAGED))
-    light, median = find_light(*lit_places(brightness, weight, across, down, _SPARSE))
+    brightness, = normalized(blurred(masked_brightness(brightness, weight), _AVERAGED))
+    light, median = fit_lighting(*sample_harmonics(brightness, weight, across, down, _SPARSE))
     if median <= 0:
         return np.zeros(weight.shape, np.float32)
     residuals, right, lower = (np.empty(weight.shape, np.float32) for _ in range(3))
-    shade_residuals(brightness, across, down, light, _LEAST * median, residuals, right, lower)
+    shading_residuals(brightness, across, down, light, _LEAST * median, residuals, right, lower)
     skin = ((weight > 0) & (np.abs(residuals) < np.float32(_NOT_SKIN))).astype(np.float32)
     slow, = normalized_convolution(skin, _SLOW_MM / (2 * step), residuals)
     residuals -= upsampled(slow, residuals.shape)
@@ -126,10 +126,10 @@ def _solved(values: Image, right: Image, lower: Image, step: float) -> Image:
     radius = math.sqrt(2) * _RADIUS_MM / step
     variance = _ERROR_MM**2 * 2 * math.pi * radius**2
     rest, heights, way, smooth_way = (np.zeros_like(values) for _ in range(4))
-    from_along_light(values, right, lower, rest)
+    apply_jacobian_transpose(values, right, lower, rest)
     last = 1.0
     for _ in range(_STEPS):
-        last = descend(
+        last = conjugate_gradient_step(
             rest, blurred(rest, radius), variance, right, lower, way, smooth_way, heights, last)
         if last <= 0:
             break

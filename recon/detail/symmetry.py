@@ -29,7 +29,7 @@ from denseface.recon.detail.mirror_plane import MirrorPlane
 from denseface.recon.numerics.filters import blurred, upsampled
 from denseface.recon.numerics.normalized_convolution import normalized
 
-__all__ = ["helped_by_mirror"]
+__all__ = ["symmetry_correction"]
 
 Image = NDArray[np.float32]
 
@@ -53,7 +53,7 @@ _AROUND_MM = 12.0
 _DIFFERENT = 1.15
 
 
-def helped_by_mirror(
+def symmetry_correction(
     field: Image, kept: Image, filled: Image, hole: Image, plane: MirrorPlane, noise: float,
     window: float, origin: tuple[float, float], step: float,
 ) -> Image:

@@ -14,7 +14,7 @@ from denseface.recon.intermediate import ColorSampler
 from denseface.recon.numerics.push_pull import average_neighbors
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, places
 from denseface.recon.propagation._image_kernels import collect, unset
-from denseface.recon.propagation.uncertainty import sources_of_error, standard_error
+from denseface.recon.propagation.uncertainty import standard_error, variance_components
 from denseface.recon.support import Support
 from denseface.recon.surface.rbf import Surface
 
@@ -41,7 +41,7 @@ def densify(
     surface: Surface | DetailedSurface,
     spacing: float,
     ratio: float,
-    share: float,
+    noise_fraction: float,
     sampler: ColorSampler | None = None,
 ) -> DenseCloud:
     """Sample the surface on a regular grid, `ratio` points for each seed.
@@ -52,26 +52,27 @@ def densify(
     surface : the fit over (X, Y)
     spacing : mean spacing of the seeds, mm
     ratio : dense points for each seed
-    share : of the residuals' variance, how much the surface keeps as error: `noise_share`
+    noise_fraction : k of `recon.propagation.uncertainty.noise_fraction`
     sampler : tells the colours of points in holes; None, and their border's colours fill them
     """
-    supported, sheet = _sheet(seeds.points, surface, spacing)
-    slopes = sheet[1], sheet[2]
+    supported, surface_grid = _surface_grid(seeds.points, surface, spacing)
+    slopes = surface_grid[1], surface_grid[2]
     step = float(np.sqrt(supported.area / (ratio * len(seeds.points))))
-    supported = _unbridged(supported, slopes, spacing)
+    supported = _without_bridges(supported, slopes, spacing)
     xs, ys, support = supported.on_grid(step)
     origin = float(xs[0]), float(ys[0])
 
-    sources = sources_of_error(
-        seeds.points, supported.inside, sheet[0], slopes, origin, supported.step, spacing)
-    error = standard_error(sources, share, detailed=isinstance(surface, DetailedSurface))
+    components = variance_components(
+        seeds.points, supported.inside, surface_grid[0], slopes, origin, supported.step, spacing)
+    error = standard_error(
+        components, noise_fraction, detailed=isinstance(surface, DetailedSurface))
     sigma = np.asarray(cv2.copyMakeBorder(error, 0, 1, 0, 1, cv2.BORDER_REPLICATE), np.float32)
     # Colours have no detail finer than the seeds: every so many points are enough.
     every = max(1, round(_COLOR_STEP * spacing / step))
     colors = _colors(seeds, origin, every * step, spacing, _coarser(support, every))
     columns, rows = supported.places(xs, ys)
     points, normals, colors, sigma, cells = collect(
-        support, xs, ys, sheet, rows, columns, colors, every, sigma, sources.every)
+        support, xs, ys, surface_grid, rows, columns, colors, every, sigma, components.every)
     if sampler is not None:
         near = supported.near_seeds(_HOLE * spacing)
         hole = unset(near, rows, columns, cells)
@@ -89,17 +90,17 @@ def densify(
     )
 
 
-def _sheet(
+def _surface_grid(
     points: NDArray[np.float32], surface: Surface | DetailedSurface, spacing: float
 ) -> tuple[Support, NDArray[np.float32]]:
     """Give the support, and height and slopes on its grid, (3, rows, columns)."""
     if isinstance(surface, DetailedSurface):
-        return surface.support, surface.sheet
+        return surface.support, surface.surface_grid
     supported = Support.of(points, spacing)
     return supported, np.stack(surface.sampled(supported.xs, supported.ys))
 
 
-def _unbridged(
+def _without_bridges(
     supported: Support, slopes: tuple[NDArray[np.float32], NDArray[np.float32]], spacing: float
 ) -> Support:
     """Leave out where the fit bridges a step that nothing was read of."""

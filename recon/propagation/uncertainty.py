@@ -3,7 +3,7 @@
     sigma^2 = k r^2 (1 + H d) + S (h g^2)^2 + E e (h g)^2
 
 r, mm : what the seeds around the point are off the surface, root mean square: the sensor's noise
-    and detail that smoothing took away, k of it left in the surface (`noise_share`)
+    and detail that smoothing took away, k of it left in the surface (`noise_fraction`)
 d, spacings : how far into a hole: distance from the nearest seed, less one
 h, mm : mean spacing of the seeds, which grows with the distance from the camera
 g : slope of the surface: where it is steep, a reading's sideways jitter, as large as h, is depth
@@ -28,11 +28,11 @@ from denseface.recon.numerics.filters import gaussian_taps
 from denseface.recon.propagation._uncertainty_kernels import coarsen
 from denseface.recon.settings import Settings
 
-__all__ = ["Sources", "average_cutoff", "cutoff", "noise_share", "sources_of_error",
-           "standard_error"]
+__all__ = ["VarianceComponents", "averaging_cutoff", "fit_cutoff", "noise_fraction",
+           "standard_error", "variance_components"]
 
 # From bench/calibration.py: H, S, E above, E of a fit without detail, which has no broad average at
-# the rim, and those of `noise_share`.
+# the rim, and those of `noise_fraction`.
 _HOLE = 0.4
 _SLOPE = 0.075
 _RIM = 1.46
@@ -49,7 +49,7 @@ _LEAST_MM = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Sources:
+class VarianceComponents:
     """The parts of sigma^2 before their coefficients, on every so many points of a grid.
 
     Attributes
@@ -65,31 +65,31 @@ class Sources:
     every: int
 
 
-def noise_share(settings: Settings) -> float:
+def noise_fraction(settings: Settings) -> float:
     """Give k: how much of the residuals' variance is the error left in the surface.
 
     A smoother lets pass what is longer than some L, where signal and smoothing weigh the same: of
     noise, a share in proportion to (h / L)^2. Detail that is added to the fit brings back a part
     of the share of its own average.
     """
-    share = _SHARE * cutoff(settings.r0_factor, settings.smoothing) ** 2
+    share = _SHARE * fit_cutoff(settings.r0_factor, settings.smoothing) ** 2
     if settings.detail_factor is not None:
-        share += _DETAIL_PART * _SHARE * average_cutoff(settings.detail_factor) ** 2
+        share += _DETAIL_PART * _SHARE * averaging_cutoff(settings.detail_factor) ** 2
     return share
 
 
-def cutoff(r0_factor: float, smoothing: float) -> float:
+def fit_cutoff(r0_factor: float, smoothing: float) -> float:
     """Give h / L of a fit, L = pi R0 / sqrt(ln(pi (R0/h)^2 / lambda))."""
     weight = max(math.pi * r0_factor**2 / smoothing, math.e)
     return math.sqrt(math.log(weight)) / (math.pi * r0_factor)
 
 
-def average_cutoff(detail_factor: float) -> float:
+def averaging_cutoff(detail_factor: float) -> float:
     """Give h / L of a Gaussian average: of a wave of length L, half is left."""
     return math.sqrt(math.log(2) / 2) / (math.pi * detail_factor)
 
 
-def sources_of_error(
+def variance_components(
     points: NDArray[np.float32],
     support: NDArray[np.bool_],
     heights: NDArray[np.float32],
@@ -97,7 +97,7 @@ def sources_of_error(
     origin: tuple[float, float],
     step: float,
     spacing: float,
-) -> Sources:
+) -> VarianceComponents:
     """Find what an error can come from, place by place.
 
     Parameters
@@ -121,18 +121,21 @@ def sources_of_error(
     slope /= np.maximum(covered, np.float32(1e-3))
     across = np.float32(spacing**2)
     edge = np.clip(2 - 2 * covered, np.float32(0), np.float32(1))
-    return Sources(noise=np.asarray(noise, np.float32), hole=np.asarray(hole, np.float32),
-                   slope=np.asarray(across * slope * slope, np.float32),
-                   rim=np.asarray(across * slope * edge, np.float32), every=every)
+    return VarianceComponents(
+        noise=np.asarray(noise, np.float32), hole=np.asarray(hole, np.float32),
+        slope=np.asarray(across * slope * slope, np.float32),
+        rim=np.asarray(across * slope * edge, np.float32), every=every)
 
 
-def standard_error(sources: Sources, share: float, *, detailed: bool) -> NDArray[np.float32]:
-    """Give sigma on the nodes of its sources.
+def standard_error(
+    components: VarianceComponents, noise_fraction: float, *, detailed: bool
+) -> NDArray[np.float32]:
+    """Give sigma on the nodes of its components.
 
     Parameters
     ----------
-    sources : of this face
-    share : k, of the settings that the surface was fitted with
+    components : of this face's variance
+    noise_fraction : k, of the settings that the surface was fitted with
     detailed : whether detail was added to the fit
 
     Returns
@@ -141,6 +144,7 @@ def standard_error(sources: Sources, share: float, *, detailed: bool) -> NDArray
     twice
     """
     rim = np.float32(_RIM if detailed else _RIM_ALONE)
-    variance = (np.float32(share) * (sources.noise + np.float32(_HOLE) * sources.hole)
-                + np.float32(_SLOPE) * sources.slope + rim * sources.rim)
+    variance = (np.float32(noise_fraction)
+                * (components.noise + np.float32(_HOLE) * components.hole)
+                + np.float32(_SLOPE) * components.slope + rim * components.rim)
     return np.asarray(np.maximum(np.sqrt(variance), np.float32(_LEAST_MM)), np.float32)

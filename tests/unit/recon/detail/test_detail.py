@@ -94,7 +94,7 @@ def test_inside_a_hole_the_surface_goes_on_from_its_border():
 
 def test_the_same_seeds_give_the_same_bytes(noisy):
     again = surfaces(1.2)[1]
-    np.testing.assert_array_equal(noisy[1].sheet, again.sheet)
+    np.testing.assert_array_equal(noisy[1].surface_grid, again.surface_grid)
     assert noisy[1].noise == again.noise
 
 
@@ -104,6 +104,6 @@ def test_far_from_all_seeds_the_detail_stays_finite():
     points[:, 2] = truth(*points[:, :2].T)
     broad = fit_surface(points, 14 * SPACING, 20)
     detailed = add_detail(broad, points, SPACING, 1.6 * SPACING)
-    assert np.isfinite(detailed.sheet).all()
+    assert np.isfinite(detailed.surface_grid).all()
     middle = np.hypot(X, Y) < 20
     np.testing.assert_allclose(detailed.on_grid(XS, YS)[middle], 700, atol=0.02)

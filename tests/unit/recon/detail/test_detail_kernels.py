@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from denseface.recon.detail._detail_kernels import face_field, lay_under, shares, slopes
+from denseface.recon.detail._detail_kernels import blend_toward, face_field, shares, slopes
 
 
 def numpys(heights, step):
@@ -51,6 +51,6 @@ def test_detail_is_moved_by_the_larger_of_two_shares():
     rng = np.random.default_rng(5)
     detail, broad, near, missing = (rng.random((13, 17)).astype(np.float32) for _ in range(4))
     moved = detail.copy()
-    lay_under(moved, broad, near, missing)
+    blend_toward(moved, broad, near, missing)
     np.testing.assert_allclose(moved, detail + np.maximum(near, missing) * (broad - detail),
                                rtol=1e-5, atol=1e-6)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from denseface.recon.detail.rim import Rim, broad_average
+from denseface.recon.detail.rim import Rim, iterated_average
 
 ROWS, COLUMNS, FINER = 40, 50, 4
 USUAL = 4.0
@@ -16,13 +16,14 @@ FULL = np.full((ROWS, COLUMNS), USUAL, np.float32)
 def averaged(shown, seeds=FULL, away=10.0):
     """Average what each cell shows, known only where there are seeds, far from the rim or near."""
     rim = Rim(np.ones_like(X), np.full(X.shape, away, np.float32))
-    return broad_average(seeds, (seeds * shown).astype(np.float32), 3.0, USUAL, rim, FINER)
+    return iterated_average(seeds, (seeds * shown).astype(np.float32), 3.0, USUAL, rim, FINER)
 
 
 def frayed(support, slopes, spacing, step):
     """What is added, on every other point of each direction."""
     rim = Rim.of(support, step / spacing)
-    return rim.frayed_depth(tuple(one[::2, ::2].astype(np.float32) for one in slopes), spacing)
+    coarse = tuple(one[::2, ::2].astype(np.float32) for one in slopes)
+    return rim.fraying_correction(coarse, spacing)
 
 
 def test_nothing_stays_nothing():

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from denseface.recon.detail._shading_kernels import (
-    along_light,
-    brightness_of,
-    descend,
-    from_along_light,
-    only_seen,
-    shade_residuals,
+    apply_jacobian,
+    apply_jacobian_transpose,
+    brightness_image,
+    conjugate_gradient_step,
+    grid_points,
+    masked_brightness,
+    shading_residuals,
     weigh,
-    weighted_points,
 )
 
 SHAPE = 23, 31
@@ -38,8 +38,8 @@ def test_one_difference_is_the_other_s_transpose(rng):
         one[[0, -1]] = one[:, [0, -1]] = 0
     heights[[0, -1]] = heights[:, [0, -1]] = 0
     along, back = np.zeros(SHAPE, np.float32), np.zeros(SHAPE, np.float32)
-    along_light(heights, right, lower, along)
-    from_along_light(values, right, lower, back)
+    apply_jacobian(heights, right, lower, along)
+    apply_jacobian_transpose(values, right, lower, back)
     assert np.vdot(along, values) == pytest.approx(np.vdot(heights, back), rel=1e-4)
     expected = (right * np.gradient(heights, axis=1) + lower * np.gradient(heights, axis=0)) * 2
     np.testing.assert_allclose(along[1:-1, 1:-1], expected[1:-1, 1:-1], rtol=1e-4, atol=1e-5)
@@ -51,7 +51,7 @@ def test_residuals_and_how_light_changes_with_slopes(rng):
     shade = basis(across.astype(float), down.astype(float)) @ light
     brightness = (shade * np.exp(image(rng, 0.1))).astype(np.float32)
     residuals, by_across, by_down = (np.empty(SHAPE, np.float32) for _ in range(3))
-    shade_residuals(brightness, across, down, light, 0.1, residuals, by_across, by_down)
+    shading_residuals(brightness, across, down, light, 0.1, residuals, by_across, by_down)
     usual = shade > 0.12
     assert usual.mean() > 0.9
     np.testing.assert_allclose(residuals[usual], np.log(brightness / shade)[usual], atol=5e-3)
@@ -64,7 +64,7 @@ def test_residuals_and_how_light_changes_with_slopes(rng):
 def test_less_light_than_the_least_is_not_divided_by():
     flat, dark = np.zeros((3, 3), np.float32), np.full((3, 3), 0.01, np.float32)
     out = [np.empty((3, 3), np.float32) for _ in range(3)]
-    shade_residuals(dark, flat, flat, np.zeros(9, np.float32), 0.1, *out)
+    shading_residuals(dark, flat, flat, np.zeros(9, np.float32), 0.1, *out)
     np.testing.assert_allclose(out[0], 2 * (0.01 - 0.1) / 0.11, rtol=1e-5)
     assert np.isfinite(np.stack(out)).all()
 
@@ -73,7 +73,7 @@ def test_points_and_brightness_are_of_the_same_places(rng):
     weight = (rng.random(SHAPE) < 0.6).astype(np.float32)
     heights = image(rng)
     xs, ys = np.arange(SHAPE[1]) * 2.0 - 5, np.arange(SHAPE[0]) * 2.0 + 3
-    points = weighted_points(weight, xs, ys, heights)
+    points = grid_points(weight, xs, ys, heights)
     rows, columns = np.nonzero(weight)
     np.testing.assert_allclose(points, np.column_stack([xs[columns], ys[rows],
                                                         heights[rows, columns]]), rtol=1e-6)
@@ -81,7 +81,7 @@ def test_points_and_brightness_are_of_the_same_places(rng):
     seen = rng.random(len(points)) < 0.8
     table = rng.random((3, 256)).astype(np.float32)
     lowered = weight.copy()
-    brightness = brightness_of(colors, seen, table, 250, lowered)
+    brightness = brightness_image(colors, seen, table, 250, lowered)
     counts = seen & (colors.max(axis=1) < 250)
     expected = table[np.arange(3), colors].sum(axis=1) * counts
     np.testing.assert_allclose(brightness[rows, columns], expected, rtol=1e-6)
@@ -92,7 +92,7 @@ def test_points_and_brightness_are_of_the_same_places(rng):
 
 def test_only_what_is_seen_has_a_brightness(rng):
     brightness, weight = image(rng), np.maximum(image(rng), 0)
-    found = only_seen(brightness, weight)
+    found = masked_brightness(brightness, weight)
     np.testing.assert_array_equal(found[..., 0], weight > 0)
     np.testing.assert_array_equal(found[..., 1], np.where(weight > 0, brightness, 0))
 
@@ -118,18 +118,20 @@ def test_conjugate_gradients_end_at_the_solution(rng):
         unit, along, back = np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(
             shape, np.float32)
         unit.flat[k] = 1
-        along_light(unit, right, lower, along)
-        from_along_light(along, right, lower, back)
+        apply_jacobian(unit, right, lower, along)
+        apply_jacobian_transpose(along, right, lower, back)
         columns.append(back.ravel())
     rest, way, smooth_way, heights = (np.zeros(shape, np.float32) for _ in range(4))
-    from_along_light(values, right, lower, rest)
+    apply_jacobian_transpose(values, right, lower, rest)
     matrix = np.array(columns, float).T + np.eye(right.size) / variance
     expected = np.linalg.solve(matrix, rest.ravel()).reshape(shape)
     last, norms = 1.0, []
     for _ in range(40):
-        last = descend(rest, rest.copy(), variance, right, lower, way, smooth_way, heights, last)
+        last = conjugate_gradient_step(
+            rest, rest.copy(), variance, right, lower, way, smooth_way, heights, last)
         norms.append(last)
         if last < 1e-9 * norms[0]:
             break
     np.testing.assert_allclose(heights, expected, atol=1e-4)
-    assert descend(np.zeros_like(rest), rest, 1.0, right, lower, way, smooth_way, heights, 1) == 0
+    assert conjugate_gradient_step(
+        np.zeros_like(rest), rest, 1.0, right, lower, way, smooth_way, heights, 1) == 0

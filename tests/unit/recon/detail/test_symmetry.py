@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter
 
 from denseface.recon.detail.detail import add_detail
 from denseface.recon.detail.mirror_plane import MirrorPlane
-from denseface.recon.detail.symmetry import helped_by_mirror
+from denseface.recon.detail.symmetry import symmetry_correction
 from denseface.recon.surface.rbf import fit_surface
 from tests.unit.recon.mirror_shapes import Pose, face_points, height
 
@@ -138,7 +138,7 @@ def test_a_plane_beside_the_face_adds_nothing(plane):
     field = np.ones((30, 20, 5), np.float32)
     field[..., 0] = 700
     none = np.zeros((30, 20), np.float32)
-    added = helped_by_mirror(field, none, none, none, plane, 0.1, 11.0, (0.0, 0.0), 1.5)
+    added = symmetry_correction(field, none, none, none, plane, 0.1, 11.0, (0.0, 0.0), 1.5)
     np.testing.assert_array_equal(added, 0)
 
 
@@ -151,7 +151,7 @@ def test_without_noise_nothing_changes():
     field = np.stack([700 + z, facing, np.ones_like(z), detail * facing, np.ones_like(z)],
                      axis=-1).astype(np.float32)
     none = np.zeros(z.shape, np.float32)
-    added = helped_by_mirror(field, detail.astype(np.float32), none, none,
+    added = symmetry_correction(field, detail.astype(np.float32), none, none,
                              MirrorPlane(np.array([1.0, 0, 0]), 0.0), 0.0, 11.0, (-30.0, -30.0),
                              1.0)
     assert np.isfinite(added).all()
@@ -160,6 +160,6 @@ def test_without_noise_nothing_changes():
 
 def test_the_same_seeds_give_the_same_bytes(half):
     points, broad = half
-    one, other = (add_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=True).sheet
+    one, other = (add_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=True).surface_grid
                   for _ in range(2))
     np.testing.assert_array_equal(one, other)

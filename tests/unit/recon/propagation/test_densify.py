@@ -15,7 +15,7 @@ from tests.unit.recon.shapes import disc_seeds, seeds
 def dense_of(points, ratio=10.0, colors=None, smoothing=0.1):
     spacing = exact_spacing(np.ascontiguousarray(points[:, :2]))
     surface = fit_surface(points, 6 * spacing, smoothing)
-    return densify(seeds(points, colors), surface, spacing, ratio, share=0.5)
+    return densify(seeds(points, colors), surface, spacing, ratio, noise_fraction=0.5)
 
 
 def raised(points, height):

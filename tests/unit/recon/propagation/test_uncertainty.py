@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from denseface.recon.propagation._uncertainty_kernels import coarsen
 from denseface.recon.propagation.densify import densify
-from denseface.recon.propagation.uncertainty import cutoff, noise_share
+from denseface.recon.propagation.uncertainty import fit_cutoff, noise_fraction
 from denseface.recon.settings import Preset, Settings
 from denseface.recon.surface.rbf import fit_surface
 from tests.unit.recon.shapes import disc_seeds, seeds
@@ -114,9 +114,9 @@ def test_it_moves_with_the_face():
 
 
 def test_stronger_smoothing_leaves_less_noise():
-    paper, faithful, best = (noise_share(Settings.of(preset)) for preset in Preset)
+    paper, faithful, best = (noise_fraction(Settings.of(preset)) for preset in Preset)
     assert paper > faithful > best > 0
-    shares = [noise_share(Settings.of("faithful", smoothing=value))
+    shares = [noise_fraction(Settings.of("faithful", smoothing=value))
               for value in (0.05, 1, 30, 1000)]
     assert shares == sorted(shares, reverse=True)
     assert shares[-1] > 0
@@ -124,7 +124,7 @@ def test_stronger_smoothing_leaves_less_noise():
 
 def test_the_cutoff_is_the_one_of_the_decision():
     """L = 23 mm at 1.2 mm spacing: R0 = 14 h, lambda = 20 let pass what is longer than 23.7 h."""
-    assert 1 / cutoff(14.0, 20.0) == pytest.approx(23.7, abs=0.1)
+    assert 1 / fit_cutoff(14.0, 20.0) == pytest.approx(23.7, abs=0.1)
 
 
 def test_coarsening_sums_what_is_near_each_node():

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from denseface.recon.numerics.jit import compiled
 from denseface.recon.numerics.linear_solve import solved
 
-__all__ = ["find_light", "lit_places"]
+__all__ = ["fit_lighting", "sample_harmonics"]
 
 Image = NDArray[np.float32]
 
@@ -21,7 +21,7 @@ _RIDGE = 1e-4
 
 
 @compiled
-def lit_places(
+def sample_harmonics(
     brightness: Image, weight: Image, across: Image, down: Image, every: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Give what the light is a sum of, (9, n), and the brightness, (n,).
@@ -52,10 +52,10 @@ def lit_places(
 
 
 @compiled
-def find_light(
+def fit_lighting(
     basis: NDArray[np.float64], seen: NDArray[np.float64]
 ) -> tuple[NDArray[np.float32], float]:
-    """Fit the light to the brightness, as of `lit_places`.
+    """Fit the light to the brightness, as of `sample_harmonics`.
 
     Gives what each term counts, (9,), and the median brightness; 0 where there is too little.
     """

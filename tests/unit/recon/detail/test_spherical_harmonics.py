@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from denseface.recon.detail._light_kernels import find_light, lit_places
+from denseface.recon.detail._spherical_harmonics import fit_lighting, sample_harmonics
 
 SHAPE = 23, 31
 LIGHT = np.array([0.8, 0.2, -0.3, 0.4, 0.1, -0.1, 0.05, 0.1, 0.05])
@@ -28,7 +28,7 @@ def basis(across, down):
 def test_the_light_is_told_by_some_places(rng, every):
     weight = rng.random(SHAPE).astype(np.float32)
     across, down, brightness = (image(rng) for _ in range(3))
-    found, seen = lit_places(brightness, weight, across, down, every)
+    found, seen = sample_harmonics(brightness, weight, across, down, every)
     some = np.s_[::every, ::every]
     chosen = weight[some] > 0.5
     np.testing.assert_allclose(found.T, basis(across[some], down[some])[chosen], rtol=1e-4,
@@ -41,7 +41,7 @@ def test_a_light_is_found_whatever_a_few_places_show(rng):
     seen = terms @ LIGHT
     seen[:30] *= 3
     seen[30:60] *= 0.1
-    light, median = find_light(np.ascontiguousarray(terms.T), seen)
+    light, median = fit_lighting(np.ascontiguousarray(terms.T), seen)
     assert median == pytest.approx(np.median(seen))
     np.testing.assert_allclose((terms @ light)[60:], seen[60:], atol=0.02)
     plain = np.linalg.lstsq(terms, seen, rcond=None)[0]
@@ -52,7 +52,7 @@ def test_a_fit_to_all_places_alike_is_that_of_least_squares(rng):
     """Where nothing is far off, all count about alike."""
     terms = basis(*rng.standard_normal((2, 600)))
     seen = terms @ LIGHT + rng.normal(0, 1e-3, 600)
-    light, _ = find_light(np.ascontiguousarray(terms.T), seen)
+    light, _ = fit_lighting(np.ascontiguousarray(terms.T), seen)
     expected = np.linalg.lstsq(terms, seen, rcond=None)[0]
     np.testing.assert_allclose(terms @ light, terms @ expected, atol=5e-3)
 
@@ -60,6 +60,6 @@ def test_a_fit_to_all_places_alike_is_that_of_least_squares(rng):
 @pytest.mark.parametrize(("places", "brightness"), [(49, 1.0), (200, 0.0)])
 def test_too_few_or_too_dark_places_tell_no_light(rng, places, brightness):
     terms = basis(*rng.standard_normal((2, places)))
-    light, median = find_light(np.ascontiguousarray(terms.T), np.full(places, brightness))
+    light, median = fit_lighting(np.ascontiguousarray(terms.T), np.full(places, brightness))
     assert median == 0
     assert not light.any()

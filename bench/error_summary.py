@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tests.simulator.accuracy import GROSS_MM
 
-__all__ = ["BINS", "HEADINGS", "Tally"]
+__all__ = ["BINS", "HEADINGS", "ErrorSummary"]
 
 BINS = np.linspace(0, GROSS_MM, 56)
 HEADINGS = ("method", "mean over the face, mm", "ours at the same places, mm",
@@ -17,7 +17,7 @@ _FILLED = 0.5
 
 
 @dataclass
-class Tally:
+class ErrorSummary:
     """Sums over frames; a frame counts once in the mean, a point once inside holes."""
 
     name: str
