@@ -3,6 +3,11 @@
 Each error is also the builtin kind that a caller would expect to catch.
 """
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
 __all__ = [
     "AddressError",
     "AuthenticatorStoppedError",
@@ -27,6 +32,8 @@ __all__ = [
     "StoreError",
     "UnknownCaptureError",
     "UsageError",
+    "first_error",
+    "reason_of",
 ]
 
 
@@ -160,3 +167,25 @@ class FormatError(ServiceError, ValueError):
 
 class UsageError(ServiceError, ValueError):
     """The command line asks for something that does not exist."""
+
+
+def first_error(error: "ValidationError", *, found: bool = False) -> tuple[str, str]:
+    """Give the first field that pydantic refuses, and why.
+
+    Parameters
+    ----------
+    found : say also which value it had
+
+    Returns
+    -------
+    field : its path, with dots; empty where the whole is refused
+    message : one sentence
+    """
+    first = error.errors(include_url=False, include_context=False, include_input=found)[0]
+    message = f"{first['msg']}, found {first['input']!r}" if found else first["msg"]
+    return ".".join(map(str, first["loc"])), message
+
+
+def reason_of(error: BaseException) -> str:
+    """Say what went wrong; of an error of the system without its number and file."""
+    return getattr(error, "strerror", None) or str(error)

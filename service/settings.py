@@ -17,7 +17,7 @@ from pydantic import (
     field_validator,
 )
 
-from denseface.service.errors import SettingsError
+from denseface.service.errors import SettingsError, first_error, reason_of
 from denseface.service.runtime.loopback import loopback_place
 from denseface.service.runtime.times import retention_of
 
@@ -108,10 +108,10 @@ class ServiceSettings(BaseModel):
         try:
             return cls(**(given | flags))
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            name = str(first["loc"][0])
+            field, message = first_error(error, found=True)
+            name = field.partition(".")[0]
             where = f"--{name.replace('_', '-')}" if name in flags else _PREFIX + name.upper()
-            raise SettingsError(f"{where}: {first['msg']}, found {first['input']!r}") from error
+            raise SettingsError(f"{where}: {message}") from error
 
 
 def private_folder(path: Path) -> Path:
@@ -130,5 +130,5 @@ def private_folder(path: Path) -> Path:
         if found.st_mode & 0o077:
             path.chmod(0o700)
     except OSError as error:
-        raise SettingsError(f"{path}: {error.strerror or error}") from error
+        raise SettingsError(f"{path}: {reason_of(error)}") from error
     return path

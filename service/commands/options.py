@@ -116,7 +116,7 @@ def recon_settings(args: argparse.Namespace) -> "Settings":
     from pydantic import ValidationError
 
     from denseface.recon.settings import Settings
-    from denseface.service.errors import UsageError
+    from denseface.service.errors import UsageError, first_error
 
     given = {"preset": args.preset} if args.preset else {}
     for change in args.changes:
@@ -128,10 +128,9 @@ def recon_settings(args: argparse.Namespace) -> "Settings":
     try:
         return Settings.model_validate(given)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        name = ".".join(str(part) for part in first["loc"])
+        name, message = first_error(error, found=True)
         flag = "--preset" if name == "preset" and args.preset else f"--set {name}"
-        raise UsageError(f"{flag}: {first['msg']}, found {first['input']!r}") from error
+        raise UsageError(f"{flag}: {message}") from error
 
 
 def service_settings(args: argparse.Namespace) -> "ServiceSettings":

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from denseface.recon.face import Face
-from denseface.service.errors import StoreError, UsageError
+from denseface.service.errors import StoreError, UsageError, reason_of
 from denseface.service.export.formats import check_ending, save_face
 from denseface.service.storage.record_file import write_atomically
 
@@ -51,4 +51,4 @@ class FaceFiles:
 
                 write_atomically(self._preview, [render(face)], durable=False)
         except OSError as error:
-            raise StoreError(f"{error.filename or ''}: {error.strerror or error}") from error
+            raise StoreError(f"{error.filename or ''}: {reason_of(error)}") from error

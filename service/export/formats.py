@@ -23,7 +23,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from denseface.recon.face import DenseCloud, Face, PointCloud, Report
-from denseface.service.errors import FormatError
+from denseface.service.errors import FormatError, first_error, reason_of
 from denseface.service.export.glb import glb
 from denseface.service.export.mesh import triangulate
 from denseface.service.storage.record_file import write_atomically
@@ -84,10 +84,10 @@ def load_face(path: str | Path) -> Face:
                        float(of["grid_step_mm"])),
             Report.model_validate_json(str(of["report"])))
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        raise FormatError(f"{path}: report: {first['loc']}: {first['msg']}") from error
+        field, message = first_error(error)
+        raise FormatError(f"{path}: report: {field}: {message}") from error
     except (OSError, EOFError, ValueError, TypeError, LookupError, BadZipFile, zlib.error) as error:
-        raise FormatError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
+        raise FormatError(f"{path}: {reason_of(error)}") from error
 
 
 def _npz(face: Face, path: Path) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from denseface.service.errors import reason_of
 from denseface.service.monitoring.observer import Snapshot
 from denseface.service.settings import ServiceSettings
 
@@ -79,5 +80,5 @@ def unwritable(folder: Path) -> str | None:
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
-        return f"{folder}: {error.strerror or error}"
+        return f"{folder}: {reason_of(error)}"
     return None

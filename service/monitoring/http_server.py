@@ -14,7 +14,7 @@ from typing import Any, Self
 import structlog
 from prometheus_client import CONTENT_TYPE_LATEST
 
-from denseface.service.errors import AddressError
+from denseface.service.errors import AddressError, reason_of
 
 __all__ = ["MetricsServer"]
 
@@ -47,7 +47,7 @@ class MetricsServer:
             self._server = _Server(place, metrics, health)
         except OSError as error:
             raise AddressError(
-                f"--metrics {place[0]}:{place[1]}: {error.strerror or error}") from error
+                f"--metrics {place[0]}:{place[1]}: {reason_of(error)}") from error
         self._thread = threading.Thread(
             target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, name="scrape",
             daemon=True)

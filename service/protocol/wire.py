@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError
 
-from denseface.service.errors import LocalProtocolError, RemoteProtocolError
+from denseface.service.errors import LocalProtocolError, RemoteProtocolError, first_error
 from denseface.service.protocol.messages import FromHub, Message, ToHub
 from denseface.service.protocol.payload import Arrays
 
@@ -126,11 +126,10 @@ def _header(header: bytes, adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub]) -
         with np.errstate(all="ignore"):  # absurd calibrations overflow before they are refused
             message = adapter.validate_json(header)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False, include_context=False)[0]
-        where = ".".join(str(part) for part in first["loc"]) or "header"
-        reason = "version" if first["loc"][-1:] == ("version",) else "malformed"
+        field, complaint = first_error(error)
+        reason = "version" if field.rpartition(".")[2] == "version" else "malformed"
         raise RemoteProtocolError(
-            _printable(f"{where}: {first['msg']}"[:500]), reason) from error
+            _printable(f"{field or 'header'}: {complaint}"[:500]), reason) from error
     if "version" not in message.model_fields_set:
         raise RemoteProtocolError(f"{message.kind}: no version given", "version")
     return message

@@ -13,7 +13,7 @@ from pathlib import Path
 import structlog
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from denseface.service.errors import KeyFileError
+from denseface.service.errors import KeyFileError, first_error, reason_of
 from denseface.service.runtime.descriptors import OUT_OF_DESCRIPTORS
 from denseface.service.security.keys import (
     check_key,
@@ -171,7 +171,7 @@ def revoke(keys: Path, name: str) -> None:
     except FileNotFoundError:
         raise KeyFileError(f"{name}: no key of that name is allowed in {path.parent}") from None
     except OSError as error:
-        raise KeyFileError(f"{path}: {error.strerror or error}") from error
+        raise KeyFileError(f"{path}: {reason_of(error)}") from error
 
 
 def _out_of_descriptors(error: BaseException | None) -> bool:
@@ -183,7 +183,6 @@ def _read(path: Path) -> Allowed:
     try:
         file = _File.model_validate_json(read_private_text(path, _WRITABLE_BY_OTHERS))
     except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        raise KeyFileError(
-            f"{path}: {'.'.join(map(str, first['loc'])) or 'file'}: {first['msg']}") from error
+        field, message = first_error(error)
+        raise KeyFileError(f"{path}: {field or 'file'}: {message}") from error
     return Allowed(name, check_key(path, file.public_key), frozenset(file.roles))

@@ -17,7 +17,7 @@ import zmq
 import zmq.utils.z85
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from denseface.service.errors import KeyFileError
+from denseface.service.errors import KeyFileError, reason_of
 from denseface.service.settings import private_folder
 from denseface.service.storage.record_file import write_atomically
 
@@ -129,7 +129,7 @@ def write_private(path: Path, contents: BaseModel) -> None:
     try:
         write_atomically(path, [text.encode()], mode=0o600)
     except OSError as error:
-        raise KeyFileError(f"{path}: {error.strerror or error}") from error
+        raise KeyFileError(f"{path}: {reason_of(error)}") from error
 
 
 def read_pair(path: Path) -> KeyPair:
@@ -177,7 +177,7 @@ def read_private_text(path: Path, forbidden: int) -> bytes:
             found = os.fstat(file.fileno())
             text = file.read(_MAX_BYTES + 1) if stat.S_ISREG(found.st_mode) else b""
     except OSError as error:
-        raise KeyFileError(f"{path}: {error.strerror or error}") from error
+        raise KeyFileError(f"{path}: {reason_of(error)}") from error
     if not stat.S_ISREG(found.st_mode) or len(text) > _MAX_BYTES:
         raise KeyFileError(f"{path}: expected a key file of at most {_MAX_BYTES} bytes")
     if forbidden and found.st_uid != os.getuid():

@@ -4,7 +4,7 @@ import fcntl
 import os
 from pathlib import Path
 
-from denseface.service.errors import HubRunningError, SettingsError
+from denseface.service.errors import HubRunningError, SettingsError, reason_of
 from denseface.service.settings import private_folder
 
 __all__ = ["check_folder", "lock"]
@@ -34,7 +34,7 @@ def lock(path: Path) -> int:
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
     except OSError as error:
-        raise SettingsError(f"{path}: {error.strerror or error}") from error
+        raise SettingsError(f"{path}: {reason_of(error)}") from error
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:

@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from denseface.service.errors import CorruptFileError, DiskFullError, StoreError
+from denseface.service.errors import CorruptFileError, DiskFullError, StoreError, reason_of
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.storage.direct import write_direct
 
@@ -121,7 +121,7 @@ def read_parts(path: Path, checksum: str | None = None) -> tuple[list[memoryview
     except OSError as error:
         passing = error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
         raise (StoreError if passing else CorruptFileError)(
-            f"{path}: {error.strerror or error}") from error
+            f"{path}: {reason_of(error)}") from error
     if len(data) > _MOST_BYTES:
         raise CorruptFileError(f"{path}: has more than {_MOST_BYTES} bytes")
     start = len(_MAGIC) + _DIGEST_BYTES
@@ -160,7 +160,7 @@ def _split(data: memoryview) -> list[memoryview] | None:
 
 def store_error(path: Path, error: OSError) -> StoreError:
     """Say in one line why a file could not be written."""
-    reason = f"{path}: {error.strerror or error}"
+    reason = f"{path}: {reason_of(error)}"
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return DiskFullError(f"no room on the disk ({reason})")
     if error.errno == errno.EIO:
