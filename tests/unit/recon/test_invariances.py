@@ -35,7 +35,7 @@ def dense_of(seeds: Seeds) -> DenseCloud:
     points = seeds.points
     spacing = exact_spacing(np.ascontiguousarray(points[:, :2]))
     surface = surface_of(points, spacing, HOW)
-    return densify(seeds, surface, spacing, HOW.ratio, share=0.5)
+    return densify(seeds, surface, spacing, HOW.ratio, noise_fraction=0.5)
 
 
 def off(one: DenseCloud, other: DenseCloud) -> np.ndarray:
