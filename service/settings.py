@@ -1,7 +1,6 @@
 """Settings of the service: where it listens, where it keeps things, how long it waits."""
 
 import os
-import stat
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,11 +16,10 @@ from pydantic import (
     field_validator,
 )
 
-from denseface.service.errors import SettingsError, first_error, reason_of
-from denseface.service.runtime.loopback import loopback_place
-from denseface.service.runtime.times import retention_of
+from denseface.service.errors import SettingsError, first_error
+from denseface.service.runtime.parsing import parse_loopback_address, parse_retention
 
-__all__ = ["ServiceSettings", "default_address", "private_folder", "runtime_folder"]
+__all__ = ["ServiceSettings", "default_address", "runtime_folder"]
 
 _PREFIX = "DENSEFACE_"
 _Seconds = Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
@@ -74,11 +72,11 @@ class ServiceSettings(BaseModel):
     """Longest reconstruction; a worker that takes longer ends itself, seconds."""
     queue: Annotated[int, Field(ge=1, le=100_000)] = 1000
     """Frames that may wait for a worker; beyond it a press is refused."""
-    retention: Annotated[float | None, BeforeValidator(retention_of)] = 86400.0
+    retention: Annotated[float | None, BeforeValidator(parse_retention)] = 86400.0
     """Time after its outcome when a capture is removed, seconds; None for never."""
     reserve_mib: Annotated[int, Field(ge=0, le=2**30)] = 256
     """Room that is to stay free on the disk, MiB; with less a press is refused."""
-    metrics: Annotated[tuple[str, int] | None, BeforeValidator(loopback_place)] = None
+    metrics: Annotated[tuple[str, int] | None, BeforeValidator(parse_loopback_address)] = None
     """Host and port of `/metrics` and `/healthz`, on this machine alone; None for neither."""
     resend_s: _Seconds = 2.0
     """Time after which an unanswered request or frame is sent again, seconds."""
@@ -112,23 +110,3 @@ class ServiceSettings(BaseModel):
             name = field.partition(".")[0]
             where = f"--{name.replace('_', '-')}" if name in flags else _PREFIX + name.upper()
             raise SettingsError(f"{where}: {message}") from error
-
-
-def private_folder(path: Path) -> Path:
-    """Create a folder that only this user can enter, or check that it is one.
-
-    Raises
-    ------
-    SettingsError
-        Where it is no folder, belongs to someone else or cannot be made.
-    """
-    try:
-        path.mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = path.lstat()
-        if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
-            raise SettingsError(f"{path}: must be a folder of user {os.getuid()}")
-        if found.st_mode & 0o077:
-            path.chmod(0o700)
-    except OSError as error:
-        raise SettingsError(f"{path}: {reason_of(error)}") from error
-    return path

@@ -82,7 +82,7 @@ def add_metrics(parser: argparse.ArgumentParser) -> None:
 
 def moment(text: str) -> datetime:
     """Read a time."""
-    from denseface.service.runtime.times import parse_time
+    from denseface.service.runtime.parsing import parse_time
 
     try:
         return parse_time(text)

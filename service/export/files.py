@@ -5,7 +5,7 @@ from pathlib import Path
 from denseface.recon.face import Face
 from denseface.service.errors import StoreError, UsageError, reason_of
 from denseface.service.export.formats import check_ending, save_face
-from denseface.service.storage.record_file import write_atomically
+from denseface.service.runtime.files import write_atomically
 
 __all__ = ["FaceFiles"]
 

@@ -26,7 +26,7 @@ from denseface.recon.face import DenseCloud, Face, PointCloud, Report
 from denseface.service.errors import FormatError, first_error, reason_of
 from denseface.service.export.glb import glb
 from denseface.service.export.mesh import triangulate
-from denseface.service.storage.record_file import write_atomically
+from denseface.service.runtime.files import write_atomically
 
 __all__ = ["check_ending", "load_face", "save_face"]
 

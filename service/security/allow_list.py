@@ -14,15 +14,14 @@ import structlog
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from denseface.service.errors import KeyFileError, first_error, reason_of
-from denseface.service.runtime.descriptors import OUT_OF_DESCRIPTORS
+from denseface.service.runtime.files import private_folder, read_private_text
+from denseface.service.runtime.limits import OUT_OF_DESCRIPTORS
 from denseface.service.security.keys import (
     check_key,
     check_name,
     fingerprint,
-    read_private_text,
-    write_private,
+    write_key_file,
 )
-from denseface.service.settings import private_folder
 
 __all__ = ["AllowList", "Allowed", "Role", "allow", "revoke"]
 
@@ -153,7 +152,7 @@ def allow(keys: Path, name: str, public: str, roles: frozenset[Role]) -> Allowed
             raise KeyFileError(
                 f"{name}: that name or key is in use: {other.name} {other.fingerprint}; "
                 f"`denseface keys revoke {other.name}` first")
-    write_private(folder / name, _File(public_key=public, roles=tuple(sorted(roles))))
+    write_key_file(folder / name, _File(public_key=public, roles=tuple(sorted(roles))))
     return one
 
 

@@ -4,9 +4,7 @@
 and `allowed/NAME` (see `service.security.allow_list`) the public half of someone who may come in.
 """
 
-import os
 import re
-import stat
 import struct
 from dataclasses import dataclass
 from hashlib import sha256
@@ -17,17 +15,15 @@ import zmq
 import zmq.utils.z85
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from denseface.service.errors import KeyFileError, reason_of
-from denseface.service.settings import private_folder
-from denseface.service.storage.record_file import write_atomically
+from denseface.service.errors import KeyFileError
+from denseface.service.runtime.files import private_folder, read_private_text, write_private_text
 
 __all__ = ["HUB", "KeyPair", "check_key", "check_name", "fingerprint", "new_pair", "read_pair",
-           "read_private_text", "read_public", "write_private"]
+           "read_public", "write_key_file"]
 
 HUB = "hub"
 """Name of the hub's own pair."""
 
-_MAX_BYTES = 4096
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 _Z85 = re.compile(r"[0-9A-Za-z.\-:+=^!/*?&<>()\[\]{}@%$#]{40}")
 
@@ -112,12 +108,12 @@ def new_pair(folder: Path, name: str) -> tuple[Path, Path]:
         if path.exists():
             raise KeyFileError(f"{path}: exists; remove it or choose another name")
     pair = KeyPair.made()
-    write_private(secret, _File(name=name, public_key=pair.public, secret_key=pair.secret))
-    write_private(public, _File(name=name, public_key=pair.public))
+    write_key_file(secret, _File(name=name, public_key=pair.public, secret_key=pair.secret))
+    write_key_file(public, _File(name=name, public_key=pair.public))
     return secret, public
 
 
-def write_private(path: Path, contents: BaseModel) -> None:
+def write_key_file(path: Path, contents: BaseModel) -> None:
     """Write a file of mode 0600, whole or not at all.
 
     Raises
@@ -125,11 +121,7 @@ def write_private(path: Path, contents: BaseModel) -> None:
     KeyFileError
         Where it cannot be written.
     """
-    text = contents.model_dump_json(indent=2, exclude_none=True) + "\n"
-    try:
-        write_atomically(path, [text.encode()], mode=0o600)
-    except OSError as error:
-        raise KeyFileError(f"{path}: {reason_of(error)}") from error
+    write_private_text(path, contents.model_dump_json(indent=2, exclude_none=True) + "\n")
 
 
 def read_pair(path: Path) -> KeyPair:
@@ -162,31 +154,6 @@ def read_public(given: Path | str) -> str:
     path = Path(given)
     file = _parse(path, read_private_text(path, 0))
     return check_key(path, file.public_key)
-
-
-def read_private_text(path: Path, forbidden: int) -> bytes:
-    """Read a small file unless others have one of the `forbidden` permissions.
-
-    Raises
-    ------
-    KeyFileError
-        Where it is no regular file, too long, not ours or open to others.
-    """
-    try:
-        with path.open("rb") as file:
-            found = os.fstat(file.fileno())
-            text = file.read(_MAX_BYTES + 1) if stat.S_ISREG(found.st_mode) else b""
-    except OSError as error:
-        raise KeyFileError(f"{path}: {reason_of(error)}") from error
-    if not stat.S_ISREG(found.st_mode) or len(text) > _MAX_BYTES:
-        raise KeyFileError(f"{path}: expected a key file of at most {_MAX_BYTES} bytes")
-    if forbidden and found.st_uid != os.getuid():
-        raise KeyFileError(f"{path}: belongs to user {found.st_uid}, expected {os.getuid()}")
-    if found.st_mode & forbidden:
-        raise KeyFileError(
-            f"{path}: others may use this key (mode {found.st_mode & 0o777:o}): expected 600, "
-            "and if others had access make a new key")
-    return text
 
 
 def _parse(path: Path, text: bytes) -> _File:

@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from denseface.service.settings import private_folder
-from denseface.service.storage.record_file import sync_folder
+from denseface.service.runtime.files import private_folder, sync_folder
 
 __all__ = ["FolderLayout"]
 

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 from denseface.service.errors import HubRunningError, SettingsError, reason_of
-from denseface.service.settings import private_folder
+from denseface.service.runtime.files import private_folder
 
 __all__ = ["check_folder", "lock"]
 

@@ -23,7 +23,7 @@ from denseface.service.protocol.messages import CaptureFailed, DeadLetter, FaceD
 from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.failpoints import failpoint
-from denseface.service.settings import private_folder
+from denseface.service.runtime.files import private_folder
 from denseface.service.storage.base import CaptureRow
 from denseface.service.storage.folder_layout import FolderLayout
 from denseface.service.storage.folder_lock import lock

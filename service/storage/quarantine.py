@@ -7,8 +7,7 @@ from pathlib import Path
 
 import structlog
 
-from denseface.service.settings import private_folder
-from denseface.service.storage.record_file import write_atomically
+from denseface.service.runtime.files import private_folder, write_atomically
 from denseface.service.storage.store_clock import StoreClock, stamp
 
 __all__ = ["Quarantine"]

@@ -15,14 +15,13 @@ import os
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from denseface.service.errors import CorruptFileError, DiskFullError, StoreError, reason_of
-from denseface.service.runtime.failpoints import failpoint
-from denseface.service.storage.direct import write_direct
+from denseface.service.runtime.files import write_atomically
 
-__all__ = ["naming", "read_parts", "store_error", "sync_folder", "write_atomically", "write_parts"]
+__all__ = ["naming", "read_parts", "store_error", "write_parts"]
 
 _MAGIC = b"denseface spool 3\n"
 _BEFORE = b"denseface spool 2\n"
@@ -30,44 +29,6 @@ _BEFORE = b"denseface spool 2\n"
 _DIGEST_BYTES = hashlib.sha256().digest_size
 _MOST_BYTES = 128 * 2**20
 """Of a file that is read: more than any message."""
-
-
-def write_atomically(
-    path: Path, chunks: Sequence[bytes | memoryview], *, durable: bool = True, named: bool = True,
-    direct: bool = False, mode: int = 0o666, steps: str = "",
-) -> None:
-    """Write a file so that `path` is ever either the old contents or all of the new.
-
-    With `durable`, it is on the disk, and with `named` so is its name, when this returns; without,
-    that is left to `sync_folder`. With `direct` it does not pass through the page cache where that
-    can be had. `mode`, less the umask, is that of the file. `steps` begins the names of this
-    write's failpoints.
-
-    Raises
-    ------
-    OSError
-        As from the system; nothing half-written stays, though all of it may.
-    """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
-        with os.fdopen(os.open(temporary, flags, mode), "wb") as file:
-            if not (direct and write_direct(file.fileno(), chunks)):
-                for chunk in chunks:
-                    file.write(chunk)
-                file.flush()
-            failpoint(f"{steps}.written")
-            if durable:
-                os.fsync(file.fileno())
-                failpoint(f"{steps}.synced")
-        temporary.replace(path)
-        failpoint(f"{steps}.renamed")
-    except BaseException:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
-        raise
-    if durable and named:
-        sync_folder(path.parent)
 
 
 def write_parts(
@@ -175,12 +136,3 @@ def naming(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise store_error(path, error) from error
-
-
-def sync_folder(folder: Path) -> None:
-    """Put the names in a folder on the disk; OSError where that fails."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

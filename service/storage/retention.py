@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 from datetime import datetime
 
 from denseface.service.protocol.states import CaptureState
+from denseface.service.runtime.files import sync_folder
 from denseface.service.storage.database import Database
 from denseface.service.storage.disk_reserve import DiskReserve
 from denseface.service.storage.folder_layout import FolderLayout
 from denseface.service.storage.quarantine import Quarantine
-from denseface.service.storage.record_file import naming, sync_folder
+from denseface.service.storage.record_file import naming
 from denseface.service.storage.store_clock import StoreClock, stamp
 
 __all__ = ["Retention"]

@@ -15,7 +15,8 @@ from typing import Protocol, Self
 
 from denseface.service.errors import StoreError
 from denseface.service.runtime.failpoints import failpoint
-from denseface.service.storage.record_file import store_error, sync_folder
+from denseface.service.runtime.files import sync_folder
+from denseface.service.storage.record_file import store_error
 from denseface.service.storage.records import FrameAbout, PendingWrite
 
 __all__ = ["InlineWriter", "WriteResult", "Writer", "WriterThreads", "write"]

@@ -6,7 +6,8 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from denseface.service.errors import AddressError, HubRunningError
-from denseface.service.settings import private_folder, runtime_folder
+from denseface.service.runtime.files import private_folder
+from denseface.service.settings import runtime_folder
 
 __all__ = ["check_bindable", "check_connectable", "is_local", "publications_of", "socket_file"]
 

@@ -10,8 +10,7 @@ from denseface.service.errors import AddressError, AuthenticatorStoppedError
 from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Buffer
-from denseface.service.runtime.descriptors import DescriptorWatch
-from denseface.service.runtime.memory import MemoryWatch
+from denseface.service.runtime.limits import DescriptorWatch, MemoryWatch
 from denseface.service.security.allow_list import Allowed, AllowList
 from denseface.service.security.keys import HUB, read_pair
 from denseface.service.security.permissions import TOPICS

@@ -7,7 +7,7 @@ import pytest
 from denseface.service.client.aio import AsyncClient
 from denseface.service.client.blocking import Client
 from denseface.service.errors import AddressError, HubRunningError, SettingsError
-from denseface.service.settings import ServiceSettings, default_address, private_folder
+from denseface.service.settings import ServiceSettings, default_address
 from denseface.service.transport.addresses import (
     check_bindable,
     is_local,
@@ -66,16 +66,6 @@ def test_a_socket_in_use_is_not_taken_over(tmp_path, monkeypatch):
         with pytest.raises(HubRunningError, match="another hub"):
             check_bindable(f"ipc://{path}")
     check_bindable(f"ipc://{path}")  # left behind by one that was killed
-
-
-def test_a_private_folder_is_private(tmp_path):
-    folder = private_folder(tmp_path / "a" / "b")
-    assert folder.stat().st_mode & 0o777 == 0o700
-    folder.chmod(0o755)
-    assert private_folder(folder).stat().st_mode & 0o777 == 0o700
-    (tmp_path / "link").symlink_to(folder)
-    with pytest.raises(SettingsError, match="must be a folder"):
-        private_folder(tmp_path / "link")
 
 
 def test_nobody_connects_by_a_default_folder_that_another_may_have_made(tmp_path, monkeypatch):

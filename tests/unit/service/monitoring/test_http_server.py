@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from denseface.service.errors import AddressError
 from denseface.service.monitoring.http_server import MetricsServer
-from denseface.service.runtime.loopback import loopback_place
+from denseface.service.runtime.parsing import parse_loopback_address
 
 
 class Asked:
@@ -146,7 +146,7 @@ def test_a_port_in_use_is_one_line(server):
     ("9400", ("127.0.0.1", 9400)), ("0", ("127.0.0.1", 0)), ("127.0.0.5:1", ("127.0.0.5", 1)),
     ("[::1]:9400", ("::1", 9400)), ("off", None), (None, None)])
 def test_places(given, place):
-    assert loopback_place(given) == place
+    assert parse_loopback_address(given) == place
 
 
 @pytest.mark.parametrize("given", [
@@ -154,4 +154,4 @@ def test_places(given, place):
     "١", "127.0.0.1:", "127.0.0.1"])
 def test_other_places_are_refused(given):
     with pytest.raises(ValueError, match="this machine alone"):
-        loopback_place(given)
+        parse_loopback_address(given)

@@ -9,7 +9,7 @@ import zmq
 from denseface.service.errors import AddressError, KeyFileError
 from denseface.service.monitoring.figures import Counters
 from denseface.service.monitoring.rejections import Rejections
-from denseface.service.runtime.memory import MemoryWatch
+from denseface.service.runtime.limits import MemoryWatch
 from denseface.service.security.allow_list import Role, allow, revoke
 from denseface.service.security.keys import KeyPair, new_pair, read_public
 from denseface.service.settings import ServiceSettings
@@ -146,8 +146,8 @@ def test_several_addresses_come_with_commas():
 def test_memory_that_stays_with_the_process_is_said_once(monkeypatch, tmp_path):
     statm = tmp_path / "statm"
     statm.touch()
-    monkeypatch.setattr("denseface.service.runtime.memory._STATM", statm)
-    monkeypatch.setattr("denseface.service.runtime.memory._PAGE", 1)
+    monkeypatch.setattr("denseface.service.runtime.limits._STATM", statm)
+    monkeypatch.setattr("denseface.service.runtime.limits._PAGE_BYTES", 1)
     watch = MemoryWatch(100)
 
     def beyond(used):

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 import pytest
 
 from denseface.service.errors import SettingsError
-from denseface.service.runtime.times import parse_time
+from denseface.service.runtime.parsing import parse_time
 from denseface.service.settings import ServiceSettings
 
 

@@ -1,16 +1,19 @@
-"""Durations and times as people write them."""
+"""Durations, times and addresses as people write them."""
 
 import math
 import re
 from datetime import UTC, datetime
+from ipaddress import ip_address
 
-__all__ = ["parse_time", "retention_of"]
+__all__ = ["parse_loopback_address", "parse_retention", "parse_time"]
 
 _UNITS = {"s": 1, "m": 60, "h": 3600, "d": 86400}
+"""Letter -> seconds."""
 _SHORTEST_S = 1.0
+"""Shortest retention, seconds."""
 
 
-def retention_of(given: object) -> float | None:
+def parse_retention(given: object) -> float | None:
     """Read a retention, seconds; None for `off`.
 
     Zero is refused: some mean "keep nothing" by it, others "no limit".
@@ -46,3 +49,26 @@ def parse_time(text: str) -> datetime:
         raise ValueError(
             f"{text!r}: expected a time such as 2026-01-31T14:30, UTC or with a zone") from error
     return moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
+
+
+def parse_loopback_address(given: object) -> tuple[str, int] | None:
+    """Read `PORT` or `HOST:PORT` of a loopback host; None for `off`. Port 0 is any free one.
+
+    Raises
+    ------
+    ValueError
+        One line that says what was expected.
+    """
+    text = str(given).strip()
+    if given is None or text.lower() == "off":
+        return None
+    host, colon, port = text.rpartition(":")
+    host = host.removeprefix("[").removesuffix("]") if colon else "127.0.0.1"
+    try:
+        loopback = ip_address(host).is_loopback
+    except ValueError:
+        loopback = False
+    if not loopback or not port.isascii() or not port.isdecimal() or not int(port) <= 65535:
+        raise ValueError("expected PORT, 127.0.0.1:PORT or [::1]:PORT, or off: the metrics are for "
+                         "this machine alone")
+    return host, int(port)

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from denseface.service.storage import direct
+from denseface.service.runtime import _direct_io
 from denseface.service.storage.record_file import read_parts, write_parts
 
 PARTS = [b"header", os.urandom(2**20 + 17), b"", memoryview(os.urandom(3 * 2**20 + 1))]
@@ -22,7 +22,7 @@ def written(monkeypatch):
             sizes.append(count)
         return count
 
-    monkeypatch.setattr(direct.os, "write", write)
+    monkeypatch.setattr(_direct_io.os, "write", write)
     return sizes
 
 
@@ -42,7 +42,8 @@ def test_it_holds_what_any_other_holds(tmp_path, monkeypatch):
 
 def test_a_short_write_goes_on(tmp_path, monkeypatch):
     real = os.write
-    monkeypatch.setattr(direct.os, "write", lambda descriptor, data: real(descriptor, data[:2**20]))
+    monkeypatch.setattr(
+        _direct_io.os, "write", lambda descriptor, data: real(descriptor, data[:2**20]))
     checksum = write_parts(tmp_path / "x", PARTS, direct=True)
     assert read_parts(tmp_path / "x", checksum)[0] == [bytes(part) for part in PARTS]
 
@@ -58,7 +59,7 @@ def test_where_it_cannot_be_had_the_cache_is_used(tmp_path, monkeypatch, at):
         return real(descriptor, data[:2**20])
 
     with monkeypatch.context() as patch:
-        patch.setattr(direct.os, "write", refuses)
+        patch.setattr(_direct_io.os, "write", refuses)
         checksum = write_parts(tmp_path / "x", PARTS, direct=True)
     assert calls
     assert read_parts(tmp_path / "x", checksum)[0] == [bytes(part) for part in PARTS]
@@ -68,7 +69,7 @@ def test_a_full_disk_is_told(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(direct.os, "write", full)
+    monkeypatch.setattr(_direct_io.os, "write", full)
     with pytest.raises(OSError, match="no room on the disk"):
         write_parts(tmp_path / "x", PARTS, direct=True)
     assert list(tmp_path.iterdir()) == []
