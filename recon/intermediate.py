@@ -6,7 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ColorSampler", "Registration"]
+from denseface.recon.numerics.bilinear import add_resampled
+from denseface.recon.support import Support
+
+__all__ = ["ColorSampler", "Registration", "SurfaceGrid"]
 
 ColorSampler = Callable[[NDArray[np.float32]], tuple[NDArray[np.uint8], NDArray[np.bool_]]]
 """Points, (n, 3) float32, mm, to their colours, (n, 3) uint8, and which are seen, (n,) bool."""
@@ -42,3 +45,31 @@ class Registration:
     colors: NDArray[np.uint8]
     pitch: float
     nearest: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceGrid:
+    """A surface z = f(x, y) on the grid of its support, bilinear between the points.
+
+    Attributes
+    ----------
+    values : (3, rows, columns) float32: height, mm, and slopes along x and y
+    support : where the seeds support the surface, and the grid
+    noise : standard deviation of the seeds about the surface, mm
+    detailed : whether detail was added to the fit
+    """
+
+    values: NDArray[np.float32]
+    support: Support
+    noise: float
+    detailed: bool
+
+    def sampled(
+        self, xs: NDArray[np.float64], ys: NDArray[np.float64]
+    ) -> NDArray[np.float32]:
+        """Give f, df/dx, df/dy on another axis-aligned grid: (k,), (m,) mm -> (3, m, k)."""
+        columns, rows = self.support.places(xs, ys)
+        found = np.zeros((3, len(rows), len(columns)), np.float32)
+        for one, known in zip(found, self.values, strict=True):
+            add_resampled(one, known, rows, columns)
+        return found

@@ -12,18 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.capture.frame import RgbdFrame
-from denseface.recon.detail.detail import DetailedSurface, add_detail
+from denseface.recon.detail.detail import add_detail
 from denseface.recon.detection import detect_face
 from denseface.recon.errors import NoDepthError, TooLittleDepthError
 from denseface.recon.face import Face, PointCloud, Report
-from denseface.recon.intermediate import ColorSampler, Registration
+from denseface.recon.intermediate import ColorSampler, Registration, SurfaceGrid
 from denseface.recon.numerics.threads import one_blas_thread
 from denseface.recon.propagation.densify import densify
 from denseface.recon.propagation.uncertainty import noise_fraction
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation.segment import segment_face, window_of_box
 from denseface.recon.settings import Settings
-from denseface.recon.surface.rbf import MIN_SEEDS, Surface, fit_surface
+from denseface.recon.support import Support
+from denseface.recon.surface.rbf import MIN_SEEDS, fit_surface
 from denseface.recon.surface.spacing import mean_spacing
 
 __all__ = ["reconstruct", "surface_of"]
@@ -112,7 +113,7 @@ def _version() -> str:
 def surface_of(
     points: NDArray[np.float32], spacing: float, settings: Settings,
     sampler: ColorSampler | None = None,
-) -> Surface | DetailedSurface:
+) -> SurfaceGrid:
     """Fit the seeds, and add the detail that the settings ask for.
 
     Parameters
@@ -126,12 +127,14 @@ def surface_of(
     TooLittleDepthError
         Where there are too few points, or all on a line.
     """
-    surface = fit_surface(points, settings.r0_factor * spacing, settings.smoothing)
+    fit = fit_surface(points, settings.r0_factor * spacing, settings.smoothing)
+    support = Support.of(points, spacing)
     if settings.detail_factor is None:
-        return surface
-    return add_detail(surface, points, spacing, settings.detail_factor * spacing,
-                      symmetry=settings.symmetry,
-                      sampler=sampler if settings.shading else None)
+        return fit.on_support(support)
+    return add_detail(
+        fit.heights(support.xs, support.ys), support, points, spacing,
+        settings.detail_factor * spacing, symmetry=settings.symmetry,
+        sampler=sampler if settings.shading else None)
 
 
 def _warnings(frame: RgbdFrame, seeds: int) -> tuple[str, ...]:

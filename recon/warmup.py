@@ -7,15 +7,14 @@ import numpy as np
 
 from denseface.capture.calibration import Calibration, CameraModel
 from denseface.capture.frame import RgbdFrame
-from denseface.recon.detail.detail import add_detail
 from denseface.recon.detection import detect_face, judge_box
 from denseface.recon.errors import NoFaceError
 from denseface.recon.numerics.malloc import keep_freed_memory
+from denseface.recon.pipeline import surface_of
 from denseface.recon.propagation.densify import densify
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation.segment import segment_face
 from denseface.recon.settings import Settings
-from denseface.recon.surface.rbf import fit_surface
 from denseface.recon.surface.spacing import mean_spacing
 
 __all__ = ["warm"]
@@ -44,9 +43,8 @@ def warm() -> None:
     judge_box(_BOX, registered, _FOCAL_PX)
     seeds = segment_face(registered, _BOX, _FOCAL_PX)
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
-    fit = fit_surface(seeds.points, settings.r0_factor * spacing, settings.smoothing)
     sampler = partial(sample_colors, frame, registered)
-    surface = add_detail(fit, seeds.points, spacing, spacing, symmetry=True, sampler=sampler)
+    surface = surface_of(seeds.points, spacing, settings, sampler)
     densify(seeds, surface, spacing, settings.ratio, 1.0, sampler)
 
 

@@ -7,7 +7,6 @@ doi:10.1109/TPAMI.1980.4766994, keeps what stands above noise.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +17,15 @@ from denseface.recon.detail.mirror_plane import find_plane
 from denseface.recon.detail.rim import BROADER, Rim, iterated_average
 from denseface.recon.detail.shading import shading_detail
 from denseface.recon.detail.symmetry import symmetry_correction
-from denseface.recon.intermediate import ColorSampler
+from denseface.recon.intermediate import ColorSampler, SurfaceGrid
 from denseface.recon.numerics.bilinear import add_resampled
 from denseface.recon.numerics.filters import blurred, downsampled, upsampled
 from denseface.recon.numerics.normalized_convolution import normalized_convolution
 from denseface.recon.numerics.percentile import percentile
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, read_between, share_out
 from denseface.recon.support import Support
-from denseface.recon.surface.rbf import Surface
 
-__all__ = ["DetailedSurface", "add_detail"]
+__all__ = ["add_detail"]
 
 Image = NDArray[np.float32]
 
@@ -46,60 +44,26 @@ _AT_RIM = 0.5
 _FADING_RIM = 1.5
 
 
-@dataclass(frozen=True, eq=False)
-class DetailedSurface:
-    """A fit with what was added to it, between the points of a grid.
-
-    Attributes
-    ----------
-    sheet : (3, rows, columns) float32: height, mm, and slopes along x and y
-    support : whose grid this is, and where the seeds support the surface
-    noise : standard deviation of the seeds about the surface, mm
-    """
-
-    surface_grid: Image
-    support: Support
-    noise: float
-
-    def on_grid(self, xs: NDArray[np.float64], ys: NDArray[np.float64]) -> Image:
-        """Evaluate on an axis-aligned grid: (k,), (m,) mm -> (m, k) mm."""
-        return self.sampled(xs, ys)[0]
-
-    def sampled(
-        self, xs: NDArray[np.float64], ys: NDArray[np.float64]
-    ) -> tuple[Image, Image, Image]:
-        """Give f, df/dx, df/dy on an axis-aligned grid at once, in single precision.
-
-        As `Surface.sampled`: (k,), (m,) mm -> (m, k) each.
-        """
-        columns, rows = self.support.places(xs, ys)
-        found = np.zeros((3, len(rows), len(columns)), np.float32)
-        for one, known in zip(found, self.surface_grid, strict=True):
-            add_resampled(one, known, rows, columns)
-        return found[0], found[1], found[2]
-
-
 def add_detail(
-    base: Surface, points: NDArray[np.float32], spacing: float, radius: float, *,
-    symmetry: bool = False, sampler: ColorSampler | None = None,
-) -> DetailedSurface:
+    heights: Image, supported: Support, points: NDArray[np.float32], spacing: float,
+    radius: float, *, symmetry: bool = False, sampler: ColorSampler | None = None,
+) -> SurfaceGrid:
     """Add to a broad fit what its seeds show besides.
 
     Parameters
     ----------
-    base : a fit of `points`
+    heights : (rows, columns) float32, mm, a fit of `points` on the support's grid
+    supported : where they support a surface
     points : (n, 3) float32, mm, depth camera frame
     spacing : mean spacing of the points, mm
     radius : of the average (standard deviation), mm
     symmetry : let each side of the face be helped by the other's mirror image
     sampler : tells points' colours, of whose shading more detail is taken; None: of depth alone
     """
-    supported = Support.of(points, spacing)
     xs, ys, step, support = supported.xs, supported.ys, supported.step, supported.inside
     columns, rows = (((points[:, axis] - low) / step).astype(np.float32)
                      for axis, low in ((0, xs[0]), (1, ys[0])))
     grid = _SeedGrid(columns, rows, support.shape)
-    heights = base.heights(xs, ys)
     rest = points[:, 2] - grid.at_seeds(heights)
     usual = np.float32((step / spacing) ** 2)
     weight, detail = (blurred(one, _blur_after_scatter(radius / step)) for one in grid.sums(rest))
@@ -110,7 +74,7 @@ def add_detail(
     counts, sums = cells.sums(rest)
     broad = iterated_average(counts, sums, BROADER * radius / (4 * step), 16 * float(usual), rim, 2)
     blend_toward(detail, upsampled(broad, detail.shape), upsampled(rim.nearness, detail.shape),
-              missing)
+                 missing)
     filled, hole = fill_holes(counts, sums, missing, rim, heights, detail, spacing)
     detail *= 1 - hole
 
@@ -145,11 +109,11 @@ def add_detail(
     slopes(smaller, 2 * step, across, down)
     detail += upsampled(rim.fraying_correction((across, down), spacing), detail.shape)
     detail += filled
-    surface_grid = np.empty((3, *detail.shape), np.float32)
-    np.add(heights, detail, out=surface_grid[0])
-    slopes(surface_grid[0], step, surface_grid[1], surface_grid[2])
+    values = np.empty((3, *detail.shape), np.float32)
+    np.add(heights, detail, out=values[0])
+    slopes(values[0], step, values[1], values[2])
     noise_mm = float((rest - grid.at_seeds(detail)).std())
-    return DetailedSurface(surface_grid, supported, noise_mm)
+    return SurfaceGrid(values, supported, noise_mm, detailed=True)
 
 
 class _SeedGrid:

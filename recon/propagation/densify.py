@@ -8,15 +8,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.detail.detail import DetailedSurface
 from denseface.recon.face import DenseCloud, Seeds
-from denseface.recon.intermediate import ColorSampler
+from denseface.recon.intermediate import ColorSampler, SurfaceGrid
 from denseface.recon.numerics.push_pull import average_neighbors
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, places
 from denseface.recon.propagation._image_kernels import collect, unset
 from denseface.recon.propagation.uncertainty import standard_error, variance_components
 from denseface.recon.support import Support
-from denseface.recon.surface.rbf import Surface
 
 __all__ = ["densify"]
 
@@ -38,7 +36,7 @@ _SPECK = 2
 
 def densify(
     seeds: Seeds,
-    surface: Surface | DetailedSurface,
+    surface: SurfaceGrid,
     spacing: float,
     ratio: float,
     noise_fraction: float,
@@ -49,30 +47,29 @@ def densify(
     Parameters
     ----------
     seeds : the initial cloud
-    surface : the fit over (X, Y)
+    surface : the fit over (X, Y), with its detail
     spacing : mean spacing of the seeds, mm
     ratio : dense points for each seed
     noise_fraction : k of `recon.propagation.uncertainty.noise_fraction`
     sampler : tells the colours of points in holes; None, and their border's colours fill them
     """
-    supported, surface_grid = _surface_grid(seeds.points, surface, spacing)
-    slopes = surface_grid[1], surface_grid[2]
+    supported, (heights, dz_dx, dz_dy) = surface.support, surface.values
+    slopes = dz_dx, dz_dy
     step = float(np.sqrt(supported.area / (ratio * len(seeds.points))))
     supported = _without_bridges(supported, slopes, spacing)
     xs, ys, support = supported.on_grid(step)
     origin = float(xs[0]), float(ys[0])
 
     components = variance_components(
-        seeds.points, supported.inside, surface_grid[0], slopes, origin, supported.step, spacing)
-    error = standard_error(
-        components, noise_fraction, detailed=isinstance(surface, DetailedSurface))
+        seeds.points, supported.inside, heights, slopes, origin, supported.step, spacing)
+    error = standard_error(components, noise_fraction, detailed=surface.detailed)
     sigma = np.asarray(cv2.copyMakeBorder(error, 0, 1, 0, 1, cv2.BORDER_REPLICATE), np.float32)
     # Colours have no detail finer than the seeds: every so many points are enough.
     every = max(1, round(_COLOR_STEP * spacing / step))
     colors = _colors(seeds, origin, every * step, spacing, _coarser(support, every))
     columns, rows = supported.places(xs, ys)
     points, normals, colors, sigma, cells = collect(
-        support, xs, ys, surface_grid, rows, columns, colors, every, sigma, components.every)
+        support, xs, ys, surface.values, rows, columns, colors, every, sigma, components.every)
     if sampler is not None:
         near = supported.near_seeds(_HOLE * spacing)
         hole = unset(near, rows, columns, cells)
@@ -88,16 +85,6 @@ def densify(
         grid_shape=support.shape,
         grid_step_mm=step,
     )
-
-
-def _surface_grid(
-    points: NDArray[np.float32], surface: Surface | DetailedSurface, spacing: float
-) -> tuple[Support, NDArray[np.float32]]:
-    """Give the support, and height and slopes on its grid, (3, rows, columns)."""
-    if isinstance(surface, DetailedSurface):
-        return surface.support, surface.surface_grid
-    supported = Support.of(points, spacing)
-    return supported, np.stack(surface.sampled(supported.xs, supported.ys))
 
 
 def _without_bridges(

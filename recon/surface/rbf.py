@@ -26,6 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.errors import TooLittleDepthError
+from denseface.recon.intermediate import SurfaceGrid
+from denseface.recon.support import Support
 from denseface.recon.surface._conjugate_gradients import conjugate_gradients
 from denseface.recon.surface._fast_gauss import FastGaussTransform
 from denseface.recon.surface._trend import Trend, polynomial
@@ -120,6 +122,11 @@ class Surface:
         lines = slope_y @ weights
         slopes_y: NDArray[np.float32] = lines @ across.T
         return heights, slopes_x, slopes_y
+
+    def on_support(self, support: Support) -> SurfaceGrid:
+        """Sample on the grid of a support."""
+        values = np.stack(self.sampled(support.xs, support.ys))
+        return SurfaceGrid(values, support, self.noise, detailed=False)
 
     def _factors(
         self, values: NDArray[np.float64], axis: int, kind: type[_Float]

@@ -4,9 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.capture.calibration import DepthToColor
+from denseface.recon.detail.detail import add_detail
 from denseface.recon.face import Seeds
-from denseface.recon.intermediate import Registration
+from denseface.recon.intermediate import Registration, SurfaceGrid
 from denseface.recon.registration import register
+from denseface.recon.support import Support
+from denseface.recon.surface.rbf import Surface, fit_surface
 from tests.unit.frames import calibration, camera, frame
 
 FOCAL = 300.0
@@ -72,3 +75,20 @@ def seeds(points: NDArray[np.float32], colors: NDArray[np.uint8] | None = None) 
     if colors is None:
         colors = np.full((len(points), 3), 128, np.uint8)
     return Seeds(points, colors, np.zeros((len(points), 2), np.int32))
+
+
+def fitted(
+    points: NDArray[np.float32], spacing: float, r0: float, smoothing: float
+) -> SurfaceGrid:
+    """A fit without detail, on the support of its points."""
+    return fit_surface(points, r0, smoothing).on_support(Support.of(points, spacing))
+
+
+def with_detail(
+    broad: Surface, points: NDArray[np.float32], spacing: float, radius: float, *,
+    symmetry: bool = False,
+) -> SurfaceGrid:
+    """A fit of some points with their detail."""
+    support = Support.of(points, spacing)
+    return add_detail(broad.heights(support.xs, support.ys), support, points, spacing, radius,
+                      symmetry=symmetry)

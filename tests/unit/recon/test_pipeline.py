@@ -351,5 +351,5 @@ def test_without_colour_the_face_is_that_of_depth(shot):
         spacing = mean_spacing(seeds.points, seeds.pixels, Neighbors.LATTICE)
         surface = surface_of(seeds.points, spacing, Settings(shading=shading),
                              partial(sample_colors, frame, tied))
-        heights.append(surface.surface_grid[0])
+        heights.append(surface.values[0])
     assert np.abs(heights[0] - heights[1]).mean() < 0.02

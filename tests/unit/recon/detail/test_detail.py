@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from denseface.recon.detail.detail import add_detail
 from denseface.recon.surface.rbf import fit_surface
-from tests.unit.recon.shapes import disc_seeds
+from tests.unit.recon.shapes import disc_seeds, with_detail
 
 SPACING = 1.3
 XS = YS = np.linspace(-45, 45, 61)
@@ -24,7 +23,7 @@ def surfaces(noise_mm, shape=truth, hole=0.0):
     points[:, 2] = shape(*points[:, :2].T) + np.random.default_rng(3).normal(
         0, noise_mm, len(points))
     broad = fit_surface(points, 14 * SPACING, 20)
-    return broad, add_detail(broad, points, SPACING, 1.6 * SPACING)
+    return broad, with_detail(broad, points, SPACING, 1.6 * SPACING)
 
 
 @pytest.fixture(scope="module")
@@ -37,14 +36,14 @@ def rms(heights, where, shape=truth):
 
 
 def test_nearly_nothing_where_flat_and_noisy(noisy):
-    broad, detailed = (one.on_grid(XS, YS) for one in noisy)
+    broad, detailed = (one.sampled(XS, YS)[0] for one in noisy)
     flat = (AWAY > 25) & INSIDE
     assert rms(detailed, flat) < 1.5 * rms(broad, flat)
     assert rms(detailed, flat) < 0.2
 
 
 def test_the_bump_comes_back(noisy):
-    broad, detailed = (one.on_grid(XS, YS) for one in noisy)
+    broad, detailed = (one.sampled(XS, YS)[0] for one in noisy)
     bump = AWAY < 8
     assert rms(broad, bump) > 3 * rms(detailed, bump)
 
@@ -54,18 +53,18 @@ def test_better_than_either_smoothing_for_the_whole(noisy):
     points = disc_seeds(SPACING, 55)
     points[:, 2] = truth(*points[:, :2].T) + np.random.default_rng(3).normal(0, 1.2, len(points))
     fine = fit_surface(points, 6 * SPACING, 1)
-    best = min(rms(one.on_grid(XS, YS), INSIDE) for one in (broad, fine))
-    assert rms(detailed.on_grid(XS, YS), INSIDE) < 0.8 * best
+    best = min(rms(one.sampled(XS, YS)[0], INSIDE) for one in (broad, fine))
+    assert rms(detailed.sampled(XS, YS)[0], INSIDE) < 0.8 * best
 
 
 def test_the_gradient_is_the_derivative(noisy):
     _, detailed = noisy
     e = 0.3
     heights, dx, dy = detailed.sampled(XS, YS)
-    np.testing.assert_allclose(heights, detailed.on_grid(XS, YS), atol=1e-3)
+    np.testing.assert_allclose(heights, detailed.sampled(XS, YS)[0], atol=1e-3)
     for slope, moved in (
-            (dx, (detailed.on_grid(XS + e, YS) - detailed.on_grid(XS - e, YS)) / (2 * e)),
-            (dy, (detailed.on_grid(XS, YS + e) - detailed.on_grid(XS, YS - e)) / (2 * e))):
+            (dx, (detailed.sampled(XS + e, YS)[0] - detailed.sampled(XS - e, YS)[0]) / (2 * e)),
+            (dy, (detailed.sampled(XS, YS + e)[0] - detailed.sampled(XS, YS - e)[0]) / (2 * e))):
         assert np.abs(slope - moved)[INSIDE].max() < 0.05
         assert np.corrcoef(slope[INSIDE], moved[INSIDE])[0, 1] > 0.995
 
@@ -76,8 +75,8 @@ def test_noise_is_what_the_seeds_are_off_the_surface(noisy):
 
 def test_without_noise_the_surface_is_that_of_the_seeds():
     _, detailed = surfaces(0.0)
-    assert rms(detailed.on_grid(XS, YS), AWAY < 8) < 0.4
-    assert rms(detailed.on_grid(XS, YS), (AWAY > 25) & INSIDE) < 0.02
+    assert rms(detailed.sampled(XS, YS)[0], AWAY < 8) < 0.4
+    assert rms(detailed.sampled(XS, YS)[0], (AWAY > 25) & INSIDE) < 0.02
 
 
 def test_inside_a_hole_the_surface_goes_on_from_its_border():
@@ -85,16 +84,16 @@ def test_inside_a_hole_the_surface_goes_on_from_its_border():
         return 700 + 4 * np.exp(-(x * x + y * y) / (2 * 8.0**2))
 
     hole = np.hypot(X, Y) < 6
-    broad, detailed = (one.on_grid(XS, YS) for one in surfaces(0.0, hill, hole=6.0))
+    broad, detailed = (one.sampled(XS, YS)[0] for one in surfaces(0.0, hill, hole=6.0))
     assert rms(detailed, hole, hill) < 0.45 * rms(broad, hole, hill)
-    whole = surfaces(0.0, hill)[1].on_grid(XS, YS)
+    whole = surfaces(0.0, hill)[1].sampled(XS, YS)[0]
     far = (np.hypot(X, Y) > 15) & (np.hypot(X, Y) < 45)
     np.testing.assert_allclose(detailed[far], whole[far], atol=0.02)
 
 
 def test_the_same_seeds_give_the_same_bytes(noisy):
     again = surfaces(1.2)[1]
-    np.testing.assert_array_equal(noisy[1].surface_grid, again.surface_grid)
+    np.testing.assert_array_equal(noisy[1].values, again.values)
     assert noisy[1].noise == again.noise
 
 
@@ -103,7 +102,7 @@ def test_far_from_all_seeds_the_detail_stays_finite():
     points = disc_seeds(SPACING, 55, 40)
     points[:, 2] = truth(*points[:, :2].T)
     broad = fit_surface(points, 14 * SPACING, 20)
-    detailed = add_detail(broad, points, SPACING, 1.6 * SPACING)
-    assert np.isfinite(detailed.surface_grid).all()
+    detailed = with_detail(broad, points, SPACING, 1.6 * SPACING)
+    assert np.isfinite(detailed.values).all()
     middle = np.hypot(X, Y) < 20
-    np.testing.assert_allclose(detailed.on_grid(XS, YS)[middle], 700, atol=0.02)
+    np.testing.assert_allclose(detailed.sampled(XS, YS)[0][middle], 700, atol=0.02)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from denseface.recon.detail.detail import add_detail
 from denseface.recon.detail.mirror_plane import MirrorPlane
 from denseface.recon.detail.symmetry import symmetry_correction
 from denseface.recon.surface.rbf import fit_surface
 from tests.unit.recon.mirror_shapes import Pose, face_points, height
+from tests.unit.recon.shapes import with_detail
 
 SPACING = 1.5
 # Parts of the variance and correlation lengths, points, as a Kinect's (`tests/simulator/noise.py`).
@@ -61,8 +61,8 @@ def errors(symmetry, pose=TURNED, one_side=None, hole=False, seeds=3):
             at = pose.own(points)
             points = points[np.hypot(at[:, 0] - 30, at[:, 1] + 22) > 12]
         broad = fit_surface(points, 14 * SPACING, 12)
-        surface = add_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=symmetry)
-        found.append([surface.on_grid(true[k:k + 1, 0], true[k:k + 1, 1])[0, 0]
+        surface = with_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=symmetry)
+        found.append([surface.sampled(true[k:k + 1, 0], true[k:k + 1, 1])[0, 0, 0]
                       for k in range(len(true))] - true[:, 2])
     return x, y, np.array(found)
 
@@ -127,8 +127,8 @@ def test_half_a_face_is_no_worse_for_it(half):
     at = TURNED.own(points)
     true = TURNED.placed(np.column_stack([at[:, :2], height(at[:, 0], at[:, 1])]))[::5]
     for symmetry in (False, True):
-        surface = add_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=symmetry)
-        found.append(np.std([surface.on_grid(one[:1], one[1:2])[0, 0] - one[2] for one in true]))
+        surface = with_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=symmetry)
+        found.append(np.std([surface.sampled(one[:1], one[1:2])[0, 0, 0] - one[2] for one in true]))
     assert found[1] < 1.02 * found[0]
 
 
@@ -160,6 +160,6 @@ def test_without_noise_nothing_changes():
 
 def test_the_same_seeds_give_the_same_bytes(half):
     points, broad = half
-    one, other = (add_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=True).surface_grid
+    one, other = (with_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=True).values
                   for _ in range(2))
     np.testing.assert_array_equal(one, other)

@@ -7,14 +7,13 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from denseface.recon.propagation.densify import densify
-from denseface.recon.surface.rbf import fit_surface
 from denseface.recon.surface.spacing import exact_spacing
-from tests.unit.recon.shapes import disc_seeds, seeds
+from tests.unit.recon.shapes import disc_seeds, fitted, seeds
 
 
 def dense_of(points, ratio=10.0, colors=None, smoothing=0.1):
     spacing = exact_spacing(np.ascontiguousarray(points[:, :2]))
-    surface = fit_surface(points, 6 * spacing, smoothing)
+    surface = fitted(points, spacing, 6 * spacing, smoothing)
     return densify(seeds(points, colors), surface, spacing, ratio, noise_fraction=0.5)
 
 
@@ -122,7 +121,7 @@ def test_arrays_are_of_the_documented_kinds():
 def test_points_in_a_hole_are_coloured_by_what_is_seen_there():
     points = raised(disc_seeds(1.3, 40, 8), sphere)
     spacing = exact_spacing(points[:, :2])
-    surface = fit_surface(points, 8 * spacing, 0.1)
+    surface = fitted(points, spacing, 8 * spacing, 0.1)
     asked = []
 
     def sampler(some):
@@ -158,7 +157,7 @@ def test_a_step_is_not_bridged_where_nothing_was_read():
     points = disc_seeds(1.0, 30)
     points = points[np.abs(points[:, 0]) > 1.8]
     points[:, 2] = np.where(points[:, 0] > 0, 740, 700)
-    dense = densify(seeds(points), fit_surface(points, 4, 0.1), 1.0, 10, 0.5)
+    dense = densify(seeds(points), fitted(points, 1.0, 4, 0.1), 1.0, 10, 0.5)
     x, y, z = dense.points.T
     assert not ((np.abs(x) < 1) & (np.abs(y) < 28)).any()
     # Neither side loses its own.
@@ -170,7 +169,7 @@ def test_a_step_is_not_bridged_where_nothing_was_read():
 def test_a_gap_without_a_step_is_filled():
     points = disc_seeds(1.0, 30)
     points = points[np.abs(points[:, 0]) > 1.8]
-    dense = densify(seeds(points), fit_surface(points, 4, 0.1), 1.0, 10, 0.5)
+    dense = densify(seeds(points), fitted(points, 1.0, 4, 0.1), 1.0, 10, 0.5)
     x, y, _ = dense.points.T
     assert ((np.abs(x) < 1) & (np.abs(y) < 28)).sum() == pytest.approx(
         2 * 56 / dense.grid_step_mm**2, rel=0.1)
@@ -179,6 +178,6 @@ def test_a_gap_without_a_step_is_filled():
 def test_what_was_read_stays_however_steep():
     points = disc_seeds(1.0, 30)
     points[:, 2] = 700 + 8 * points[:, 0]
-    dense = densify(seeds(points), fit_surface(points, 8, 0.1), 1.0, 10, 0.5)
+    dense = densify(seeds(points), fitted(points, 1.0, 8, 0.1), 1.0, 10, 0.5)
     read, _ = cKDTree(dense.points[:, :2]).query(points[:, :2])
     assert np.quantile(read, 0.9) < 0.5

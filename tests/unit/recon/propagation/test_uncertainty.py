@@ -10,15 +10,15 @@ from denseface.recon.propagation._uncertainty_kernels import coarsen
 from denseface.recon.propagation.densify import densify
 from denseface.recon.propagation.uncertainty import fit_cutoff, noise_fraction
 from denseface.recon.settings import Preset, Settings
-from denseface.recon.surface.rbf import fit_surface
-from tests.unit.recon.shapes import disc_seeds, seeds
+from tests.unit.recon.shapes import disc_seeds, fitted, seeds
 
 SHARE = 0.5
 LEAST_MM = 0.05
 
 
 def dense_of(points, spacing, share=SHARE, ratio=10.0):
-    return densify(seeds(points), fit_surface(points, 8 * spacing, 3.0), spacing, ratio, share)
+    return densify(
+        seeds(points), fitted(points, spacing, 8 * spacing, 3.0), spacing, ratio, share)
 
 
 def noisy(xy, height, noise_mm, seed=0):
