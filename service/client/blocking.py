@@ -11,8 +11,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from datetime import datetime
 from pathlib import Path
-from types import TracebackType
-from typing import Self, TypeVar
+from typing import TypeVar
 
 import zmq
 
@@ -40,6 +39,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.messages import Status
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, decode_from_hub, encode
+from denseface.service.runtime.closing import Closing
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable, publications_of
 from denseface.service.transport.connection import Credentials, connect
@@ -51,7 +51,7 @@ __all__ = ["Client", "Published", "PublishedFace", "PublishedFailure", "Publishe
 _T = TypeVar("_T")
 
 
-class Client:
+class Client(Closing):
     """A connection to the hub; for one thread.
 
     Parameters
@@ -82,15 +82,6 @@ class Client:
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._socket, self._monitor = connect(
             self._context, zmq.DEALER, self.address, self._keys)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Disconnect; harmless when repeated. Ends every iteration over `faces`."""

@@ -12,6 +12,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
 from denseface.service.protocol.wire import Packet
+from denseface.service.runtime.bounded_dict import BoundedDict
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage.base import Store
@@ -60,7 +61,8 @@ class Presses:
         self._recon = recon
         self._recon_hash = recon_hash
         self._presses: dict[str, _Press] = {}
-        self._refused: dict[tuple[bytes, str, int], messages.PressRefused] = {}
+        self._refused: BoundedDict[
+            tuple[bytes, str, int], messages.PressRefused] = BoundedDict(_REFUSALS)
         """How the last requests were refused, so that a repeat of one gets the same answer."""
         self._log = structlog.get_logger("hub")
 
@@ -190,8 +192,6 @@ class Presses:
 
     def _refusal(self, peer: bytes, refused: messages.PressRefused) -> Output:
         self._refused[peer, refused.capture_id, refused.request] = refused
-        if len(self._refused) > _REFUSALS:
-            del self._refused[next(iter(self._refused))]
         return send(peer, refused)
 
     def purge(self, capture_id: str | None) -> Iterator[Output]:

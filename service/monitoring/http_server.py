@@ -8,13 +8,13 @@ import time
 from collections.abc import Callable
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import structlog
 from prometheus_client import CONTENT_TYPE_LATEST
 
 from denseface.service.errors import AddressError, reason_of
+from denseface.service.runtime.closing import Closing
 
 __all__ = ["MetricsServer"]
 
@@ -24,7 +24,7 @@ _REQUEST_S = 2.0
 _MAX_REQUEST_BYTES = 16 * 1024
 
 
-class MetricsServer:
+class MetricsServer(Closing):
     """Answers until closed; whoever is slow or talks nonsense is cut off, and nobody waits for it.
 
     Parameters
@@ -59,15 +59,6 @@ class MetricsServer:
         host, port = self._server.server_address[:2]
         host = host.decode() if isinstance(host, bytes | bytearray) else host
         return f"http://{f'[{host}]' if ':' in host else host}:{port}"
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Listen no more; a client that is being answered is left to its time-out."""

@@ -10,6 +10,7 @@ from denseface.service.monitoring.figures import Figures
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, Publish, Send
 from denseface.service.protocol.wire import Packet
+from denseface.service.runtime.bounded_dict import BoundedDict
 
 __all__ = ["MessageWatch"]
 
@@ -33,8 +34,8 @@ class MessageWatch:
     def __init__(self, figures: Figures) -> None:
         self._counters = figures.counters
         self._latencies = figures.latencies
-        self._captures: dict[str, _Times] = {}
-        self._refused: dict[tuple[bytes, str, int], None] = {}
+        self._captures: BoundedDict[str, _Times] = BoundedDict(_MOST)
+        self._refused: BoundedDict[tuple[bytes, str, int], None] = BoundedDict(_MOST)
         """Presses that were told so: a repeat is told again."""
 
     def record(self, now: float, packet: Packet | None, outputs: Sequence[Output]) -> None:
@@ -74,14 +75,10 @@ class MessageWatch:
 
     def _remember(self, told: tuple[bytes, str, int]) -> None:
         self._refused[told] = None
-        if len(self._refused) > _MOST:
-            del self._refused[next(iter(self._refused))]
 
     def _follow(self, capture_id: str) -> _Times:
         times = self._captures.pop(capture_id, None) or _Times()
         self._captures[capture_id] = times
-        if len(self._captures) > _MOST:
-            del self._captures[next(iter(self._captures))]
         return times
 
     def _accepted(self, now: float, capture_id: str) -> None:

@@ -4,8 +4,6 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import structlog
 
@@ -15,6 +13,7 @@ from denseface.service.protocol.messages import Status
 from denseface.service.protocol.outgoing import Output, Publish
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
+from denseface.service.runtime.closing import Closing
 
 __all__ = ["Observer", "Snapshot", "folder_bytes"]
 
@@ -36,7 +35,7 @@ class Snapshot:
     """By topic."""
 
 
-class Observer:
+class Observer(Closing):
     """Is told by the hub's loop what happens, and shows it to other threads as a snapshot.
 
     Parameters
@@ -52,13 +51,8 @@ class Observer:
         self._measurement = Background[int]("usage")
         self._next_measurement = 0.0
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Wait for the measurement that is under way, if any."""
         self._measurement.close()
 
     def latest(self) -> Snapshot | None:

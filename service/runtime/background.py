@@ -1,12 +1,13 @@
 """One thing at a time in a thread, its end something that a poll can wait for."""
 
-import os
 import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import suppress
-from typing import Generic, Self, TypeVar
+from typing import Generic, TypeVar
+
+from denseface.service.runtime.closing import Closing
+from denseface.service.runtime.wake_pipe import WakePipe
 
 __all__ = ["Background"]
 
@@ -14,7 +15,7 @@ _T = TypeVar("_T")
 _MOST = 2
 
 
-class Background(Generic[_T]):
+class Background(Closing, Generic[_T]):
     """Runs one call at a time in always the same thread.
 
     One more may wait: it begins as soon as the one before ends, whether or not that was taken.
@@ -22,7 +23,7 @@ class Background(Generic[_T]):
 
     def __init__(self, name: str) -> None:
         self._pool = ThreadPoolExecutor(1, thread_name_prefix=name)
-        self._event = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
+        self._wake = WakePipe()
         self._calls: deque[Future[_T]] = deque()
         self._begun = 0.0
 
@@ -37,7 +38,7 @@ class Background(Generic[_T]):
 
     def fileno(self) -> int:
         """Give the descriptor that is readable when the call has ended."""
-        return self._event
+        return self._wake.fileno()
 
     def start(self, call: Callable[[], _T]) -> None:
         """Start a call, behind the one that is under way; at most one may wait so."""
@@ -47,7 +48,7 @@ class Background(Generic[_T]):
             self._begun = time.monotonic()
         future = self._pool.submit(self._run, call)
         self._calls.append(future)
-        future.add_done_callback(lambda _: os.eventfd_write(self._event, 1))
+        future.add_done_callback(lambda _: self._wake.wake())
 
     def _run(self, call: Callable[[], _T]) -> _T:
         self._begun = time.monotonic()
@@ -72,20 +73,13 @@ class Background(Generic[_T]):
 
     def drain(self) -> None:
         """Forget what woke the poll; to be called before `ended` is asked."""
-        with suppress(BlockingIOError):
-            os.eventfd_read(self._event)
+        self._wake.drain()
 
     def ends_within(self, seconds: float) -> bool:
         """Wait for the first call, if any; False where it takes longer."""
         return not self._calls or not wait([self._calls[0]], seconds).not_done
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def close(self) -> None:
         """Wait for what was started, if anything, and end the thread."""
         self._pool.shutdown()
-        os.close(self._event)
+        self._wake.close()

@@ -3,9 +3,10 @@
 import ctypes
 import os
 import signal
-import socket
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Self
+
+from denseface.service.runtime.wake_pipe import WakePipe
 
 __all__ = ["PARENT_VARIABLE", "StopSignal", "die_with_parent"]
 
@@ -27,27 +28,21 @@ class StopSignal:
     def __init__(self, *also: signal.Signals) -> None:
         self.received: signal.Signals | None = None
         self._also = also
-        self._wake, self._written = socket.socketpair()
-        self._wake.setblocking(False)
-        self._written.setblocking(False)
+        self._wake = WakePipe()
         self._before: list[tuple[signal.Signals, object]] = []
         self._fd_before = -1
 
     def __enter__(self) -> Self:
-        self._fd_before = signal.set_wakeup_fd(self._written.fileno(), warn_on_full_buffer=False)
+        self._fd_before = signal.set_wakeup_fd(self._wake.writer, warn_on_full_buffer=False)
         for number in (*_STOPPING, *self._also):
             self._before.append((number, signal.signal(number, self._note)))
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         for number, handler in self._before:
             signal.signal(number, handler)  # type: ignore[arg-type]
         signal.set_wakeup_fd(self._fd_before)
         self._wake.close()
-        self._written.close()
 
     def __bool__(self) -> bool:
         return self.received is not None
@@ -58,11 +53,7 @@ class StopSignal:
 
     def drain(self) -> None:
         """Forget what woke the poll."""
-        try:
-            while self._wake.recv(4096):
-                pass
-        except BlockingIOError:
-            pass
+        self._wake.drain()
 
     @property
     def exit_status(self) -> int:

@@ -10,7 +10,6 @@ from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from sqlite3 import Connection
-from typing import Self
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import (
@@ -22,6 +21,7 @@ from denseface.service.errors import (
 from denseface.service.protocol.messages import CaptureFailed, DeadLetter, FaceDone, Frame, Result
 from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet
+from denseface.service.runtime.closing import Closing
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.files import private_folder
 from denseface.service.storage.base import CaptureRow
@@ -49,7 +49,7 @@ _SHOWN = 300
 """Characters of an error that a list shows."""
 
 
-class FolderStore:
+class FolderStore(Closing):
     """A `Store` in a folder, mended where it is damaged.
 
     Parameters
@@ -97,10 +97,8 @@ class FolderStore:
         """Name of this store, as long as it lives."""
         return self._epoch
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
+        """Save the store's clock, close the database and release the lock."""
         with suppress(StoreError, DamagedDatabaseError):
             self._database.set_meta("clock", self._account.save())
         self._database.close()

@@ -4,18 +4,19 @@ What a `Writer` gives back is a file that is safe with its name, or why it is no
 makes it count is the hub's to write, in its own thread, and so is all that is said of it.
 """
 
-import os
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Protocol, Self
+from typing import Protocol
 
 from denseface.service.errors import StoreError
+from denseface.service.runtime.closing import Closing
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.files import sync_folder
+from denseface.service.runtime.wake_pipe import WakePipe
 from denseface.service.storage.record_file import store_error
 from denseface.service.storage.records import FrameAbout, PendingWrite
 
@@ -101,7 +102,7 @@ class InlineWriter:
         """Do nothing: it has ended."""
 
 
-class WriterThreads:
+class WriterThreads(Closing):
     """Writes frames in one thread and faces in another.
 
     A presser waits for a frame, so none waits for a face. What has ended makes `fileno` readable
@@ -109,7 +110,8 @@ class WriterThreads:
     """
 
     def __init__(self) -> None:
-        self._event = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
+        self._wake = WakePipe()
+        self._closed = False
         self._changed = threading.Condition()
         self._begun = 0
         self._done: list[WriteResult] = []
@@ -118,7 +120,7 @@ class WriterThreads:
 
     def fileno(self) -> int:
         """Give the descriptor that is readable where something has ended."""
-        return self._event
+        return self._wake.fileno()
 
     def any_ended(self) -> bool:
         """Whether `take` would give anything; `fileno` is readable as long as it would."""
@@ -135,8 +137,8 @@ class WriterThreads:
         """Give what has ended since the last call."""
         with self._changed:
             done, self._done = self._done, []
-            if done and self._event >= 0:
-                os.eventfd_read(self._event)
+            if done and not self._closed:
+                self._wake.drain()
         return done
 
     def settle(self) -> None:
@@ -148,18 +150,15 @@ class WriterThreads:
         with self._changed:
             self._begun -= len(written)
             self._done += written
-            os.eventfd_write(self._event, 1)
+            self._wake.wake()
             self._changed.notify_all()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         """Write what was begun and end both threads; `take` still gives it."""
         for lane in (self._frames, self._faces):
             lane.close()
-        os.close(self._event)
-        self._event = -1
+        self._wake.close()
+        self._closed = True
 
 
 class _Lane:
