@@ -13,7 +13,7 @@ from denseface.recon.numerics.malloc import keep_freed_memory
 from denseface.recon.settings import Settings
 from denseface.service.errors import LocalProtocolError, RemoteProtocolError
 from denseface.service.hub.hub import Hub
-from denseface.service.hub.previews import PERIOD_S
+from denseface.service.hub.previews import PREVIEW_PERIOD_S
 from denseface.service.monitoring.observer import Observer
 from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol import messages
@@ -96,10 +96,10 @@ class _Loop:
         due = time.monotonic()
         while not stop:
             if (now := time.monotonic()) >= due:
-                self._hub.was_away(now - due)
+                self._hub.loop_stalled(now - due)
                 subscriptions = self._listeners.subscriptions()
                 watched = subscriptions[Topic.PREVIEW] > 0
-                due = now + (PERIOD_S if watched else _TICK_S)
+                due = now + (PREVIEW_PERIOD_S if watched else _TICK_S)
                 if self._listeners.tick():
                     self._drop_revoked()
                 self._hub.show(wanted=watched)
@@ -112,7 +112,7 @@ class _Loop:
                 self._give_out(self._hub.written(time.monotonic()))
             stop.drain()
         # What is being written is kept and said; the sockets linger for it.
-        self._give_out(self._hub.written(time.monotonic(), all_of_it=True))
+        self._give_out(self._hub.written(time.monotonic(), wait=True))
 
     def _drop_revoked(self) -> None:
         for peer in self._hub.peers():

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Sequence
 from hashlib import sha256
 from importlib.metadata import version
+from typing import Literal
 
 import structlog
 
@@ -22,7 +23,7 @@ from denseface.service.errors import (
 from denseface.service.hub.jobs import Jobs
 from denseface.service.hub.maintenance import Maintenance
 from denseface.service.hub.outcomes import Outcomes
-from denseface.service.hub.peers import MOST_PEERS, Peers, Sensor, Worker
+from denseface.service.hub.peers import MAX_PEERS, Peers
 from denseface.service.hub.presses import Presses
 from denseface.service.hub.previews import Previews
 from denseface.service.monitoring.figures import Figures
@@ -71,15 +72,15 @@ class Hub:
         self._figures = figures or Figures()
         self._rejections = rejections or Rejections(self._figures.counters)
         self._settings = settings
-        self._roster = Peers()
-        self._outcomes = Outcomes(store, self._remake)
-        self._jobs = Jobs(store, writer, self._roster, settings.attempts,
-                          self._outcomes.concluded, self._rejections)
-        self._intake = Presses(store, writer, self._roster, settings, recon, settings_hash(recon),
+        self._peers = Peers()
+        self._outcomes = Outcomes(store, self._requeue_damaged)
+        self._jobs = Jobs(store, writer, self._peers, settings.attempts,
+                          self._outcomes.publish, self._rejections)
+        self._presses = Presses(store, writer, self._peers, settings, recon, settings_hash(recon),
                               self._jobs.add, opened + settings.silence_s)
-        self._keeper = Maintenance(
-            store, settings, self._intake, self._jobs, self._outcomes, self._figures.counters)
-        self._viewfinder = Previews(self._roster, settings.heartbeat_s)
+        self._maintenance = Maintenance(
+            store, settings, self._presses, self._jobs, self._outcomes, self._figures.counters)
+        self._previews = Previews(self._peers, settings.heartbeat_s)
         self._status_due = 0.0
         self._log = structlog.get_logger("hub")
 
@@ -102,7 +103,7 @@ class Hub:
         outputs: list[Output] = []
         try:
             outputs.extend(self._receive(now, peer, packet, key))
-            outputs.extend(self._go_on(now))
+            outputs.extend(self._process_writes(now))
         except DamagedDatabaseError:
             raise
         except ServiceError as error:
@@ -113,7 +114,7 @@ class Hub:
                     request=request, message=str(error))))
         return outputs
 
-    def written(self, now: float, *, all_of_it: bool = False) -> list[Output]:
+    def written(self, now: float, *, wait: bool = False) -> list[Output]:
         """Say what comes of the files that were written; raises as `receive`.
 
         Parameters
@@ -122,14 +123,14 @@ class Hub:
         """
         outputs: list[Output] = []
         try:
-            outputs.extend(self._settle(now) if all_of_it else self._go_on(now))
+            outputs.extend(self._settle(now) if wait else self._process_writes(now))
         except DamagedDatabaseError:
             raise
         except ServiceError as error:
             self._log.error("not kept", reason=str(error))
         return outputs
 
-    def _go_on(self, now: float) -> Iterator[Output]:
+    def _process_writes(self, now: float) -> Iterator[Output]:
         """Do what has become possible."""
         written = self._writer.take()
         while True:
@@ -140,7 +141,7 @@ class Hub:
                 return
 
     def _written(self, now: float, written: Sequence[WriteResult]) -> Iterator[Output]:
-        yield from self._intake.written(
+        yield from self._presses.written(
             [one for one in written if isinstance(one.draft.about, FrameAbout)])
         yield from self._jobs.written(
             now, [one for one in written if isinstance(one.draft.about, FaceAbout)])
@@ -156,13 +157,13 @@ class Hub:
         """
         outputs: list[Output] = []
         try:
-            outputs.extend(self._intake.tick(now))
+            outputs.extend(self._presses.tick(now))
             outputs.extend(self._outcomes.tick(now))
-            for peer in self._roster.silent(now - self._settings.silence_s):
-                outputs.extend(self._gone(peer, "silent"))
-            outputs.extend(self._go_on(now))
-            self._keeper.tick(now)
-            outputs.extend(self._viewfinder.ask(now, busy=len(self._intake) > 0))
+            for peer in self._peers.silent(now - self._settings.silence_s):
+                outputs.extend(self._disconnected(peer, "silent"))
+            outputs.extend(self._process_writes(now))
+            self._maintenance.tick(now)
+            outputs.extend(self._previews.ask(now, busy=len(self._presses) > 0))
             if now >= self._status_due:
                 self._status_due = now + self._settings.heartbeat_s
                 outputs.append(Publish(Topic.STATUS, Packet(self._status())))
@@ -172,19 +173,19 @@ class Hub:
             self._log.error("tick failed", reason=str(error))
         return outputs
 
-    def was_away(self, seconds: float) -> None:
+    def loop_stalled(self, seconds: float) -> None:
         """Take note of how late a tick is: the hub was stopped, or waited for its disk.
 
         What was said meanwhile has not been heard yet.
         """
         if seconds < self._settings.heartbeat_s:  # no more than liveness allows for
             return
-        self._log.warning("was away", seconds=round(seconds, 1))
-        self._roster.forgive(seconds)
+        self._log.warning("event loop was stalled", seconds=round(seconds, 1))
+        self._peers.postpone_timeouts(seconds)
 
     def unreachable(self, peer: bytes, reason: str = "unreachable") -> list[Output]:
         """Take note that a message to a peer could not be delivered, nor could the next."""
-        return list(self._gone(peer, reason))
+        return list(self._disconnected(peer, reason))
 
     def pressed_by(self, capture_id: str) -> str | None:
         """Give the fingerprint of the key that pressed a capture; None where there is none."""
@@ -197,18 +198,18 @@ class Hub:
 
     def show(self, *, wanted: bool) -> None:
         """Take note of whether somebody looks at the previews; they are asked for at each tick."""
-        self._viewfinder.wanted = wanted
+        self._previews.wanted = wanted
 
     def peers(self) -> list[bytes]:
         """Give the sensors and workers that are known."""
-        return [*self._roster.sensors, *self._roster.workers]
+        return [*self._peers.sensors, *self._peers.workers]
 
     def _receive(
         self, now: float, peer: bytes, packet: Packet, key: str
     ) -> Iterator[Output]:
         match packet.message:
             case messages.Press() as message:
-                yield from self._intake.press(now, peer, message, self._jobs.queued, key)
+                yield from self._presses.press(now, peer, message, self._jobs.queued, key)
             case messages.GetFace() as message:
                 yield from self._outcomes.get_face(now, peer, message)
             case messages.GetNext() as message:
@@ -216,72 +217,72 @@ class Hub:
             case messages.FindStart() as message:
                 yield from self._outcomes.find_start(peer, message)
             case messages.ListDead() | messages.RetryDead() | messages.DropDead() as message:
-                yield from self._keeper.receive(peer, message)
+                yield from self._maintenance.receive(peer, message)
             case messages.Purge() as message:
                 yield from self._settle(now)  # so that nothing of it appears afterwards
-                yield from self._keeper.receive(peer, message)
+                yield from self._maintenance.receive(peer, message)
             case messages.GetStatus(request=request):
                 yield send(peer, self._status(request))
             case messages.SensorReady(name=name, source=source):
-                if self._has_room(Sensor, peer, name) and self._roster.sensor_ready(
+                if self._has_room("sensor", peer, name) and self._peers.sensor_ready(
                         peer, name, now):
                     self._log.info("sensor ready", name=name, source=source)
             case messages.WorkerReady(name=name, credit=credit):
-                if self._has_room(Worker, peer, name):
+                if self._has_room("worker", peer, name):
                     self._worker_ready(now, peer, name, credit)
             case messages.Heartbeat(holding=holding):
-                if not self._roster.heartbeat(peer, holding, now):
+                if not self._peers.heartbeat(peer, holding, now):
                     yield send(peer, messages.Announce())
             case messages.Goodbye():
-                if worker := self._roster.workers.get(peer):
-                    self._jobs.handed_back(worker)
-                yield from self._gone(peer, "goodbye")
+                if worker := self._peers.workers.get(peer):
+                    self._jobs.worker_stopped(worker)
+                yield from self._disconnected(peer, "goodbye")
             case messages.Frame() as message:
-                yield from self._intake.frame(peer, message, packet)
+                yield from self._presses.frame(peer, message, packet)
             case messages.PreviewFrame() as message:
-                yield from self._viewfinder.receive(peer, message, packet)
+                yield from self._previews.receive(peer, message, packet)
             case messages.FrameFailed() as message:
-                yield from self._intake.no_frame(message)
+                yield from self._presses.frame_failed(message)
             case messages.Result() as message:
                 self._jobs.result(peer, message, packet)
             case messages.JobFailed() as message:
                 yield from self._jobs.failed(peer, message)
 
-    def _remake(self, error: DamagedFaceError, kept_before: bool) -> None:
+    def _requeue_damaged(self, error: DamagedFaceError, kept_before: bool) -> None:
         # One that is damaged as soon as it is written has used up an attempt.
-        self._jobs.remake(error.capture_id, str(error), attempts_left=kept_before)
+        self._jobs.requeue_damaged(error.capture_id, str(error), attempts_left=kept_before)
 
-    def _has_room(self, kind: type[Sensor | Worker], peer: bytes, name: str) -> bool:
-        room = self._roster.has_room(kind, peer)
+    def _has_room(self, kind: Literal["sensor", "worker"], peer: bytes, name: str) -> bool:
+        room = self._peers.has_room(kind, peer)
         if not room:
-            self._log.error("too many", kind=kind.__name__.lower(), name=name, most=MOST_PEERS)
+            self._log.error("too many", kind=kind, name=name, most=MAX_PEERS)
         return room
 
     def _worker_ready(self, now: float, peer: bytes, name: str, credit: int) -> None:
-        known = self._roster.workers.get(peer)
+        known = self._peers.workers.get(peer)
         if known is None:
             self._log.info("worker ready", name=name)
         elif credit <= known.credit:
             self._rejections.note("replayed", name=name, detail=f"credit {credit}")
-        self._roster.worker_ready(peer, name, credit, now)
+        self._peers.worker_ready(peer, name, credit, now)
 
-    def _gone(self, peer: bytes, reason: str) -> Iterator[Output]:
+    def _disconnected(self, peer: bytes, reason: str) -> Iterator[Output]:
         say = self._log.info if reason == "goodbye" else self._log.warning
-        if sensor := self._roster.sensors.pop(peer, None):
+        if sensor := self._peers.sensors.pop(peer, None):
             say("sensor gone", name=sensor.name, reason=reason)
-            yield from self._intake.sensor_gone(peer, reason)
-        if worker := self._roster.workers.pop(peer, None):
+            yield from self._presses.sensor_gone(peer, reason)
+        if worker := self._peers.workers.pop(peer, None):
             say("worker gone", name=worker.name, reason=reason)
-            self._jobs.lost(worker)
+            self._jobs.worker_lost(worker)
 
     def _status(self, request: int = 0) -> messages.Status:
         counts, counters = self._store.counts(), self._figures.counters
         return messages.Status(
             request=request, epoch=self._store.epoch, sequence=self._store.last_sequence(),
             hub_version=_VERSION,
-            sensors=tuple(sensor.name for sensor in self._roster.sensors.values()),
-            workers=tuple(worker.name for worker in self._roster.workers.values()),
-            pressed=len(self._intake), queued=self._jobs.queued, working=self._jobs.working,
+            sensors=tuple(sensor.name for sensor in self._peers.sensors.values()),
+            workers=tuple(worker.name for worker in self._peers.workers.values()),
+            pressed=len(self._presses), queued=self._jobs.queued, working=self._jobs.working,
             done=counts.get(CaptureState.DONE, 0), failed=counts.get(CaptureState.FAILED, 0),
             dead=counts.get(CaptureState.DEAD, 0),
             refused=self._rejections.counts(),

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import CorruptFileError, ProtocolError, ServiceError, StoreError
-from denseface.service.hub.peers import Peers, Worker
+from denseface.service.hub.peers import Peers, WorkerPeer
 from denseface.service.hub.unsaved_faces import UnsavedFaces
 from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol import messages
@@ -23,7 +23,7 @@ from denseface.service.storage.writer import Writer, WriteResult
 __all__ = ["Jobs"]
 
 _LOST = ("WorkerLost", "the worker that held it went away")
-_PAUSE_S = 1.0
+_RETRY_S = 1.0
 """Time until what the disk refused is tried again, seconds."""
 
 
@@ -31,18 +31,18 @@ class Jobs:
     """Frames that wait for a worker or are held by one."""
 
     def __init__(
-        self, store: Store, writer: Writer, roster: Peers, attempts: int,
-        concluded: Callable[[str], Iterator[Output]], rejections: Rejections,
+        self, store: Store, writer: Writer, peers: Peers, attempts: int,
+        publish: Callable[[str], Iterator[Output]], rejections: Rejections,
     ) -> None:
-        """Take up what the store has unfinished; `concluded` announces an outcome."""
+        """Take up what the store has unfinished; `publish` announces an outcome."""
         self._store = store
-        self._roster = roster
+        self._peers = peers
         self._attempts = attempts
-        self._concluded = concluded
+        self._publish = publish
         self._rejections = rejections
         self._queue = deque(store.unfinished())
-        self._reasons: dict[str, tuple[str, str]] = {}
-        self._faces = UnsavedFaces(store, writer)
+        self._last_errors: dict[str, tuple[str, str]] = {}
+        self._unsaved_faces = UnsavedFaces(store, writer)
         self._paused_until = 0.0
         self._log = structlog.get_logger("hub")
         if self._queue:
@@ -56,7 +56,7 @@ class Jobs:
     @property
     def working(self) -> int:
         """Frames held by a worker."""
-        return sum(len(worker.jobs) for worker in self._roster.workers.values())
+        return sum(len(worker.jobs) for worker in self._peers.workers.values())
 
     def add(self, capture_id: str) -> None:
         """Queue a frame that was just kept."""
@@ -67,15 +67,15 @@ class Jobs:
         """Drop captures that were removed, from workers' hands too."""
         self._queue = deque(one for one in self._queue if one not in capture_ids)
         for capture_id in capture_ids:
-            self._reasons.pop(capture_id, None)
-            self._faces.drop(capture_id)
-        for worker in self._roster.workers.values():
+            self._last_errors.pop(capture_id, None)
+            self._unsaved_faces.drop(capture_id)
+        for worker in self._peers.workers.values():
             worker.jobs = [one for one in worker.jobs if one not in capture_ids]
 
-    def remake(self, capture_id: str, reason: str, *, attempts_left: bool = True) -> None:
+    def requeue_damaged(self, capture_id: str, reason: str, *, attempts_left: bool = True) -> None:
         """Take up a capture again whose face turned out to be damaged."""
         self._store.reopen(capture_id, attempts_left=attempts_left)
-        self._reasons[capture_id] = "CorruptFileError", reason
+        self._last_errors[capture_id] = "CorruptFileError", reason
         self.add(capture_id)
         self._log.warning("face to be made again", capture_id=capture_id, reason=reason)
 
@@ -87,64 +87,65 @@ class Jobs:
         if now < self._paused_until:
             return
         try:
-            if self._faces.caught_up():
+            if self._unsaved_faces.retry_refused():
                 yield from self._dispatch(now)
         except StoreError as error:
             self._pause(now, str(error))
 
     def _pause(self, now: float, reason: str) -> None:
-        self._paused_until = now + _PAUSE_S
-        self._log.error("the disk refuses, work waits", reason=reason, unkept=len(self._faces))
+        self._paused_until = now + _RETRY_S
+        self._log.error(
+            "the disk refuses, work waits", reason=reason, unsaved=len(self._unsaved_faces))
 
     def _dispatch(self, now: float) -> Iterator[Output]:
         while self._queue:
             capture_id = self._queue[0]
             stored = self._store.find(capture_id)
             if (stored is None or stored.state is not CaptureState.ACCEPTED
-                    or capture_id in self._faces):
+                    or capture_id in self._unsaved_faces):
                 self._queue.popleft()
             elif stored.attempts >= self._attempts:
-                yield from self._give_up(capture_id, *self._reasons.get(capture_id, _LOST))
+                yield from self._give_up(capture_id, *self._last_errors.get(capture_id, _LOST))
             # What may have ended a worker is tried alone: no other frame is lost or blamed with it.
-            elif worker := self._roster.free_worker(alone=stored.attempts > 0):
-                yield from self._give(now, capture_id, stored, worker)
+            elif worker := self._peers.free_worker(alone=stored.attempts > 0):
+                yield from self._send_job(now, capture_id, stored, worker)
             else:
                 return
 
     def result(self, peer: bytes, message: messages.Result, packet: Packet) -> None:
         """Begin to keep a face, unless this capture has one; `written` says what comes of it."""
         failpoint("hub.result.received")
-        if self._expected(peer, message, CaptureEvent.RESULT):
+        if self._take_answer(peer, message, CaptureEvent.RESULT):
             try:
                 message.face.check(packet.arrays)
-                self._faces.keep(packet)
+                self._unsaved_faces.keep(packet)
             except (ProtocolError, StoreError) as error:
                 self._retry(message.capture_id, type(error).__name__, str(error))
 
     def written(self, now: float, faces: Sequence[WriteResult]) -> Iterator[Output]:
         """Announce faces that are safe, in order; those that the disk refused wait."""
-        for capture_id, error in self._faces.written(faces):
+        for capture_id, error in self._unsaved_faces.written(faces):
             if error is None:
                 self._log.info("done", capture_id=capture_id)
                 yield from self._announce(capture_id)
                 continue
             if isinstance(error, StoreError):
                 self._pause(now, str(error))
-            if capture_id not in self._faces:
+            if capture_id not in self._unsaved_faces:
                 self._retry(capture_id, type(error).__name__, str(error))
             if not isinstance(error, ServiceError):
                 raise error
 
     def _announce(self, capture_id: str) -> Iterator[Output]:
         try:
-            yield from self._concluded(capture_id)
+            yield from self._publish(capture_id)
         except StoreError as error:  # subscribers will see the gap and ask for it
             self._log.error("not announced", capture_id=capture_id, reason=str(error))
 
     def failed(self, peer: bytes, message: messages.JobFailed) -> Iterator[Output]:
         """Announce "no face", or try again."""
         event = CaptureEvent.REJECTED if message.final else CaptureEvent.LOST
-        if not self._expected(peer, message, event):
+        if not self._take_answer(peer, message, event):
             return
         capture_id = message.capture_id
         if not message.final:
@@ -156,9 +157,9 @@ class Jobs:
             self._retry(capture_id, type(error).__name__, str(error))
         else:
             self._log.info("failed", capture_id=capture_id, error=message.error)
-            yield from self._concluded(capture_id)
+            yield from self._publish(capture_id)
 
-    def lost(self, worker: Worker) -> None:
+    def worker_lost(self, worker: WorkerPeer) -> None:
         """Take back what a worker held that went away.
 
         It was working on the first: the others were not begun.
@@ -167,11 +168,11 @@ class Jobs:
         while worker.jobs:
             self._retry(worker.jobs.pop(), *_LOST)
 
-    def handed_back(self, worker: Worker) -> None:
+    def worker_stopped(self, worker: WorkerPeer) -> None:
         """Take back what a worker held that was told to stop."""
         self._hand_back(worker, list(worker.jobs))
 
-    def _hand_back(self, worker: Worker, capture_ids: Sequence[str]) -> None:
+    def _hand_back(self, worker: WorkerPeer, capture_ids: Sequence[str]) -> None:
         """Put jobs back in the queue; as an attempt it does not count."""
         for capture_id in reversed(capture_ids):
             worker.jobs.remove(capture_id)
@@ -181,8 +182,8 @@ class Jobs:
                 self._log.warning("attempt not taken back", reason=str(error))
             self._retry(capture_id, "HandedBack", "the worker that held it was stopped")
 
-    def _give(
-        self, now: float, capture_id: str, stored: CaptureRow, worker: Worker
+    def _send_job(
+        self, now: float, capture_id: str, stored: CaptureRow, worker: WorkerPeer
     ) -> Iterator[Output]:
         try:
             kept = self._store.frame(capture_id)
@@ -205,9 +206,9 @@ class Jobs:
     def _give_up(self, capture_id: str, error: str, reason: str) -> Iterator[Output]:
         self._store.fail(capture_id, error, reason, dead=True)
         self._queue.popleft()
-        self._reasons.pop(capture_id, None)
+        self._last_errors.pop(capture_id, None)
         self._log.error("dead letter", capture_id=capture_id, error=error, reason=reason)
-        yield from self._concluded(capture_id)
+        yield from self._publish(capture_id)
 
     def _retry(self, capture_id: str, error: str, reason: str) -> None:
         """Put a capture back in the queue that waits for a face.
@@ -220,16 +221,16 @@ class Jobs:
         if capture_id not in self._queue:
             self._log.warning(
                 "to be tried again", capture_id=capture_id, error=error, reason=reason)
-            self._reasons[capture_id] = error, reason
+            self._last_errors[capture_id] = error, reason
             self._queue.appendleft(capture_id)
 
-    def _expected(
+    def _take_answer(
         self, peer: bytes, answer: messages.Result | messages.JobFailed, event: CaptureEvent
     ) -> bool:
         """Say whether an answer is of use; whoever held the job holds it no more."""
         capture_id = answer.capture_id
-        useful = self._of_use(answer, event)
-        worker = self._roster.workers.get(peer)
+        useful = self._is_expected(answer, event)
+        worker = self._peers.workers.get(peer)
         if worker and capture_id in worker.jobs:
             at = worker.jobs.index(capture_id)
             # Jobs are answered in order: the answers to those before it were lost.
@@ -243,7 +244,7 @@ class Jobs:
                 "replayed", capture_id=capture_id, detail=f"{event}, not asked for")
         return useful
 
-    def _of_use(
+    def _is_expected(
         self, answer: messages.Result | messages.JobFailed, event: CaptureEvent
     ) -> bool:
         stored = self._store.find(answer.capture_id)
@@ -256,12 +257,12 @@ class Jobs:
         if stored is None:
             return None
         if stored.state is CaptureState.ACCEPTED:
-            if capture_id in self._faces:
+            if capture_id in self._unsaved_faces:
                 return CaptureState.CONCLUDING
             if self._holder(capture_id):
                 return CaptureState.WORKING
         return stored.state
 
-    def _holder(self, capture_id: str) -> Worker | None:
-        return next((worker for worker in self._roster.workers.values()
+    def _holder(self, capture_id: str) -> WorkerPeer | None:
+        return next((worker for worker in self._peers.workers.values()
                      if capture_id in worker.jobs), None)

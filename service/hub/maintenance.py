@@ -1,4 +1,4 @@
-"""The hub's keeper: what is kept for how long, and what an operator does about it."""
+"""What is kept for how long, and what an operator does about it."""
 
 from collections.abc import Iterator, Sequence
 
@@ -18,7 +18,7 @@ from denseface.service.storage.base import Store
 __all__ = ["Maintenance"]
 
 _BATCH = 20
-"""Captures removed at once: the hub must not be away from its peers for long."""
+"""Captures removed at once: more would keep the hub from its peers for too long."""
 _PAGE = 50
 _SWEEP_S = 600.0
 """Longest time between two looks for what is too old, seconds."""
@@ -30,13 +30,13 @@ class Maintenance:
     """Retention, dead letters, purges."""
 
     def __init__(
-        self, store: Store, settings: ServiceSettings, intake: Presses, jobs: Jobs,
+        self, store: Store, settings: ServiceSettings, presses: Presses, jobs: Jobs,
         outcomes: Outcomes, counters: Counters,
     ) -> None:
         self._store = store
         self._retention_s = settings.retention
         self._sweep_s = min(_SWEEP_S, (settings.retention or _SWEEP_S) / 10)
-        self._intake = intake
+        self._presses = presses
         self._jobs = jobs
         self._outcomes = outcomes
         self._counters = counters
@@ -110,7 +110,7 @@ class Maintenance:
         else:
             going = self._store.accepted_before(message.before, _BATCH)
         if message.before is None:
-            yield from self._intake.purge(message.capture_id)
+            yield from self._presses.purge(message.capture_id)
         yield from self._remove(going)
         left = len(going) == _BATCH
         if message.everything and not left:

@@ -13,7 +13,7 @@ from denseface.service.storage.base import Store
 __all__ = ["Outcomes"]
 
 _MAX_WAITERS = 1000
-_MAX_WAITERS_OF_ONE = 100
+_MAX_WAITERS_PER_CLIENT = 100
 """So that nobody takes all the places."""
 
 
@@ -26,28 +26,34 @@ class _Waiter:
 class Outcomes:
     """What ended, and who waits for what has not."""
 
-    def __init__(self, store: Store, remake: Callable[[DamagedFaceError, bool], None]) -> None:
-        """Publish and give; `remake` takes up a damaged face, True where it was kept before."""
+    def __init__(
+        self, store: Store, requeue_damaged: Callable[[DamagedFaceError, bool], None]
+    ) -> None:
+        """Publish and give; `requeue_damaged` has a damaged face made again.
+
+        It is told True where the face was kept before, False where it is damaged as soon as it was
+        written.
+        """
         self._store = store
-        self._remake = remake
+        self._requeue_damaged = requeue_damaged
         self._waiters: dict[tuple[bytes, int], _Waiter] = {}
         """By client and request."""
 
-    def concluded(self, capture_id: str) -> Iterator[Output]:
+    def publish(self, capture_id: str) -> Iterator[Output]:
         """Publish the outcome of a capture and answer those who wait for it."""
         try:
             packet = self._store.outcome(capture_id)
         except DamagedFaceError as error:
-            self._remake(error, False)
+            self._requeue_damaged(error, False)
             return
         if packet:
             yield Publish(Topic.FACES, packet)
             for peer, request, _ in self._take_waiters([capture_id]):
                 yield _answer(peer, request, packet)
 
-    def _has_place(self, peer: bytes) -> bool:
+    def _may_wait(self, peer: bytes) -> bool:
         own = sum(one == peer for one, _ in self._waiters)
-        return len(self._waiters) < _MAX_WAITERS and own < _MAX_WAITERS_OF_ONE
+        return len(self._waiters) < _MAX_WAITERS and own < _MAX_WAITERS_PER_CLIENT
 
     def removed(self, capture_ids: Collection[str]) -> Iterator[Output]:
         """Answer those who wait for captures that are gone."""
@@ -67,7 +73,7 @@ class Outcomes:
         try:
             packet = self._store.outcome(capture_id)
         except DamagedFaceError as error:
-            self._remake(error, True)
+            self._requeue_damaged(error, True)
             packet = None
         if packet:
             yield _answer(peer, request, packet)
@@ -75,7 +81,7 @@ class Outcomes:
             yield send(peer, messages.CaptureUnknown(request=request, capture_id=capture_id))
         elif (peer, request) in self._waiters:
             return  # a repeat: its wait does not begin anew
-        elif message.wait_s > 0 and self._has_place(peer):
+        elif message.wait_s > 0 and self._may_wait(peer):
             self._waiters[peer, request] = _Waiter(capture_id, now + message.wait_s)
         else:
             yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
@@ -94,7 +100,7 @@ class Outcomes:
             try:
                 return self._store.outcome_after(after)
             except DamagedFaceError as error:
-                self._remake(error, True)
+                self._requeue_damaged(error, True)
 
     def find_start(self, peer: bytes, message: messages.FindStart) -> Iterator[Output]:
         """Give the number after which the outcomes come that are asked for."""

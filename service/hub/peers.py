@@ -2,15 +2,16 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from typing import Literal
 
-__all__ = ["MOST_PEERS", "Peers", "Sensor", "Worker"]
+__all__ = ["MAX_PEERS", "Peers", "SensorPeer", "WorkerPeer"]
 
-MOST_PEERS = 256
+MAX_PEERS = 256
 """Of sensors, and of workers: whoever comes later is not taken, so that all fit into a status."""
 
 
 @dataclass
-class Sensor:
+class SensorPeer:
     """A capture process with its source open."""
 
     peer: bytes
@@ -20,7 +21,7 @@ class Sensor:
 
 
 @dataclass
-class Worker:
+class WorkerPeer:
     """A reconstruction process."""
 
     peer: bytes
@@ -41,23 +42,23 @@ class Worker:
 class Peers:
     """Peers by their connection."""
 
-    sensors: dict[bytes, Sensor] = field(default_factory=dict)
-    workers: dict[bytes, Worker] = field(default_factory=dict)
+    sensors: dict[bytes, SensorPeer] = field(default_factory=dict)
+    workers: dict[bytes, WorkerPeer] = field(default_factory=dict)
 
-    def has_room(self, kind: type[Sensor | Worker], peer: bytes) -> bool:
+    def has_room(self, kind: Literal["sensor", "worker"], peer: bytes) -> bool:
         """Say whether a peer is known as such, or can be."""
-        known: Collection[bytes] = self.sensors if kind is Sensor else self.workers
-        return peer in known or len(known) < MOST_PEERS
+        known: Collection[bytes] = self.sensors if kind == "sensor" else self.workers
+        return peer in known or len(known) < MAX_PEERS
 
     def sensor_ready(self, peer: bytes, name: str, now: float) -> bool:
         """Note a sensor; True where it is new."""
         new = peer not in self.sensors
-        self.sensors[peer] = Sensor(peer, name, now)
+        self.sensors[peer] = SensorPeer(peer, name, now)
         return new
 
-    def worker_ready(self, peer: bytes, name: str, credit: int, now: float) -> Worker:
+    def worker_ready(self, peer: bytes, name: str, credit: int, now: float) -> WorkerPeer:
         """Note that a worker is free, unless its credit was spent before."""
-        worker = self.workers.setdefault(peer, Worker(peer, name, now))
+        worker = self.workers.setdefault(peer, WorkerPeer(peer, name, now))
         if credit > worker.credit:
             worker.credit, worker.free, worker.seen = credit, True, now
         return worker
@@ -79,24 +80,24 @@ class Peers:
             return False
         return True
 
-    def forgive(self, seconds: float) -> None:
+    def postpone_timeouts(self, seconds: float) -> None:
         """Hold no silence against anyone that the hub could not have heard."""
-        for one in self._everyone():
+        for one in self._all():
             one.seen += seconds
 
-    def free_worker(self, *, alone: bool) -> Worker | None:
+    def free_worker(self, *, alone: bool) -> WorkerPeer | None:
         """Give the free worker with the fewest jobs, none where it is to be `alone` with one."""
         free = [worker for worker in self.workers.values() if worker.free and (
             not worker.jobs or not (alone or worker.alone))]
         return min(free, key=lambda worker: len(worker.jobs), default=None)
 
-    def sensor(self) -> Sensor | None:
+    def sensor(self) -> SensorPeer | None:
         """Give the sensor that has been known longest."""
         return next(iter(self.sensors.values()), None)
 
     def silent(self, before: float) -> list[bytes]:
         """Give the peers that were last heard before a time."""
-        return [one.peer for one in self._everyone() if one.seen < before]
+        return [one.peer for one in self._all() if one.seen < before]
 
-    def _everyone(self) -> list[Sensor | Worker]:
+    def _all(self) -> list[SensorPeer | WorkerPeer]:
         return [*self.sensors.values(), *self.workers.values()]

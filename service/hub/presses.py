@@ -21,8 +21,8 @@ from denseface.service.storage.writer import Writer, WriteResult
 __all__ = ["Presses"]
 
 _MIB = 2**20
-_REFUSALS = 1000
-_MOST_KEEPING = 32
+_MAX_REFUSALS = 1000
+_MAX_SAVING = 32
 """Frames that may wait for the disk, which are in memory meanwhile; beyond it a press is refused.
 """
 
@@ -37,7 +37,7 @@ class _Press:
     """Fingerprint of the first presser's key; empty where it needed none."""
     pressers: dict[bytes, int] = field(default_factory=dict)
     """The last request of each client that pressed this id."""
-    giver: bytes | None = None
+    frame_sender: bytes | None = None
     """The sensor whose frame is being written; None where none came."""
 
 
@@ -45,24 +45,24 @@ class Presses:
     """Presses that wait for their frame, or for their frame to be safe."""
 
     def __init__(
-        self, store: Store, writer: Writer, roster: Peers, settings: ServiceSettings,
-        recon: Settings, recon_hash: str, accepted: Callable[[str], None], all_here: float,
+        self, store: Store, writer: Writer, peers: Peers, settings: ServiceSettings,
+        recon: Settings, recon_hash: str, accepted: Callable[[str], None], sensors_due: float,
     ) -> None:
         """Take presses; `accepted` is told of each frame that is safe.
 
-        Until the time `all_here`, sensors may not have had time to say that they are there.
+        Until the time `sensors_due`, sensors may not have had time to say that they are there.
         """
         self._store = store
         self._writer = writer
         self._accepted = accepted
-        self._all_here = all_here
-        self._roster = roster
+        self._sensors_due = sensors_due
+        self._peers = peers
         self._settings = settings
         self._recon = recon
         self._recon_hash = recon_hash
         self._presses: dict[str, _Press] = {}
         self._refused: BoundedDict[
-            tuple[bytes, str, int], messages.PressRefused] = BoundedDict(_REFUSALS)
+            tuple[bytes, str, int], messages.PressRefused] = BoundedDict(_MAX_REFUSALS)
         """How the last requests were refused, so that a repeat of one gets the same answer."""
         self._log = structlog.get_logger("hub")
 
@@ -85,8 +85,8 @@ class Presses:
         if state is not None:
             yield send(peer, messages.PressAccepted(request=request, capture_id=capture_id))
             return
-        sensor = self._roster.sensor()
-        if sensor is None and now < self._all_here:
+        sensor = self._peers.sensor()
+        if sensor is None and now < self._sensors_due:
             return  # the client repeats it in a moment
         obstacle = self._obstacle(queued)
         if sensor is None or obstacle:
@@ -103,8 +103,8 @@ class Presses:
     def _obstacle(self, queued: int) -> tuple[messages.PressReason, str] | None:
         if queued + len(self) >= self._settings.queue:
             return "queue", f"{self._settings.queue} frames wait for a worker already"
-        if sum(press.giver is not None for press in self._presses.values()) >= _MOST_KEEPING:
-            return "disk", f"{_MOST_KEEPING} frames wait for the disk already"
+        if sum(press.frame_sender is not None for press in self._presses.values()) >= _MAX_SAVING:
+            return "disk", f"{_MAX_SAVING} frames wait for the disk already"
         try:
             free = self._store.free_bytes() // _MIB
         except StoreError as error:
@@ -127,7 +127,7 @@ class Presses:
                        messages.FrameRefused(capture_id=capture_id, message="nobody waits for it"))
             return
         press = self._presses[capture_id]
-        press.giver = peer
+        press.frame_sender = peer
         try:
             draft = self._store.frame_draft(packet, self._recon, self._recon_hash, press.key)
         except StoreError as error:
@@ -164,18 +164,18 @@ class Presses:
         self._log.info("accepted", capture_id=capture_id)
         press = self._presses.pop(capture_id)
         self._accepted(capture_id)
-        if press.giver is not None:
-            yield send(press.giver, messages.FrameAccepted(capture_id=capture_id))
+        if press.frame_sender is not None:
+            yield send(press.frame_sender, messages.FrameAccepted(capture_id=capture_id))
         for presser, request in press.pressers.items():
             yield send(presser, messages.PressAccepted(request=request, capture_id=capture_id))
 
     def _not_kept(self, capture_id: str, error: Exception) -> Iterator[Output]:
-        giver = self._presses[capture_id].giver
-        if giver is not None:
-            yield send(giver, messages.FrameRefused(capture_id=capture_id, message=str(error)))
+        sender = self._presses[capture_id].frame_sender
+        if sender is not None:
+            yield send(sender, messages.FrameRefused(capture_id=capture_id, message=str(error)))
         yield from self._refuse(capture_id, "disk", str(error))
 
-    def no_frame(self, message: messages.FrameFailed) -> Iterator[Output]:
+    def frame_failed(self, message: messages.FrameFailed) -> Iterator[Output]:
         """Refuse a press for which the sensor has no frame."""
         if self._state(message.capture_id) is CaptureState.PRESSED:
             yield from self._refuse(message.capture_id, "sensor", message.message)
@@ -202,14 +202,14 @@ class Presses:
     def sensor_gone(self, peer: bytes, reason: str) -> Iterator[Output]:
         """Refuse what a sensor that went away was asked for."""
         for capture_id in [key for key, press in self._presses.items()
-                           if press.sensor == peer and press.giver is None]:
+                           if press.sensor == peer and press.frame_sender is None]:
             yield from self._refuse(
                 capture_id, "sensor_gone", f"the sensor went away ({reason})")
 
     def tick(self, now: float) -> Iterator[Output]:
         """Refuse what took too long."""
         late = [key for key, press in self._presses.items()
-                if now >= press.deadline and press.giver is None]
+                if now >= press.deadline and press.frame_sender is None]
         for capture_id in late:
             limit = self._settings.take_timeout_s
             yield from self._refuse(
@@ -217,6 +217,6 @@ class Presses:
 
     def _state(self, capture_id: str) -> CaptureState | None:
         if press := self._presses.get(capture_id):
-            return CaptureState.PRESSED if press.giver is None else CaptureState.KEEPING
+            return CaptureState.PRESSED if press.frame_sender is None else CaptureState.KEEPING
         stored = self._store.find(capture_id)
         return stored.state if stored else None

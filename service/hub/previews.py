@@ -1,4 +1,4 @@
-"""The hub's viewfinder: small pictures of what the sensor sees, while somebody looks.
+"""Previews: small pictures of what the sensor sees, while somebody looks.
 
 The hub asks for one at a time and no sooner than the last one came, so that a preview never waits
 in a queue; a press goes first. Nothing of it is kept.
@@ -13,9 +13,9 @@ from denseface.service.protocol.outgoing import Output, Publish, send
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 
-__all__ = ["PERIOD_S", "Previews"]
+__all__ = ["PREVIEW_PERIOD_S", "Previews"]
 
-PERIOD_S = 0.1
+PREVIEW_PERIOD_S = 0.1
 """Shortest time between two previews, seconds."""
 
 
@@ -27,9 +27,9 @@ class Previews:
     patience_s : time after which one that did not come is asked for again, seconds
     """
 
-    def __init__(self, roster: Peers, patience_s: float) -> None:
-        self._roster = roster
-        self._patience_s = patience_s
+    def __init__(self, peers: Peers, timeout_s: float) -> None:
+        self._peers = peers
+        self._timeout_s = timeout_s
         self._epoch = secrets.token_hex(8)
         self._sequence = 0
         self._asked: bytes | None = None
@@ -40,8 +40,8 @@ class Previews:
 
     def ask(self, now: float, *, busy: bool) -> Iterator[Output]:
         """Ask for one where it is time to; not while a press waits for its frame."""
-        sensor = self._roster.sensor()
-        pause = PERIOD_S if self._asked is None else self._patience_s
+        sensor = self._peers.sensor()
+        pause = PREVIEW_PERIOD_S if self._asked is None else self._timeout_s
         if not self.wanted or busy or sensor is None or now - self._asked_at < pause:
             return
         self._asked, self._asked_at = sensor.peer, now

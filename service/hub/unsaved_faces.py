@@ -12,7 +12,7 @@ from denseface.service.storage.writer import Writer, WriteResult
 
 __all__ = ["UnsavedFaces"]
 
-_MOST_UNKEPT = 16
+_MAX_UNSAVED = 16
 """Faces in memory; beyond it no work is begun, and one that the disk refuses is let go."""
 
 
@@ -22,23 +22,23 @@ class UnsavedFaces:
     def __init__(self, store: Store, writer: Writer) -> None:
         self._store = store
         self._writer = writer
-        self._unkept: dict[str, PendingWrite] = {}
+        self._pending: dict[str, PendingWrite] = {}
         self._refused: dict[str, bool] = {}
         """Those that the disk refused, in order; True where one is being written again."""
 
     def __len__(self) -> int:
-        return len(self._unkept)
+        return len(self._pending)
 
     def __contains__(self, capture_id: str) -> bool:
-        return capture_id in self._unkept
+        return capture_id in self._pending
 
     def keep(self, result: Packet) -> None:
         """Begin to write a face; StoreError where it is of no use."""
         draft = self._store.face_draft(result)
-        self._unkept[draft.capture_id] = draft
+        self._pending[draft.capture_id] = draft
         self._writer.start(draft)
 
-    def caught_up(self) -> bool:
+    def retry_refused(self) -> bool:
         """Begin anew to write what the disk refused; True where there is room for more faces.
 
         Raises
@@ -48,9 +48,9 @@ class UnsavedFaces:
         """
         for capture_id, again in self._refused.items():
             if not again:
-                self.keep(self._unkept[capture_id].packet)  # its retention begins now
+                self.keep(self._pending[capture_id].packet)  # its retention begins now
                 self._refused[capture_id] = True
-        return not self._refused and len(self._unkept) < _MOST_UNKEPT
+        return not self._refused and len(self._pending) < _MAX_UNSAVED
 
     def written(self, faces: Sequence[WriteResult]) -> list[tuple[str, Exception | None]]:
         """Give their rows to faces that were written, in order, and say of each what came of it.
@@ -82,7 +82,7 @@ class UnsavedFaces:
 
     def drop(self, capture_id: str) -> None:
         """Forget a capture that was removed; its face must not be under way."""
-        self._unkept.pop(capture_id, None)
+        self._pending.pop(capture_id, None)
         self._refused.pop(capture_id, None)
 
     def _kept(self, written: WriteResult) -> tuple[str, None]:
@@ -91,6 +91,6 @@ class UnsavedFaces:
 
     def _not_kept(self, capture_id: str, error: Exception) -> Exception:
         self._refused[capture_id] = False
-        if not isinstance(error, StoreError) or len(self._refused) > _MOST_UNKEPT:
+        if not isinstance(error, StoreError) or len(self._refused) > _MAX_UNSAVED:
             self.drop(capture_id)
         return error

@@ -294,7 +294,7 @@ def test_silence_while_the_hub_was_away_counts_for_nothing(bench):
     bench.accepted("a")
     bench.worker()
     bench.now += 60
-    bench.hub.was_away(59.9)
+    bench.hub.loop_stalled(59.9)
     assert bench.wait(0) == []
     assert (len(bench.hub.peers()), bench.hub._jobs.working) == (2, 1)
     bench.wait(4)

@@ -69,7 +69,7 @@ def test_a_frame_that_was_tried_before_has_a_worker_for_itself(bench):
     bench.stumble(OTHER, "b")  # and it is behind none
     bench.worker(WORKER, credit=3)
     assert attempts(bench, "b") == [2]
-    assert bench.hub._roster.workers[OTHER].jobs == ["b"]
+    assert bench.hub._peers.workers[OTHER].jobs == ["b"]
 
 
 def test_a_worker_that_leaves_hands_back_both_in_order(bench):
@@ -143,7 +143,7 @@ def test_a_hub_that_comes_back_takes_the_answers_of_both(bench):
     bench.accepted("a", "b")
     bench.worker(credit=0)
     bench.worker(credit=1)
-    again = Bench(Hub(bench.store, SETTINGS, bench.hub._intake._recon), bench.store, bench.now)
+    again = Bench(Hub(bench.store, SETTINGS, bench.hub._presses._recon), bench.store, bench.now)
     assert again.say(WORKER, messages.Heartbeat(holding="a"))[0][1].kind == "announce"
     for capture_id in ("a", "b"):
         again.result(capture_id, hashed=HASH)

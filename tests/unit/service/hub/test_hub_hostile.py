@@ -17,7 +17,7 @@ import pytest
 from denseface.recon.settings import Settings
 from denseface.service.errors import ProtocolError
 from denseface.service.hub.hub import Hub
-from denseface.service.hub.peers import MOST_PEERS
+from denseface.service.hub.peers import MAX_PEERS
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, Publish
 from denseface.service.protocol.topics import Topic
@@ -151,7 +151,7 @@ class Hostile:
 
     def conclude(self) -> set[str]:
         """Let an honest worker finish what is left; give the ids that have an outcome."""
-        self.give(self.hub.written(self.now, all_of_it=True))
+        self.give(self.hub.written(self.now, wait=True))
         self.start()
         self.jobs = []
         for credit in range(20):
@@ -185,14 +185,14 @@ def test_every_kind_to_the_hub_is_tried():
 def test_a_crowd_is_not_taken_and_the_status_can_still_be_written(store, kind):
     hub = Hub(store, SETTINGS, Settings())
     more = {"source": "x"} if kind is messages.SensorReady else {"credit": 0}
-    for number in range(MOST_PEERS + 50):
+    for number in range(MAX_PEERS + 50):
         hub.receive(0.0, b"%d" % number, Packet(kind(name="\\" * 100, **more)))
         hub.receive(0.0, b"%d" % number, Packet(kind(name="\\" * 100, **more)))
-    assert len(hub.peers()) == MOST_PEERS
+    assert len(hub.peers()) == MAX_PEERS
     other = (messages.WorkerReady(name="\\" * 100, credit=0)
              if kind is messages.SensorReady
              else messages.SensorReady(name="\\" * 100, source="x"))
-    for number in range(MOST_PEERS):
+    for number in range(MAX_PEERS):
         hub.receive(0.0, b"%d" % number, Packet(other))
     for output in hub.tick(1.0):
         decode_from_hub(encode(output.packet))

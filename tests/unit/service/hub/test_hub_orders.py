@@ -159,7 +159,7 @@ class AnyOrder(RuleBasedStateMachine):
         """As a hub does that is told to stop, and another."""
         if hasattr(self, "writer"):
             try:
-                self.give(self.hub.written(self.now, all_of_it=True))
+                self.give(self.hub.written(self.now, wait=True))
             except KilledError:
                 self.kill()
                 return
@@ -222,7 +222,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.ready(worker)
 
     @rule(capture_id=ids)
-    def no_frame(self, capture_id):
+    def frame_failed(self, capture_id):
         self.say(b"s", messages.FrameFailed(capture_id=capture_id, message="none"))
 
     @rule(worker=workers)

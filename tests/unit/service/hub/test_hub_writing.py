@@ -5,8 +5,8 @@ import pytest
 from denseface.recon.settings import Settings
 from denseface.service.errors import DiskFullError, StoreError
 from denseface.service.hub.hub import Hub
-from denseface.service.hub.presses import _MOST_KEEPING
-from denseface.service.hub.unsaved_faces import _MOST_UNKEPT
+from denseface.service.hub.presses import _MAX_SAVING
+from denseface.service.hub.unsaved_faces import _MAX_UNSAVED
 from denseface.service.protocol import messages
 from denseface.service.protocol.states import CaptureState
 from denseface.service.storage.folder_store import FolderStore
@@ -223,14 +223,14 @@ def test_a_hub_that_is_told_to_stop_keeps_what_it_was_writing(bench):
     face_comes(bench)
     bench.press("b")
     bench.frame("b")
-    sent = bench._sent(bench.hub.written(bench.now, all_of_it=True))
+    sent = bench._sent(bench.hub.written(bench.now, wait=True))
     assert kinds(sent) == [(SENSOR, "frame_accepted"), (CLIENT, "press_accepted")]
     assert [one.capture_id for one in bench.published] == ["a"]
     assert bench.store.find("b").state is CaptureState.ACCEPTED
 
 
 def test_a_disk_that_does_not_keep_up_stops_the_work(bench):
-    many = IDS[:_MOST_UNKEPT + 1]
+    many = IDS[:_MAX_UNSAVED + 1]
     for capture_id in many:
         bench.press(capture_id)
         bench.frame(capture_id)
@@ -240,24 +240,24 @@ def test_a_disk_that_does_not_keep_up_stops_the_work(bench):
         if sent := bench.worker(credit=credit):
             given.append(sent[0][1].capture_id)
             bench.result(given[-1])
-    assert given == many[:_MOST_UNKEPT]
+    assert given == many[:_MAX_UNSAVED]
     assert (WORKER, "job") in kinds(bench.written())
     assert [one.capture_id for one in bench.published] == given
 
 
 def test_a_disk_that_does_not_keep_up_refuses_presses(bench):
-    for capture_id in IDS[:_MOST_KEEPING]:
+    for capture_id in IDS[:_MAX_SAVING]:
         bench.press(capture_id)
         bench.frame(capture_id)
     (answer,) = bench.press("more")
     assert (answer[1].reason, answer[1].message) == (
-        "disk", f"{_MOST_KEEPING} frames wait for the disk already")
+        "disk", f"{_MAX_SAVING} frames wait for the disk already")
     bench.written()
     assert kinds(bench.press("more", request=9)) == [(SENSOR, "take")]
 
 
 def test_only_so_many_refused_faces_are_held_in_memory(bench):
-    many = IDS[:_MOST_UNKEPT + 1]
+    many = IDS[:_MAX_UNSAVED + 1]
     for capture_id in many:
         bench.press(capture_id)
         bench.frame(capture_id)
@@ -272,4 +272,4 @@ def test_only_so_many_refused_faces_are_held_in_memory(bench):
     bench.full = False
     bench.wait(1.1)
     bench.written()
-    assert len(bench.published) == _MOST_UNKEPT
+    assert len(bench.published) == _MAX_UNSAVED

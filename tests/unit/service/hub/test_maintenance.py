@@ -1,4 +1,4 @@
-"""The hub's keeper: dead letters, retention, purges."""
+"""Dead letters, retention, purges."""
 
 import itertools
 
