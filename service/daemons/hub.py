@@ -70,12 +70,15 @@ def run(settings: ServiceSettings, recon: Settings) -> int:
 def _scrapes(settings: ServiceSettings, observer: Observer) -> AbstractContextManager[object]:
     if settings.metrics is None:
         return nullcontext()
+    from prometheus_client import make_wsgi_app
+
     from denseface.service.monitoring.health import Health, unwritable
     from denseface.service.monitoring.http_server import MetricsServer
     from denseface.service.monitoring.prometheus import Metrics
 
     health = Health(observer.latest, settings, lambda: unwritable(settings.data))
-    server = MetricsServer(settings.metrics, Metrics(observer.latest).render, health.report)
+    server = MetricsServer(settings.metrics, make_wsgi_app(Metrics(observer.latest).registry),
+                           health.report)
     structlog.get_logger("hub").info("metrics", url=f"{server.url}/metrics")
     return server
 

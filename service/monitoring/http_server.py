@@ -2,35 +2,39 @@
 
 import json
 import socket
-import socketserver
+import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler
+from socketserver import TCPServer, ThreadingMixIn
 from typing import Any
+from wsgiref.simple_server import WSGIRequestHandler, WSGIServer
+from wsgiref.types import StartResponse, WSGIApplication, WSGIEnvironment
 
 import structlog
-from prometheus_client import CONTENT_TYPE_LATEST
 
 from denseface.service.errors import AddressError, reason_of
 from denseface.service.runtime.closing import Closing
 
 __all__ = ["MetricsServer"]
 
-_MOST_CLIENTS = 8
+_MAX_CONNECTIONS = 8
+"""Connections at a time; further ones are closed at once."""
 _REQUEST_S = 2.0
-"""Longest time for a whole request to come and its answer to be taken, seconds."""
-_MAX_REQUEST_BYTES = 16 * 1024
+"""Longest time for a request to come and its answer to be taken, seconds."""
+_POLL_S = 0.1
+"""Interval at which overdue connections are looked for, seconds."""
 
 
-class MetricsServer(Closing):
+class MetricsServer(ThreadingMixIn, WSGIServer):
     """Answers until closed; whoever is slow or talks nonsense is cut off, and nobody waits for it.
 
     Parameters
     ----------
-    place : host and port; port 0 is any free one
-    metrics : gives Prometheus' text
+    address : host and port; port 0 is any free one
+    metrics : answers `/metrics`
     health : says whether all is well, and what there is to say
 
     Raises
@@ -39,131 +43,96 @@ class MetricsServer(Closing):
         Where the port cannot be had.
     """
 
+    daemon_threads = True
+    block_on_close = False
+
     def __init__(
-        self, place: tuple[str, int], metrics: Callable[[], bytes],
+        self, address: tuple[str, int], metrics: WSGIApplication,
         health: Callable[[], tuple[bool, dict[str, Any]]],
     ) -> None:
+        self.address_family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
+        self._metrics = metrics
+        self._health = health
+        self._opened: dict[Any, float] = {}
+        """Connection -> when it was accepted, seconds of `time.monotonic`."""
         try:
-            self._server = _Server(place, metrics, health)
+            super().__init__(address, _Handler)
         except OSError as error:
             raise AddressError(
-                f"--metrics {place[0]}:{place[1]}: {reason_of(error)}") from error
+                f"--metrics {address[0]}:{address[1]}: {reason_of(error)}") from error
+        self.set_app(self._answer)
         self._thread = threading.Thread(
-            target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, name="scrape",
-            daemon=True)
+            target=self.serve_forever, args=(_POLL_S,), name="metrics", daemon=True)
         self._thread.start()
 
     @property
     def url(self) -> str:
         """Where it listens."""
-        host, port = self._server.server_address[:2]
-        host = host.decode() if isinstance(host, bytes | bytearray) else host
-        return f"http://{f'[{host}]' if ':' in host else host}:{port}"
+        host = self.server_name
+        return f"http://{f'[{host}]' if ':' in host else host}:{self.server_port}"
 
-    def close(self) -> None:
-        """Listen no more; a client that is being answered is left to its time-out."""
-        self._server.shutdown()
-        self._server.server_close()
+    def __exit__(self, *_: object) -> None:
+        """Listen no more and cut every connection."""
+        self.shutdown()
+        self.server_close()
         self._thread.join()
+        self._cut(opened_before=time.monotonic())
 
+    def server_bind(self) -> None:
+        """Bind without asking the resolver for the host's name, as `HTTPServer` does."""
+        TCPServer.server_bind(self)
+        self.server_name, self.server_port = str(self.server_address[0]), self.server_address[1]
+        self.setup_environ()
 
-class _Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
-    allow_reuse_address = True
-    daemon_threads = True
-    block_on_close = False
-
-    def __init__(
-        self, place: tuple[str, int], metrics: Callable[[], bytes],
-        health: Callable[[], tuple[bool, dict[str, Any]]],
-    ) -> None:
-        self.address_family = socket.AF_INET6 if ":" in place[0] else socket.AF_INET
-        self.metrics = metrics
-        self.health = health
-        self._free = threading.BoundedSemaphore(_MOST_CLIENTS)
-        super().__init__(place, _Handler)
+    def service_actions(self) -> None:
+        """Cut overdue connections."""
+        self._cut(opened_before=time.monotonic() - _REQUEST_S)
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        if not self._free.acquire(blocking=False):
+        """Answer in a thread of its own, where there is room."""
+        if len(self._opened) >= _MAX_CONNECTIONS:
             self.shutdown_request(request)
             return
-        try:
-            super().process_request(request, client_address)
-        except BaseException:  # no thread was to be had
-            self._free.release()
-            raise
+        self._opened[request] = time.monotonic()
+        super().process_request(request, client_address)
 
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            self._free.release()
+    def shutdown_request(self, request: Any) -> None:
+        """Close a connection."""
+        self._opened.pop(request, None)
+        super().shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ARG002
-        structlog.get_logger("hub").exception("a scrape failed")
+        """Log what went wrong, unless it is the connection."""
+        if not isinstance(sys.exception(), OSError):
+            structlog.get_logger("hub").exception("a scrape failed")
 
+    def _cut(self, opened_before: float) -> None:
+        for connection, opened in self._opened.copy().items():
+            if opened <= opened_before:
+                with suppress(OSError):  # closed meanwhile
+                    connection.shutdown(socket.SHUT_RDWR)
 
-class _Hurried:
-    """Reads lines from a socket, all of them within one time and size."""
-
-    def __init__(self, connection: socket.socket) -> None:
-        self._connection = connection
-        self._deadline = time.monotonic() + _REQUEST_S
-        self._left = _MAX_REQUEST_BYTES
-        self._buffer = b""
-
-    def readline(self, limit: int = -1) -> bytes:
-        while b"\n" not in self._buffer:
-            left_s = self._deadline - time.monotonic()
-            if left_s <= 0 or self._left <= 0:
-                raise TimeoutError
-            self._connection.settimeout(left_s)
-            more = self._connection.recv(min(4096, self._left))
-            if not more:
-                break
-            self._left -= len(more)
-            self._buffer += more
-        line, end, self._buffer = self._buffer.partition(b"\n")
-        return line + end if limit < 0 else (line + end)[:limit]
-
-    def close(self) -> None:
-        """Leave the socket to whoever opened it."""
-
-
-class _Handler(BaseHTTPRequestHandler):
-    server: _Server
-    server_version = "denseface"
-    sys_version = ""
-
-    def setup(self) -> None:
-        super().setup()
-        self.rfile.close()
-        self.rfile = _Hurried(self.connection)  # type: ignore[assignment]
-
-    def handle(self) -> None:
+    def _answer(self, environ: WSGIEnvironment, start: StartResponse) -> Iterable[bytes]:
+        kind = "text/plain"
         try:
-            super().handle()
-        except (OSError, ValueError):
-            self.close_connection = True
+            match environ["REQUEST_METHOD"], environ["PATH_INFO"]:
+                case "GET", "/metrics":
+                    return self._metrics(environ, start)
+                case "GET", "/healthz":
+                    healthy, report = self._health()
+                    status = HTTPStatus.OK if healthy else HTTPStatus.SERVICE_UNAVAILABLE
+                    kind, body = "application/json", json.dumps(report)
+                case "GET", _:
+                    status, body = HTTPStatus.NOT_FOUND, "/metrics or /healthz"
+                case _:
+                    status, body = HTTPStatus.NOT_IMPLEMENTED, "expected GET"
+        except Exception:
+            structlog.get_logger("hub").exception("a scrape failed")
+            status, body = HTTPStatus.INTERNAL_SERVER_ERROR, "the hub's log says why"
+        start(f"{status} {status.phrase}", [("Content-Type", kind), ("Cache-Control", "no-store")])
+        return [body.encode() + b"\n"]
 
-    def do_GET(self) -> None:
-        self.connection.settimeout(_REQUEST_S)
-        match self.path.partition("?")[0]:
-            case "/metrics":
-                self._answer(HTTPStatus.OK, CONTENT_TYPE_LATEST, self.server.metrics())
-            case "/healthz":
-                well, said = self.server.health()
-                self._answer(HTTPStatus.OK if well else HTTPStatus.SERVICE_UNAVAILABLE,
-                             "application/json", json.dumps(said).encode() + b"\n")
-            case _:
-                self._answer(HTTPStatus.NOT_FOUND, "text/plain", b"/metrics or /healthz\n")
 
-    def _answer(self, status: HTTPStatus, kind: str, body: bytes) -> None:
-        self.send_response(status)
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(body)))
-        self.send_header("Cache-Control", "no-store")
-        self.end_headers()
-        self.wfile.write(body)
-
+class _Handler(WSGIRequestHandler):
     def log_message(self, format: str, *args: Any) -> None:  # noqa: A002
         """Log nothing: a scrape every few seconds is no event."""

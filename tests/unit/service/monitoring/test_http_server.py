@@ -11,10 +11,16 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from prometheus_client import CollectorRegistry, Gauge, make_wsgi_app
+from structlog.testing import capture_logs
 
 from denseface.service.errors import AddressError
 from denseface.service.monitoring.http_server import MetricsServer
 from denseface.service.runtime.parsing import parse_loopback_address
+
+REGISTRY = CollectorRegistry()
+Gauge("figures", "Of a test.", registry=REGISTRY).set(1)
+METRICS = make_wsgi_app(REGISTRY)
 
 
 class Asked:
@@ -22,9 +28,10 @@ class Asked:
 
     def __init__(self):
         self.well = True
+        self.missing = []
 
     def health(self):
-        return self.well, {"missing": [] if self.well else ["worker"]}
+        return self.well, {"missing": self.missing}
 
 
 @pytest.fixture
@@ -34,7 +41,7 @@ def asked():
 
 @pytest.fixture
 def server(asked):
-    with MetricsServer(("127.0.0.1", 0), lambda: b"figures 1\n", asked.health) as server:
+    with MetricsServer(("127.0.0.1", 0), METRICS, asked.health) as server:
         yield server
 
 
@@ -69,10 +76,10 @@ def raw(server, data):
 
 def test_the_metrics_and_the_health(server, asked):
     status, kind, body = get(server, "/metrics")
-    assert (status, body) == (200, b"figures 1\n")
+    assert (status, body.splitlines()[-1]) == (200, b"figures 1.0")
     assert kind.startswith("text/plain; version=")
     assert get(server, "/healthz")[::2] == (200, b'{"missing": []}\n')
-    asked.well = False
+    asked.well, asked.missing = False, ["worker"]
     status, kind, body = get(server, "/healthz?verbose=1")
     assert (status, kind, json.loads(body)) == (503, "application/json", {"missing": ["worker"]})
     assert get(server, "/")[0] == 404
@@ -82,10 +89,24 @@ def test_other_verbs_are_not_known(server):
     assert b"501" in raw(server, b"POST /metrics HTTP/1.0\r\n\r\n").splitlines()[0]
 
 
+def test_prometheus_own_format_is_given_to_who_asks_for_it(server):
+    asking = b"GET /metrics HTTP/1.0\r\nAccept: application/openmetrics-text; version=1.0.0\r\n\r\n"
+    assert raw(server, asking).endswith(b"\r\n\r\n# HELP figures Of a test.\n# TYPE figures gauge\n"
+                                        b"figures 1.0\n# EOF\n")
+
+
+def test_a_failure_is_logged_and_answered(server, asked):
+    asked.missing = object()  # json cannot write it
+    with capture_logs() as logged:
+        assert get(server, "/healthz")[0] == 500
+    assert [(one["event"], one["log_level"]) for one in logged] == [("a scrape failed", "error")]
+    assert get(server, "/metrics")[0] == 200
+
+
 @given(st.binary(max_size=200))
 @hypothesis_settings(deadline=None, max_examples=40)
 def test_garbage_ends_the_connection_alone(data):
-    with MetricsServer(("127.0.0.1", 0), lambda: b"figures 1\n", Asked().health) as server:
+    with MetricsServer(("127.0.0.1", 0), METRICS, Asked().health) as server:
         raw(server, data)
         assert get(server, "/metrics")[0] == 200
 
@@ -139,7 +160,7 @@ def test_more_clients_than_there_is_room_for_are_turned_away(server):
 
 def test_a_port_in_use_is_one_line(server):
     with pytest.raises(AddressError, match=r"^--metrics 127.0.0.1:\d+: Address already in use$"):
-        MetricsServer(place(server), bytes, Asked().health)
+        MetricsServer(place(server), METRICS, Asked().health)
 
 
 @pytest.mark.parametrize(("given", "place"), [

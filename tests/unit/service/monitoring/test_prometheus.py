@@ -1,6 +1,7 @@
 """The metrics and the health, from what the hub's loop shows."""
 
 import pytest
+from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
 from denseface.service.monitoring.figures import Latencies
@@ -31,7 +32,7 @@ def snapshot():
 
 
 def samples(snapshot):
-    text = Metrics(lambda: snapshot).render().decode()
+    text = generate_latest(Metrics(lambda: snapshot).registry).decode()
     return {(one.name, *sorted(one.labels.values())): one.value
             for family in text_string_to_metric_families(text) for one in family.samples
             if one.name.startswith("denseface_")}
