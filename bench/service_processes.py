@@ -14,7 +14,7 @@ from typing import IO
 import psutil
 import zmq
 
-from denseface.service.client.blocking import Client
+from denseface.service.client import Client
 from denseface.service.protocol.topics import Topic
 from denseface.service.transport.addresses import publications_of
 from denseface.service.transport.sockets import open_socket

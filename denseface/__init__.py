@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from denseface.capture import RgbdFrame, open_source
     from denseface.recon import Face, Settings, reconstruct
-    from denseface.service.client.aio import AsyncClient
-    from denseface.service.client.blocking import Client
+    from denseface.service.client import AsyncClient, Client
     from denseface.service.export.formats import load_face, save_face
 
     __version__: str
@@ -21,8 +20,8 @@ __all__ = [
 ]
 
 _HOMES = {
-    "AsyncClient": "denseface.service.client.aio",
-    "Client": "denseface.service.client.blocking",
+    "AsyncClient": "denseface.service.client",
+    "Client": "denseface.service.client",
     "Face": "denseface.recon",
     "RgbdFrame": "denseface.capture",
     "Settings": "denseface.recon",

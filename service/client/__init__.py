@@ -1,1 +1,21 @@
 """What other programs import: press, wait for faces, follow what is published."""
+
+from denseface.service.client.aio import AsyncClient
+from denseface.service.client.blocking import Client
+from denseface.service.client.events import (
+    Published,
+    PublishedFace,
+    PublishedFailure,
+    PublishedPreview,
+)
+from denseface.service.client.operator import Operator
+
+__all__ = [
+    "AsyncClient",
+    "Client",
+    "Operator",
+    "Published",
+    "PublishedFace",
+    "PublishedFailure",
+    "PublishedPreview",
+]

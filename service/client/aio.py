@@ -1,11 +1,10 @@
-"""`service.client.blocking` for asyncio: the same calls, awaited.
+"""The client for asyncio: the calls of `service.client.blocking`, awaited.
 
-ZeroMQ's sockets are watched by the event loop through their file descriptors, which say only that
-something may have happened; each look takes all there is.
+The event loop watches the file descriptors of ZeroMQ's sockets. They become readable when
+something may have happened, once: whatever has come must then be taken.
 """
 
 import asyncio
-import os
 import time
 from collections.abc import AsyncIterator
 from contextlib import closing, suppress
@@ -17,26 +16,20 @@ from typing import Self, TypeVar
 import zmq
 
 from denseface.recon.face import Face
+from denseface.service.client._base import BaseClient
 from denseface.service.client.events import Published, PublishedFace, PublishedPreview, preview_of
 from denseface.service.client.exchanges import (
-    SEND_RETRY_S,
     Exchange,
-    Exchanges,
     SendRequest,
     Step,
     deadline,
-    no_answer,
-    raise_if_failed,
 )
 from denseface.service.client.follower import TOPICS, Follower
 from denseface.service.errors import ClientClosedError, ClientTimeoutError, ProtocolError
 from denseface.service.protocol.messages import Request, Status
 from denseface.service.protocol.topics import Topic
-from denseface.service.protocol.wire import Packet, decode_from_hub, encode
-from denseface.service.settings import ServiceSettings
-from denseface.service.transport.addresses import check_connectable, publications_of
-from denseface.service.transport.connection import Credentials, connect
-from denseface.service.transport.sockets import send_parts
+from denseface.service.protocol.wire import Packet, encode
+from denseface.service.transport.connection import receive_packet
 from denseface.service.transport.subscription import CHECK_INTERVAL_S, Subscription
 
 __all__ = ["AsyncClient"]
@@ -44,7 +37,7 @@ __all__ = ["AsyncClient"]
 _T = TypeVar("_T")
 
 
-class AsyncClient:
+class AsyncClient(BaseClient):
     """A connection to the hub; for one event loop, whose tasks may share it.
 
     Parameters and errors are those of `service.client.blocking.Client`. A call that is cancelled is
@@ -54,19 +47,13 @@ class AsyncClient:
     def __init__(
         self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None
     ) -> None:
-        settings = ServiceSettings.of(os.environ, address=address, key=key, hub_key=hub_key)
-        self.address = settings.address
-        self._resend_s = settings.resend_s
-        check_connectable(self.address)
-        self._publications = publications_of(self.address)
-        self._keys = Credentials.of(settings)
-        self._exchanges = Exchanges(settings.resend_s)
+        super().__init__(address, key=key, hub_key=hub_key)
         self._pending: dict[int, asyncio.Future[Packet]] = {}
-        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._socket, self._monitor = connect(self._context, zmq.DEALER, self.address, self._keys)
+        """Number of a request -> its answer."""
         self._loop: asyncio.AbstractEventLoop | None = None
+        """Watches the socket for answers; None where none is awaited."""
         self._readable_events: dict[int, asyncio.Event] = {}
-        """Wakes who waits for a subscription, by the socket's descriptor."""
+        """Descriptor of a subscription's socket -> set when it may be readable."""
 
     async def __aenter__(self) -> Self:
         return self
@@ -80,10 +67,9 @@ class AsyncClient:
     def close(self) -> None:
         """Disconnect; harmless when repeated. Ends every iteration and every call under way."""
         self._unwatch()
-        for waiting in self._pending.values():
-            if not waiting.done():
-                waiting.set_exception(
-                    ClientClosedError(f"{self.address}: the client was closed"))
+        for answer in self._pending.values():
+            if not answer.done():
+                answer.set_exception(self._closed())
         while self._readable_events:
             descriptor, readable = self._readable_events.popitem()
             asyncio.get_running_loop().remove_reader(descriptor)
@@ -133,10 +119,6 @@ class AsyncClient:
                     preview = preview_of(subscription.receive_latest())
                 yield preview
 
-    def _subscribe(self, *topics: Topic) -> Subscription:
-        self._check_open()
-        return Subscription(self._context, self._publications, self._keys, topics)
-
     async def _run(self, exchange: Exchange[_T], subscription: Subscription | None = None) -> _T:
         try:
             step = next(exchange)
@@ -157,41 +139,38 @@ class AsyncClient:
         if isinstance(step, SendRequest):
             return await self._send_request(step.message, step.timeout, subscription)
         if subscription is None:
-            raise TypeError("there is no subscription to hear")
+            raise TypeError("an exchange that awaits publications needs a subscription")
         await self._wait(subscription, step.timeout)
         return subscription.receive()
 
     async def _send_request(
         self, message: Request, timeout: float, subscription: Subscription | None = None
     ) -> Packet:
-        """Send until answered, or until it is known that the hub lets us in no more."""
+        """Send until answered; raises as `_send`, and where the hub cannot answer."""
         self._check_open()
         parts = encode(Packet(message))
         answer = self._pending[message.request] = asyncio.get_running_loop().create_future()
         until = time.monotonic() + timeout
         try:
             while (left := until - time.monotonic()) > 0:
-                self._monitor.check()
-                if subscription:  # a key revoked meanwhile is cut off there, and not answered here
-                    subscription.monitor.check()
-                wait = self._resend_s if send_parts(self._socket, parts) else SEND_RETRY_S
+                wait = self._send(parts, subscription)
                 self._watch()
                 await asyncio.wait([answer], timeout=min(left, wait))
                 if answer.done():
-                    return raise_if_failed(self.address, answer.result())
+                    return self._checked(answer.result())
         finally:
             del self._pending[message.request]
             if not answer.cancel() and not answer.cancelled():
-                answer.exception()  # seen, where the call was cancelled meanwhile
+                answer.exception()  # marked as retrieved: the call may have been cancelled
             if not self._pending:
                 self._unwatch()
-        raise no_answer(self.address, timeout, keys=self._keys is not None)
+        raise self._no_answer(timeout)
 
     def _watch(self) -> None:
         if self._loop is None:
             self._loop = asyncio.get_running_loop()
             self._loop.add_reader(self._socket.fileno(), self._take_answers)
-        self._take_answers()  # sending may have used up the descriptor's sign
+        self._take_answers()  # after sending, the descriptor does not tell of what had come before
 
     def _unwatch(self) -> None:
         if self._loop is not None:
@@ -201,8 +180,7 @@ class AsyncClient:
     def _take_answers(self) -> None:
         while True:
             try:
-                packet = decode_from_hub([part.buffer for part in self._socket.recv_multipart(
-                    zmq.DONTWAIT, copy=False)])
+                packet = receive_packet(self._socket, zmq.DONTWAIT)
             except zmq.Again:
                 return
             except ProtocolError:
@@ -210,10 +188,6 @@ class AsyncClient:
             answer = self._pending.get(getattr(packet.message, "request", 0))
             if answer is not None and not answer.done():
                 answer.set_result(packet)
-
-    def _check_open(self) -> None:
-        if self._context.closed:
-            raise ClientClosedError(f"{self.address}: the client was closed")
 
     async def _wait(self, subscription: Subscription, timeout: float) -> None:
         until = time.monotonic() + timeout
@@ -241,6 +215,7 @@ class AsyncClient:
             except TimeoutError:
                 continue
             finally:
-                if self._readable_events.pop(descriptor, None):  # else it may be another's by now
+                # Where `close` removed it, the number may be another's by now.
+                if self._readable_events.pop(descriptor, None):
                     loop.remove_reader(descriptor)
-        raise ClientClosedError(f"{self.address}: the client was closed")
+        raise self._closed()

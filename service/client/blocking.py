@@ -1,57 +1,46 @@
-"""What other programs import: press, wait for faces, follow what is published.
+"""The blocking client: press, wait for faces, follow what is published.
 
-Every call has a time-out. Requests are repeated until answered, so a hub that restarts meanwhile
-is not noticed; repeating is safe, for an id is one capture however often it is pressed.
+Every call has a time-out. Requests are repeated until answered, so a restart of the hub goes
+unnoticed; repeating is safe, for an id is one capture however often it is pressed.
 """
 
 import math
-import os
 import time
 from collections.abc import Iterator
 from contextlib import closing
 from datetime import datetime
-from pathlib import Path
 from typing import TypeVar
 
-import zmq
-
 from denseface.recon.face import Face
+from denseface.service.client._base import BaseClient
 from denseface.service.client.events import (
     Published,
     PublishedFace,
-    PublishedFailure,
     PublishedPreview,
     preview_of,
 )
 from denseface.service.client.exchanges import (
-    SEND_RETRY_S,
     Exchange,
-    Exchanges,
     SendRequest,
     Step,
     deadline,
-    no_answer,
-    raise_if_failed,
 )
 from denseface.service.client.follower import TOPICS, Follower
-from denseface.service.errors import ClientClosedError, ClientTimeoutError, ProtocolError
+from denseface.service.errors import ClientTimeoutError, ProtocolError
 from denseface.service.protocol import messages
 from denseface.service.protocol.messages import Status
 from denseface.service.protocol.topics import Topic
-from denseface.service.protocol.wire import Packet, decode_from_hub, encode
+from denseface.service.protocol.wire import Packet, encode
 from denseface.service.runtime.closing import Closing
-from denseface.service.settings import ServiceSettings
-from denseface.service.transport.addresses import check_connectable, publications_of
-from denseface.service.transport.connection import Credentials, connect
-from denseface.service.transport.sockets import send_parts
+from denseface.service.transport.connection import receive_packet
 from denseface.service.transport.subscription import CHECK_INTERVAL_S, Subscription
 
-__all__ = ["Client", "Published", "PublishedFace", "PublishedFailure", "PublishedPreview"]
+__all__ = ["Client"]
 
 _T = TypeVar("_T")
 
 
-class Client(Closing):
+class Client(Closing, BaseClient):
     """A connection to the hub; for one thread.
 
     Parameters
@@ -60,7 +49,7 @@ class Client(Closing):
     key, hub_key : files of one's own secret key and of the hub's public one, for a hub elsewhere;
         where None, `DENSEFACE_KEY` and `DENSEFACE_HUB_KEY`
 
-    Every call raises `KeyRefusedError` where the hub does not let this key in.
+    Every call raises `KeyRefusedError` where the hub refuses this key.
 
     Raises
     ------
@@ -68,20 +57,6 @@ class Client(Closing):
         Where the address is malformed, the folder of the default one is someone else's, or a key
         file cannot be used.
     """
-
-    def __init__(
-        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None
-    ) -> None:
-        settings = ServiceSettings.of(os.environ, address=address, key=key, hub_key=hub_key)
-        self.address = settings.address
-        self._resend_s = settings.resend_s
-        check_connectable(self.address)
-        self._publications = publications_of(self.address)
-        self._keys = Credentials.of(settings)
-        self._exchanges = Exchanges(settings.resend_s)
-        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._socket, self._monitor = connect(
-            self._context, zmq.DEALER, self.address, self._keys)
 
     def close(self) -> None:
         """Disconnect; harmless when repeated. Ends every iteration over `faces`."""
@@ -155,8 +130,7 @@ class Client(Closing):
             More than one start is given, `last` is not positive or `since` has no zone.
         """
         follower = Follower(self._exchanges, after, last, since)
-        with closing(Subscription(
-                self._context, self._publications, self._keys, TOPICS)) as subscription:
+        with closing(self._subscribe(*TOPICS)) as subscription:
             self._run(follower.start(timeout), subscription)
             while True:
                 yield self._run(follower.next(timeout), subscription)
@@ -176,8 +150,7 @@ class Client(Closing):
         ClientTimeoutError
             Nothing came in `timeout` seconds.
         """
-        with closing(Subscription(
-                self._context, self._publications, self._keys, (Topic.PREVIEW,))) as subscription:
+        with closing(self._subscribe(Topic.PREVIEW)) as subscription:
             while True:
                 until = deadline(timeout)
                 preview = None
@@ -214,7 +187,7 @@ class Client(Closing):
         if isinstance(step, SendRequest):
             return self._send_request(step.message, step.timeout, subscription)
         if subscription is None:
-            raise TypeError("there is no subscription to hear")
+            raise TypeError("an exchange that awaits publications needs a subscription")
         self._wait(subscription, step.timeout)
         return subscription.receive()
 
@@ -230,21 +203,15 @@ class Client(Closing):
     def _send_request(
         self, message: messages.Request, timeout: float, subscription: Subscription | None = None
     ) -> Packet:
-        """Send until answered, or until it is known that the hub lets us in no more."""
-        if self._context.closed:
-            raise ClientClosedError(f"{self.address}: the client was closed")
+        """Send until answered; raises as `_send`, and where the hub cannot answer."""
+        self._check_open()
         parts = encode(Packet(message))
         until = time.monotonic() + timeout
         while (left := until - time.monotonic()) > 0:
-            self._monitor.check()
-            if subscription:  # a key revoked meanwhile is cut off there, and not answered here
-                subscription.monitor.check()
-            wait = self._resend_s if send_parts(self._socket, parts) else SEND_RETRY_S
-            answer = self._answer(message.request, min(left, wait))
-            if answer is None:
-                continue
-            return raise_if_failed(self.address, answer)
-        raise no_answer(self.address, timeout, keys=self._keys is not None)
+            wait = self._send(parts, subscription)
+            if answer := self._answer(message.request, min(left, wait)):
+                return self._checked(answer)
+        raise self._no_answer(timeout)
 
     def _answer(self, request: int, wait: float) -> Packet | None:
         until = time.monotonic() + wait
@@ -253,8 +220,7 @@ class Client(Closing):
             if not self._socket.poll(max(0, math.ceil(left * 1000))):
                 return None
             try:
-                packet = decode_from_hub(
-                    [part.buffer for part in self._socket.recv_multipart(copy=False)])
+                packet = receive_packet(self._socket)
             except ProtocolError:
                 continue
             if getattr(packet.message, "request", None) == request:

@@ -1,4 +1,4 @@
-"""What subscribers are given: outcomes and previews."""
+"""What subscribers get: outcomes and previews."""
 
 from dataclasses import dataclass
 
@@ -74,7 +74,7 @@ def outcome_of(packet: Packet) -> Published:
 
 
 def preview_of(packet: Packet | None) -> PublishedPreview | None:
-    """Read a `Preview`; None where it is something else, or garbled."""
+    """Read a `Preview`; None where it is something else or malformed."""
     if packet is None or not isinstance(packet.message, Preview):
         return None
     message = packet.message

@@ -1,4 +1,4 @@
-"""Following the hub's publications without missing one: no sockets, no waiting."""
+"""Following the hub's publications without a gap: no sockets, no waiting."""
 
 import time
 from datetime import datetime
@@ -28,16 +28,15 @@ from denseface.service.protocol.wire import Packet
 __all__ = ["TOPICS", "Follower"]
 
 TOPICS = (Topic.FACES, Topic.STATUS)
-"""What must be subscribed to."""
+"""Topics to subscribe to."""
 _REQUEST_TIMEOUT_S = 5.0
-"""Longest wait for one answer of a hub that may be restarting, seconds."""
+"""Time-out of one request, seconds: the hub may be restarting."""
 
 
 class Follower:
-    """Publications in order: what did not come by itself is asked for.
+    """Gives publications in order, and requests those that were missed.
 
-    A number that is skipped, a status that knows a higher number and a new epoch each say that
-    something was missed.
+    A skipped number, a status with a higher number and a new epoch each tell of missed ones.
 
     Parameters
     ----------
@@ -60,12 +59,14 @@ class Follower:
         self._start_request = exchanges.start(last, since)
         self._epoch: str | None = None
         self._last = 0
+        """Sequence number of the last outcome given."""
         self._behind = True
+        """Whether outcomes may have been missed."""
 
     def start(self, timeout: float | None) -> Exchange[None]:
-        """Find the place to start at; to be done once, when the subscription is made."""
+        """Find where to start; to be run once, after subscribing."""
         until = deadline(timeout)
-        message = self._start_request or GetStatus(request=self._exchanges.number())
+        message = self._start_request or GetStatus(request=self._exchanges.next_number())
         found = (yield from self._request_until(message, until)).message
         if not isinstance(found, StartAt if self._start_request else Status):
             raise RemoteProtocolError(f"the hub answered with {found.kind} to {message.kind}")
@@ -73,7 +74,7 @@ class Follower:
         self._last = found.sequence if self._after is None else self._after
 
     def next(self, timeout: float | None) -> Exchange[Published]:
-        """Wait for the next one."""
+        """Wait for the next publication."""
         until = deadline(timeout)
         while True:
             packet = yield from (
@@ -85,14 +86,14 @@ class Follower:
 
     def _fetch(self, until: float) -> Exchange[Packet | None]:
         packet = yield from self._request_until(
-            GetNext(request=self._exchanges.number(), after=self._last), until)
+            GetNext(request=self._exchanges.next_number(), after=self._last), until)
         message = packet.message
         if not isinstance(message, FaceDone | CaptureFailed | NothingNewer):
             raise RemoteProtocolError(f"the hub answered with {message.kind} to get_next")
         if self._new_epoch(message.epoch):
             return None
         if isinstance(message, NothingNewer):
-            # Numbers up to this one that did not come were removed.
+            # Numbers up to this one that did not come have been removed.
             self._last = max(self._last, message.sequence)
             self._behind = False
             return None
@@ -114,7 +115,7 @@ class Follower:
         return None
 
     def _new_epoch(self, epoch: str) -> bool:
-        """Start over where the hub has another store: all in it is new."""
+        """Start over where the hub has another store: everything in it is new."""
         if epoch == self._epoch:
             return False
         self._epoch, self._last, self._behind = epoch, 0, True

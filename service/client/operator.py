@@ -20,12 +20,12 @@ class Operator(Client):
         Raises
         ------
         ClientTimeoutError
-            The hub did not answer in `timeout` seconds; so also below.
+            The hub did not answer in `timeout` seconds; so for every call.
         """
         after = 0
         while True:
-            answer = self._send_request(
-                messages.ListDead(request=self._request(), after=after), timeout).message
+            answer = self._send_request(messages.ListDead(
+                request=self._exchanges.next_number(), after=after), timeout).message
             letters = expect(answer, messages.DeadLetters).letters
             yield from letters
             if not letters:
@@ -33,7 +33,7 @@ class Operator(Client):
             after = letters[-1].sequence
 
     def retry(self, capture_id: str, *, timeout: float = 5.0) -> None:
-        """Try a capture again that was given up, with all its attempts.
+        """Try a capture that was given up again, with all its attempts.
 
         Raises
         ------
@@ -42,13 +42,15 @@ class Operator(Client):
         RequestFailedError
             It is no dead letter, or its frame is damaged.
         """
-        expect(self._known(messages.RetryDead(
-            request=self._request(), capture_id=capture_id), timeout), messages.CapturePending)
+        answer = self._request_known(messages.RetryDead(
+            request=self._exchanges.next_number(), capture_id=capture_id), timeout)
+        expect(answer, messages.CapturePending)
 
     def drop(self, capture_id: str, *, timeout: float = 5.0) -> None:
         """Remove a capture that was given up; raises as `retry`."""
-        expect(self._known(messages.DropDead(
-            request=self._request(), capture_id=capture_id), timeout), messages.Removed)
+        answer = self._request_known(messages.DropDead(
+            request=self._exchanges.next_number(), capture_id=capture_id), timeout)
+        expect(answer, messages.Removed)
 
     def purge(
         self, *, capture_id: str | None = None, before: datetime | None = None,
@@ -58,8 +60,8 @@ class Operator(Client):
 
         Parameters
         ----------
-        capture_id, before, everything : just one: this id; what was accepted before this time,
-            with a zone; all, with what is in quarantine
+        capture_id, before, everything : exactly one: this id; what was accepted before this time,
+            with a zone; everything, what is in quarantine included
         timeout : for each batch, seconds
 
         Raises
@@ -70,7 +72,7 @@ class Operator(Client):
         removed = 0
         while True:
             answer = expect(self._send_request(messages.Purge(
-                request=self._request(), capture_id=capture_id, before=before,
+                request=self._exchanges.next_number(), capture_id=capture_id, before=before,
                 everything=everything), timeout).message, messages.Removed)
             removed += answer.removed
             if not answer.left:
@@ -78,7 +80,7 @@ class Operator(Client):
             if not answer.removed:
                 raise RemoteProtocolError("the hub removes nothing and says that some are left")
 
-    def _known(
+    def _request_known(
         self, message: messages.RetryDead | messages.DropDead, timeout: float
     ) -> messages.Message:
         answer = self._send_request(message, timeout).message
@@ -86,6 +88,3 @@ class Operator(Client):
             raise UnknownCaptureError(
                 f"capture {message.capture_id}: the hub has no such capture")
         return answer
-
-    def _request(self) -> int:
-        return self._exchanges.number()

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from denseface.recon.settings import Settings
-    from denseface.service.client.blocking import Client
-    from denseface.service.client.operator import Operator
+    from denseface.service.client import Client, Operator
     from denseface.service.settings import ServiceSettings
 
 __all__ = ["add_address", "add_credentials", "add_daemon", "add_hub", "add_keys", "add_listen",
@@ -144,14 +143,14 @@ def service_settings(args: argparse.Namespace) -> "ServiceSettings":
 
 def client(args: argparse.Namespace) -> "Client":
     """Connect as the flags of `add_address` and `add_credentials` say."""
-    from denseface.service.client.blocking import Client
+    from denseface.service.client import Client
 
     return Client(args.address, key=args.key, hub_key=args.hub_key)
 
 
 def operator(args: argparse.Namespace) -> "Operator":
     """Connect as `client`, to remove too."""
-    from denseface.service.client.operator import Operator
+    from denseface.service.client import Operator
 
     return Operator(args.address, key=args.key, hub_key=args.hub_key)
 

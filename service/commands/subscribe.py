@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do it."""
-    from denseface.service.client.blocking import PublishedFailure
+    from denseface.service.client import PublishedFailure
     from denseface.service.errors import UsageError
     from denseface.service.export.files import FaceFiles
 

@@ -16,7 +16,6 @@ from wsgiref.types import StartResponse, WSGIApplication, WSGIEnvironment
 import structlog
 
 from denseface.service.errors import AddressError, reason_of
-from denseface.service.runtime.closing import Closing
 
 __all__ = ["MetricsServer"]
 

@@ -1,4 +1,4 @@
-"""What a client shows at a guarded door, and why a hub does not let it in."""
+"""A connection to the hub: its keys, and why the hub refuses it."""
 
 import errno
 import time
@@ -10,11 +10,12 @@ import zmq
 from zmq.utils.monitor import parse_monitor_message
 
 from denseface.service.errors import KeyFileError, KeyRefusedError
+from denseface.service.protocol.wire import Packet, decode_from_hub
 from denseface.service.security.keys import KeyPair, read_pair, read_public
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.sockets import open_socket
 
-__all__ = ["ConnectionMonitor", "Credentials", "connect"]
+__all__ = ["ConnectionMonitor", "Credentials", "connect", "receive_packet"]
 
 _MIN_BROKEN_OFF = 3
 """Handshakes that break off in a row until it is said why: a hub may have ended in one."""
@@ -142,3 +143,14 @@ def connect(
     monitor = ConnectionMonitor(socket, address, keys)
     socket.connect(address)
     return socket, monitor
+
+
+def receive_packet(socket: "zmq.Socket[bytes]", flags: int = 0) -> Packet:
+    """Receive what the hub sends to a DEALER.
+
+    Raises
+    ------
+    RemoteProtocolError
+        It is malformed.
+    """
+    return decode_from_hub([part.buffer for part in socket.recv_multipart(flags, copy=False)])

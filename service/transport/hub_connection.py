@@ -12,12 +12,12 @@ import zmq
 from denseface.service.errors import ProtocolError
 from denseface.service.protocol.messages import Denied, Goodbye, Heartbeat, ToHub
 from denseface.service.protocol.payload import Arrays
-from denseface.service.protocol.wire import Packet, decode_from_hub, encode
+from denseface.service.protocol.wire import Packet, encode
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable
-from denseface.service.transport.connection import Credentials, connect
+from denseface.service.transport.connection import Credentials, connect, receive_packet
 from denseface.service.transport.sockets import send_parts
 
 __all__ = ["HubConnection"]
@@ -80,8 +80,7 @@ class HubConnection:
                 stop.drain()
             elif self._socket in ready:
                 try:
-                    packet = decode_from_hub(
-                        [part.buffer for part in self._socket.recv_multipart(copy=False)])
+                    packet = receive_packet(self._socket)
                 except ProtocolError as error:
                     self._log.warning("message dropped", reason=str(error))
                     continue

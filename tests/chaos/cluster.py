@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from denseface.service.client.blocking import Client
+from denseface.service.client import Client
 from denseface.service.errors import ServiceError
 from denseface.service.runtime.failpoints import NAMES, TOKENS, VARIABLE
 

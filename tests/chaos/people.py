@@ -7,7 +7,7 @@ from typing import Self
 
 import zmq
 
-from denseface.service.client.blocking import Client, PublishedFace
+from denseface.service.client import Client, PublishedFace
 from denseface.service.errors import PressRefusedError, ProtocolError, ServiceError
 from denseface.service.protocol.messages import CaptureFailed, FaceDone
 from denseface.service.protocol.topics import Topic

@@ -2,7 +2,7 @@
 
 import pytest
 
-from denseface.service.client.blocking import Client
+from denseface.service.client import Client
 from denseface.service.errors import UnknownCaptureError
 from denseface.service.security.keys import read_pair
 from tests.system.guarded import Peer, guarded_hub, press_through

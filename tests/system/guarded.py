@@ -14,7 +14,7 @@ from pathlib import Path
 import zmq
 from zmq.utils.monitor import parse_monitor_message
 
-from denseface.service.client.blocking import Client
+from denseface.service.client import Client
 from denseface.service.protocol import messages
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.wire import Packet, decode_from_hub, encode

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import psutil
 
-from denseface.service.client.blocking import Client
+from denseface.service.client import Client
 from denseface.service.protocol.messages import Status
 from tests.waiting import until
 

@@ -6,7 +6,7 @@ from contextlib import aclosing
 import numpy as np
 import pytest
 
-from denseface.service.client.aio import AsyncClient
+from denseface.service.client import AsyncClient
 from denseface.service.errors import KeyRefusedError, RequestFailedError
 from denseface.service.security.allow_list import Role, revoke
 from tests.system.guarded import guarded_hub, press_through

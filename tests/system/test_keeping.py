@@ -13,8 +13,7 @@ import pytest
 import zmq
 
 from denseface.recon.settings import Settings
-from denseface.service.client.blocking import Client
-from denseface.service.client.operator import Operator
+from denseface.service.client import Client, Operator
 from denseface.service.errors import PressRefusedError, UnknownCaptureError
 from denseface.service.hub.hub import settings_hash
 from denseface.service.protocol.messages import (

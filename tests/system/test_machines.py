@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from denseface.service.client.blocking import Client
+from denseface.service.client import Client
 from denseface.service.export.formats import load_face
 from denseface.service.security.allow_list import Role, allow
 from denseface.service.security.keys import new_pair, read_public

@@ -9,7 +9,7 @@ from contextlib import suppress
 import pytest
 import zmq
 
-from denseface.service.client.operator import Operator
+from denseface.service.client import Operator
 from denseface.service.errors import ClientTimeoutError, KeyRefusedError
 from denseface.service.protocol import messages
 from denseface.service.protocol.wire import Packet, encode

@@ -11,7 +11,7 @@ import numpy as np
 import psutil
 import pytest
 
-from denseface.service.client.blocking import Client, PublishedFace, PublishedFailure
+from denseface.service.client import Client, PublishedFace, PublishedFailure
 from denseface.service.errors import (
     CaptureFailedError,
     ClientTimeoutError,

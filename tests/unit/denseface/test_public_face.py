@@ -28,3 +28,11 @@ def test_an_unknown_name_is_an_attribute_error():
 def test_importing_it_costs_nothing():
     code = "import sys, denseface; sys.exit(bool({'numpy', 'pydantic', 'zmq'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_the_clients_load_nothing_of_the_other_processes():
+    heavy = {"numba", "cv2", "scipy", "open3d", "sqlite3", "prometheus_client"}
+    code = ("import sys; from denseface import AsyncClient, Client\n"
+            f"found = {heavy} & set(sys.modules)\nsys.exit(repr(found) if found else 0)")
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")

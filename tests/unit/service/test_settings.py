@@ -4,8 +4,7 @@ import socket
 
 import pytest
 
-from denseface.service.client.aio import AsyncClient
-from denseface.service.client.blocking import Client
+from denseface.service.client import AsyncClient, Client
 from denseface.service.errors import AddressError, HubRunningError, SettingsError
 from denseface.service.settings import ServiceSettings, default_address
 from denseface.service.transport.addresses import (

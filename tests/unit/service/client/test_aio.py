@@ -9,8 +9,7 @@ import psutil
 import pytest
 
 import denseface
-from denseface.service.client.aio import AsyncClient
-from denseface.service.client.blocking import Client
+from denseface.service.client import AsyncClient, Client
 from denseface.service.errors import (
     ClientClosedError,
     ClientTimeoutError,

@@ -1,0 +1,77 @@
+"""What both clients open; waiting is left to them."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import zmq
+
+from denseface.service.client.exchanges import Exchanges
+from denseface.service.errors import ClientClosedError, ClientTimeoutError, RequestFailedError
+from denseface.service.protocol.messages import RequestFailed
+from denseface.service.protocol.topics import Topic
+from denseface.service.protocol.wire import Buffer, Packet
+from denseface.service.settings import ServiceSettings
+from denseface.service.transport.addresses import check_connectable, publications_of
+from denseface.service.transport.connection import Credentials, connect
+from denseface.service.transport.sockets import send_parts
+from denseface.service.transport.subscription import Subscription
+
+__all__ = ["BaseClient"]
+
+_SEND_RETRY_S = 0.05
+"""Time between two tries to send while there is no connection, seconds."""
+
+
+class BaseClient:
+    """The socket for requests, and how subscriptions are opened; see `Client`."""
+
+    def __init__(
+        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None
+    ) -> None:
+        settings = ServiceSettings.of(os.environ, address=address, key=key, hub_key=hub_key)
+        self.address = settings.address
+        self._resend_s = settings.resend_s
+        check_connectable(self.address)
+        self._publications = publications_of(self.address)
+        self._keys = Credentials.of(settings)
+        self._exchanges = Exchanges(settings.resend_s)
+        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._socket, self._monitor = connect(self._context, zmq.DEALER, self.address, self._keys)
+
+    def _check_open(self) -> None:
+        if self._context.closed:
+            raise self._closed()
+
+    def _closed(self) -> ClientClosedError:
+        return ClientClosedError(f"{self.address}: the client was closed")
+
+    def _subscribe(self, *topics: Topic) -> Subscription:
+        self._check_open()
+        return Subscription(self._context, self._publications, self._keys, topics)
+
+    def _send(self, parts: Sequence[Buffer], subscription: Subscription | None) -> float:
+        """Send a request, and give how long to wait for its answer until the next try, seconds.
+
+        Raises
+        ------
+        KeyRefusedError
+            The hub refuses this key, or does so meanwhile for the subscription: a key that was
+            revoked gets no answer.
+        """
+        self._monitor.check()
+        if subscription:
+            subscription.monitor.check()
+        return self._resend_s if send_parts(self._socket, parts) else _SEND_RETRY_S
+
+    def _checked(self, answer: Packet) -> Packet:
+        """Give an answer back, unless the hub says that it cannot answer: RequestFailedError."""
+        if isinstance(answer.message, RequestFailed):
+            raise RequestFailedError(f"{self.address}: {answer.message.message}")
+        return answer
+
+    def _no_answer(self, timeout: float) -> ClientTimeoutError:
+        why = ("is it running, or was this key revoked?" if self._keys
+               else "is `denseface up` running?")
+        return ClientTimeoutError(f"{self.address}: no answer from the hub within {timeout:g} s, "
+                                  f"{why}")
