@@ -1,4 +1,4 @@
-"""The very system that `recon.surface.rbf` solves, with one unknown for each seed, by LAPACK."""
+"""The very system that `recon.surface._rbf` solves, with one unknown for each seed, by LAPACK."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -10,8 +10,8 @@ from denseface.recon.pipeline import surface_of
 from denseface.recon.propagation.densify import densify
 from denseface.recon.propagation.uncertainty import noise_fraction
 from denseface.recon.registration import register, sample_colors
-from denseface.recon.segmentation.segment import segment_face
-from denseface.recon.surface.spacing import mean_spacing
+from denseface.recon.segmentation import segment_face
+from denseface.recon.surface import mean_spacing
 
 __all__ = ["after_segmentation", "milliseconds"]
 

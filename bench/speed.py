@@ -27,7 +27,7 @@ from bench.peer_methods import inpaint_points, rbf_points
 from denseface.recon import Preset, Settings, pipeline, reconstruct, warm
 from denseface.recon.pipeline import surface_of
 from denseface.recon.registration import register, sample_colors
-from denseface.recon.surface.rbf import MIN_SEEDS, fit_surface
+from denseface.recon.surface import MIN_SEEDS, fit_surface
 
 __all__: list[str] = []
 

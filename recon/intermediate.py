@@ -68,7 +68,7 @@ class SurfaceGrid:
         self, xs: NDArray[np.float64], ys: NDArray[np.float64]
     ) -> NDArray[np.float32]:
         """Give f, df/dx, df/dy on another axis-aligned grid: (k,), (m,) mm -> (3, m, k)."""
-        columns, rows = self.support.places(xs, ys)
+        columns, rows = self.support.coordinates(xs, ys)
         found = np.zeros((3, len(rows), len(columns)), np.float32)
         for one, known in zip(found, self.values, strict=True):
             add_resampled(one, known, rows, columns)

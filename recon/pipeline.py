@@ -21,11 +21,10 @@ from denseface.recon.numerics.threads import one_blas_thread
 from denseface.recon.propagation.densify import densify
 from denseface.recon.propagation.uncertainty import noise_fraction
 from denseface.recon.registration import register, sample_colors
-from denseface.recon.segmentation.segment import segment_face, window_of_box
+from denseface.recon.segmentation import box_window, segment_face
 from denseface.recon.settings import Settings
 from denseface.recon.support import Support
-from denseface.recon.surface.rbf import MIN_SEEDS, fit_surface
-from denseface.recon.surface.spacing import mean_spacing
+from denseface.recon.surface import MIN_SEEDS, fit_surface, mean_spacing
 
 __all__ = ["reconstruct", "surface_of"]
 
@@ -62,7 +61,7 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     clock.lap("overview")
     found = detect_face(frame.color, overview, focal_px)
     clock.lap("detection")
-    registered = register(frame, settings.depth_offset_mm, *window_of_box(overview, found.box))
+    registered = register(frame, settings.depth_offset_mm, *box_window(overview, found.box))
     clock.lap("registration")
     seeds = segment_face(registered, found.box, focal_px)
     if len(seeds.points) < MIN_SEEDS:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from denseface.recon.numerics.bilinear import exceeds
 from denseface.recon.numerics.filters import blurred
 from denseface.recon.numerics.jit import compiled
-from denseface.recon.numerics.morphology import disc, fill_holes
-from denseface.recon.numerics.scatter import bounds, mark
+from denseface.recon.numerics.morphology import binary_fill_holes, disc
+from denseface.recon.numerics.scatter import occupancy, xy_bounds
 
 __all__ = ["Support"]
 
@@ -63,12 +63,12 @@ class Support:
         """
         step = spacing / _FINENESS
         reach = (_CLOSING + _GROWTH) * spacing
-        left, right, top, bottom = bounds(points)
+        left, right, top, bottom = xy_bounds(points)
         xs, ys = (_axis(low - reach, high + reach, step)
                   for low, high in ((left, right), (top, bottom)))
-        seeded = mark(points, (xs[0], ys[0]), step, len(ys), len(xs))
+        seeded = occupancy(points, (xs[0], ys[0]), step, len(ys), len(xs))
         around = disc(_CLOSING * _FINENESS)
-        closed = fill_holes(np.asarray(cv2.dilate(seeded, around), np.uint8))
+        closed = binary_fill_holes(np.asarray(cv2.dilate(seeded, around), np.uint8))
         even = min(_EVEN * _FINENESS, _EVEN_PART * math.sqrt(np.count_nonzero(closed)))
         # Of a Gaussian that far inside a straight edge, so much is inside.
         least, pixels = (0.5 + 0.5 * math.erf((closing - _RIM * _FINENESS) / (even * math.sqrt(2)))
@@ -96,7 +96,7 @@ class Support:
         """Give the same without some of the grid's points, up to half of the way to the next."""
         return replace(self, margin=_left_out(self.margin, places, self.level))
 
-    def places(
+    def coordinates(
         self, xs: NDArray[np.float64], ys: NDArray[np.float64]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Give where on the grid columns and rows are, (k,), (m,) mm, in its points, inside it."""
@@ -120,7 +120,7 @@ class Support:
         support : (rows, columns) bool
         """
         xs, ys = (_axis(own[0], own[-1], step) for own in (self.xs, self.ys))
-        columns, rows = self.places(xs, ys)
+        columns, rows = self.coordinates(xs, ys)
         return xs, ys, exceeds(self.margin, rows, columns, self.level)
 
 

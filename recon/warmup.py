@@ -13,9 +13,9 @@ from denseface.recon.numerics.malloc import keep_freed_memory
 from denseface.recon.pipeline import surface_of
 from denseface.recon.propagation.densify import densify
 from denseface.recon.registration import register, sample_colors
-from denseface.recon.segmentation.segment import segment_face
+from denseface.recon.segmentation import segment_face
 from denseface.recon.settings import Settings
-from denseface.recon.surface.spacing import mean_spacing
+from denseface.recon.surface import mean_spacing
 
 __all__ = ["warm"]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
-from denseface.recon.numerics.linear_solve import solved
+from denseface.recon.numerics.linear_solve import solve_small
 
 __all__ = ["mirror_costs", "mirror_image", "principal_curvature_angle", "refine_plane",
            "sample_points"]
@@ -52,7 +52,7 @@ def principal_curvature_angle(points: NDArray[np.float64]) -> float:
             right[j] += term[j] * z
             for k in range(6):
                 matrix[j, k] += term[j] * term[k]
-    fit = solved(matrix, right)
+    fit = solve_small(matrix, right)
     # The second axis of a symmetric matrix of two rows.
     return math.atan2(2 * fit[4], fit[3] - fit[5]) / 2
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
-from denseface.recon.numerics.linear_solve import solved
+from denseface.recon.numerics.linear_solve import solve_small
 
 __all__ = ["fit_lighting", "sample_harmonics"]
 
@@ -104,4 +104,4 @@ def _fitted(
             total += weighted[i] * seen[i]
         right[j] = total
         matrix[j, j] += _RIDGE * count
-    return solved(matrix, right)
+    return solve_small(matrix, right)

@@ -22,7 +22,7 @@ from denseface.recon.numerics.bilinear import add_resampled
 from denseface.recon.numerics.filters import blurred, downsampled, upsampled
 from denseface.recon.numerics.normalized_convolution import normalized_convolution
 from denseface.recon.numerics.percentile import percentile
-from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, read_between, share_out
+from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, interpolate, splat
 from denseface.recon.support import Support
 
 __all__ = ["add_detail"]
@@ -138,12 +138,12 @@ class _SeedGrid:
     def sums(self, values: Image) -> tuple[Image, Image]:
         """Sum the seeds, and their values, each shared among the four pixels around it."""
         counts, sums = np.zeros(self.shape, np.float32), np.zeros(self.shape, np.float32)
-        share_out(self.columns, self.rows, values, counts, sums)
+        splat(self.columns, self.rows, values, counts, sums)
         return counts, sums
 
     def at_seeds(self, image: Image) -> Image:
         """Interpolate an image, (n,)."""
-        return read_between(image, self.columns, self.rows)
+        return interpolate(image, self.columns, self.rows)
 
 
 def _blur_after_scatter(sigma: float) -> float:

@@ -9,14 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.numerics.jit import AT_HAND, compiled, floats_at_hand, inlined
+from denseface.recon.numerics.jit import STACK_FLOATS, compiled, inlined, stack_floats
 
 __all__ = ["Trees", "flat_corners", "passing_windows"]
 
 # Below this a window's standard deviation is too small to tell a pattern: 10 grey levels.
 _LEAST_DEVIATION = 10.0
 # So many windows side by side.
-_LANES = np.uint64(AT_HAND)
+_LANES = np.uint64(STACK_FLOATS)
 
 # Indices without a sign spare the compiler's question whether one counts from the end.
 _0, _1, _2, _3, _4, _5 = (np.uint64(k) for k in range(6))
@@ -78,7 +78,7 @@ def passing_windows(
     height, width = image.shape
     part = stride // step
     # Integral images: what is above and left of each corner of a pixel.
-    flat = np.zeros((height + 1) * stride + AT_HAND, np.int32)
+    flat = np.zeros((height + 1) * stride + STACK_FLOATS, np.int32)
     squares = np.zeros((height + 1, width + 1), np.int64)
     for y in range(height):
         row_sum, row_square = 0, 0
@@ -94,8 +94,8 @@ def passing_windows(
     inner = float((window - 2) ** 2)
     half = (window - 1) / 2
     windows = (width - window) // step + 1
-    scale = np.zeros(windows + AT_HAND, np.float32)
-    refused = np.empty(windows + AT_HAND, np.int32)
+    scale = np.zeros(windows + STACK_FLOATS, np.float32)
+    refused = np.empty(windows + STACK_FLOATS, np.int32)
     one, last = (window - 1) // step + part * ((window - 1) % step), 1 // step + part * (1 % step)
     for y in range(0, height + 1 - window, step):
         # Where a window is left out, its scale is 0.
@@ -121,9 +121,9 @@ def passing_windows(
             if scale[k] == 0:
                 k += 1
                 continue
-            _refuse(flat, np.uint64(y * stride + k), scale[k:k + AT_HAND], trees, corners,
-                    refused[k:k + AT_HAND])
-            k += AT_HAND
+            _refuse(flat, np.uint64(y * stride + k), scale[k:k + STACK_FLOATS], trees, corners,
+                    refused[k:k + STACK_FLOATS])
+            k += STACK_FLOATS
         left_out = False
         for k in range(windows):
             if left_out:
@@ -150,7 +150,7 @@ def _refuse(
     weights, thresholds, outcomes, stages, least = trees
     nodes = len(thresholds) // len(outcomes)
     # The compiler knows that nothing else is there, and takes all lanes at once.
-    score = floats_at_hand()
+    score = stack_floats()
     for k in range(_LANES):
         refused[k] = len(least) if scale[k] > 0 else -1
     for stage in range(len(least)):

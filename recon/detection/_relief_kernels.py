@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
-from denseface.recon.numerics.linear_solve import solved
+from denseface.recon.numerics.linear_solve import solve_small
 
 __all__ = ["curved_cells", "fitted_bulge"]
 
@@ -34,7 +34,7 @@ def fitted_bulge(depths: NDArray[np.float64], depth_mm: float) -> tuple[float, b
         if count < _LEAST_DEPTHS or count == last:
             break
         last = count
-        fitted = solved(matrix, right)
+        fitted = solve_small(matrix, right)
         best = max(best, fitted[3])
     return best, last > 0
 

@@ -14,10 +14,10 @@ from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 from numpy.typing import NDArray
 
-__all__ = ["AT_HAND", "compiled", "floats_at_hand", "inlined"]
+__all__ = ["STACK_FLOATS", "compiled", "inlined", "stack_floats"]
 
-AT_HAND = 8
-"""Numbers in `floats_at_hand`."""
+STACK_FLOATS = 8
+"""Numbers in `stack_floats`."""
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -37,20 +37,20 @@ def inlined(function: _F) -> _F:
 
 @intrinsic
 def _room(_: Any) -> tuple[Any, Any]:
-    """Point to room for `AT_HAND` float32 on the stack."""
+    """Point to room for `STACK_FLOATS` float32 on the stack."""
     def code(context: Any, builder: Any, _signature: Any, _args: Any) -> Any:
         return cgutils.alloca_once(  # type: ignore[no-untyped-call]
             builder, context.get_value_type(types.float32),
-            size=context.get_constant(types.intp, AT_HAND))
+            size=context.get_constant(types.intp, STACK_FLOATS))
 
     return types.CPointer(types.float32)(), code  # type: ignore[no-untyped-call]
 
 
 @inlined
-def floats_at_hand() -> NDArray[np.float32]:
-    """Give (`AT_HAND`,) float32 on the stack, for compiled functions alone.
+def stack_floats() -> NDArray[np.float32]:
+    """Give (`STACK_FLOATS`,) float32 on the stack, for compiled functions alone.
 
     Of these the compiler knows that no other array shares their memory: what is read elsewhere
     while they are written need not be read anew, and a loop is vectorised without questions.
     """
-    return carray(_room(), (AT_HAND,))  # type: ignore[call-arg]
+    return carray(_room(), (STACK_FLOATS,))  # type: ignore[call-arg]

@@ -5,14 +5,14 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["solved"]
+__all__ = ["solve_small"]
 
 # Makes a system that leaves something open no division by zero, and changes nothing else.
 _RIDGE = 1e-6
 
 
 @compiled
-def solved(matrix: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+def solve_small(matrix: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
     """Solve a positive definite system by elimination; both are written over."""
     size = len(right)
     for k in range(size):

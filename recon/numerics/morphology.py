@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["at_pixels", "disc", "fill_holes", "opened"]
+__all__ = ["binary_fill_holes", "disc", "opened", "select_pixels"]
 
 _Kind = TypeVar("_Kind", bound=np.generic)
 
 
-def at_pixels(image: NDArray[_Kind], mask: NDArray[np.bool_]) -> NDArray[_Kind]:
+def select_pixels(image: NDArray[_Kind], mask: NDArray[np.bool_]) -> NDArray[_Kind]:
     """Give `image[mask]`, (H, W, k) to (n, k), three times as fast."""
     return image.reshape(-1, image.shape[2]).take(np.flatnonzero(mask), axis=0)
 
@@ -23,7 +23,7 @@ def disc(radius: float) -> NDArray[np.uint8]:
     return (steps[:, None] ** 2 + steps**2 <= radius * radius).astype(np.uint8)
 
 
-def fill_holes(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def binary_fill_holes(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Fill what is enclosed: (H, W) uint8, 0 or 1, to the same."""
     outside = cv2.copyMakeBorder(image, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     cv2.floodFill(outside, None, (0, 0), 2)

@@ -6,12 +6,12 @@ from numpy.typing import NDArray
 from denseface.recon.numerics._push_pull_kernels import average, planes, scatter
 from denseface.recon.numerics.filters import gaussian_taps
 
-__all__ = ["average_missing", "average_neighbors"]
+__all__ = ["inpaint_colors", "interpolate_colors"]
 
 _LEAST_WEIGHT = 0.05
 
 
-def average_neighbors(
+def interpolate_colors(
     colors: NDArray[np.uint8],
     places: NDArray[np.number],
     wanted: NDArray[np.bool_],
@@ -45,7 +45,7 @@ def average_neighbors(
     return image
 
 
-def average_missing(
+def inpaint_colors(
     image: NDArray[np.uint8], known: NDArray[np.bool_], missing: NDArray[np.bool_]
 ) -> None:
     """Fill an image's missing colours with the mean of the known ones around them.

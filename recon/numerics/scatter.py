@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["BILINEAR_VARIANCE", "bounds", "mark", "places", "read_between", "share_out"]
+__all__ = ["BILINEAR_VARIANCE", "interpolate", "occupancy", "pixel_coordinates", "splat",
+           "xy_bounds"]
 
 _1 = np.uint64(1)
 BILINEAR_VARIANCE = 1 / 6
@@ -13,7 +14,7 @@ BILINEAR_VARIANCE = 1 / 6
 
 
 @compiled
-def bounds(points: NDArray[np.float32]) -> tuple[float, float, float, float]:
+def xy_bounds(points: NDArray[np.float32]) -> tuple[float, float, float, float]:
     """Give the least and the largest x, the least and the largest y of (n, 3) points, n >= 1."""
     left = right = points[0, 0]
     top = bottom = points[0, 1]
@@ -24,7 +25,7 @@ def bounds(points: NDArray[np.float32]) -> tuple[float, float, float, float]:
 
 
 @compiled
-def mark(
+def occupancy(
     points: NDArray[np.float32], origin: tuple[float, float], step: float, rows: int, columns: int
 ) -> NDArray[np.uint8]:
     """Set the pixel nearest to each point, (n, 3); gives (rows, columns), 0 or 1.
@@ -42,7 +43,7 @@ def mark(
 
 
 @compiled
-def places(
+def pixel_coordinates(
     points: NDArray[np.float32], origin: tuple[float, float], step: float
 ) -> NDArray[np.float32]:
     """Give (row, column) of each point, (n, 3), between pixels: (n, 2); none before the first.
@@ -57,7 +58,7 @@ def places(
 
 
 @compiled
-def share_out(
+def splat(
     columns: NDArray[np.float32], rows: NDArray[np.float32], values: NDArray[np.float32],
     counts: NDArray[np.float32], sums: NDArray[np.float32],
 ) -> None:
@@ -83,10 +84,10 @@ def share_out(
 
 
 @compiled
-def read_between(
+def interpolate(
     image: NDArray[np.float32], columns: NDArray[np.float32], rows: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Read an image at places, (n,), bilinear; places as of `share_out`."""
+    """Read an image at places, (n,), bilinear; places as of `splat`."""
     out = np.empty(len(columns), np.float32)
     for i in range(len(columns)):
         left, above = np.uint32(columns[i]), np.uint32(rows[i])

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from denseface.recon.face import DenseCloud, Seeds
 from denseface.recon.intermediate import ColorSampler, SurfaceGrid
-from denseface.recon.numerics.push_pull import average_neighbors
-from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, places
+from denseface.recon.numerics.push_pull import interpolate_colors
+from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, pixel_coordinates
 from denseface.recon.propagation._image_kernels import collect, unset
 from denseface.recon.propagation.uncertainty import standard_error, variance_components
 from denseface.recon.support import Support
@@ -67,7 +67,7 @@ def densify(
     # Colours have no detail finer than the seeds: every so many points are enough.
     every = max(1, round(_COLOR_STEP * spacing / step))
     colors = _colors(seeds, origin, every * step, spacing, _coarser(support, every))
-    columns, rows = supported.places(xs, ys)
+    columns, rows = supported.coordinates(xs, ys)
     points, normals, colors, sigma, cells = collect(
         support, xs, ys, surface.values, rows, columns, colors, every, sigma, components.every)
     if sampler is not None:
@@ -110,8 +110,9 @@ def _colors(
     # Sharing a colour among four pixels, and reading between four, blurs by as much.
     radius = np.sqrt(max((_COLOR_RADIUS * spacing / step) ** 2 - 2 * BILINEAR_VARIANCE,
                          _LEAST_RADIUS**2))
-    return average_neighbors(seeds.colors, places(seeds.points, origin, step), wanted,
-                             float(radius), spacing / step)
+    return interpolate_colors(
+        seeds.colors, pixel_coordinates(seeds.points, origin, step), wanted,
+        float(radius), spacing / step)
 
 
 def _coarser(support: NDArray[np.bool_], every: int) -> NDArray[np.bool_]:

@@ -1,1 +1,5 @@
-"""Stage 3: the depth of the face alone, and the colours of its seeds."""
+"""Stage 3: the depth of the face alone, and its colours."""
+
+from denseface.recon.segmentation._segment import box_window, segment_face
+
+__all__ = ["box_window", "segment_face"]

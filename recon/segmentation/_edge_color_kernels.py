@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["box_sums", "take_out"]
+__all__ = ["box_sums", "remove_background"]
 
 
 @compiled
@@ -43,7 +43,7 @@ def box_sums(
 
 
 @compiled
-def take_out(
+def remove_background(
     colors: NDArray[np.uint8], own: NDArray[np.bool_], edge: NDArray[np.bool_],
     near: NDArray[np.int32], far: NDArray[np.int32], farther: NDArray[np.int32], alike: float,
     share: float, aside: float, aside_least: float, contrast: float, much: float,

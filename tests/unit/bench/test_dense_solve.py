@@ -1,7 +1,7 @@
 import numpy as np
 
 from bench.dense_solve import dense_heights
-from denseface.recon.surface.rbf import fit_surface
+from denseface.recon.surface import fit_surface
 
 
 def test_is_the_system_that_the_fast_fit_solves():

@@ -9,7 +9,7 @@ from denseface.recon.face import Seeds
 from denseface.recon.intermediate import Registration, SurfaceGrid
 from denseface.recon.registration import register
 from denseface.recon.support import Support
-from denseface.recon.surface.rbf import Surface, fit_surface
+from denseface.recon.surface import Surface, fit_surface
 from tests.unit.frames import calibration, camera, frame
 
 FOCAL = 300.0

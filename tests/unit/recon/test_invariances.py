@@ -17,7 +17,7 @@ from denseface.recon.pipeline import surface_of
 from denseface.recon.propagation.densify import densify
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.settings import Neighbors
-from denseface.recon.surface.spacing import exact_spacing, mean_spacing
+from denseface.recon.surface import exact_spacing, mean_spacing
 
 HOW = Settings()
 

@@ -22,9 +22,9 @@ from denseface.recon import (
 )
 from denseface.recon.pipeline import surface_of
 from denseface.recon.registration import register, sample_colors
-from denseface.recon.segmentation.segment import segment_face
+from denseface.recon.segmentation import segment_face
 from denseface.recon.settings import Neighbors
-from denseface.recon.surface.spacing import mean_spacing
+from denseface.recon.surface import mean_spacing
 from tests.simulator import Accuracy, Light, Person, Scene, measure, simulate
 from tests.unit.frames import resampled
 

@@ -111,7 +111,7 @@ def test_both_grids_agree_and_the_area_is_that_of_the_disc():
     area = inside.sum() * 0.4**2
     assert support.area == pytest.approx(area, rel=0.02)
     assert area == pytest.approx(np.pi * 40**2, rel=0.05)
-    columns, rows = support.places(support.xs, support.ys)
+    columns, rows = support.coordinates(support.xs, support.ys)
     np.testing.assert_array_equal(
         support.inside, exceeds(support.margin, rows, columns, 0.0))
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from denseface.recon.surface.rbf import fit_surface
+from denseface.recon.surface import fit_surface
 from tests.unit.recon.shapes import disc_seeds, with_detail
 
 SPACING = 1.3

@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter
 
 from denseface.recon.detail.mirror_plane import MirrorPlane
 from denseface.recon.detail.symmetry import symmetry_correction
-from denseface.recon.surface.rbf import fit_surface
+from denseface.recon.surface import fit_surface
 from tests.unit.recon.mirror_shapes import Pose, face_points, height
 from tests.unit.recon.shapes import with_detail
 

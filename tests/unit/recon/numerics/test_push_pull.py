@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from denseface.recon.numerics.push_pull import average_neighbors
+from denseface.recon.numerics.push_pull import interpolate_colors
 
 LEFT, RIGHT = (210, 150, 120), (40, 70, 200)
 
@@ -20,7 +20,7 @@ def two_tones(every: int, shape: tuple[int, int] = (60, 80)) -> tuple[np.ndarray
 @pytest.mark.parametrize("every", [1, 3, 4])
 def test_each_side_keeps_its_colour(every):
     colors, places = two_tones(every)
-    image = average_neighbors(colors, places, np.ones((60, 80), bool), 0.5 * every, every)
+    image = interpolate_colors(colors, places, np.ones((60, 80), bool), 0.5 * every, every)
     away = 2 * every + 1
     assert (image[:, :40 - away] == LEFT).all()
     assert (image[:, 40 + away:] == RIGHT).all()
@@ -33,7 +33,7 @@ def test_each_side_keeps_its_colour(every):
 def test_a_hole_takes_the_colours_around_it():
     colors, places = two_tones(3)
     hole = np.hypot(places[:, 0] - 30, places[:, 1] - 40) < 20
-    image = average_neighbors(colors[~hole], places[~hole], np.ones((60, 80), bool), 1.5, 3)
+    image = interpolate_colors(colors[~hole], places[~hole], np.ones((60, 80), bool), 1.5, 3)
     assert np.abs(image[30, 24].astype(int) - LEFT).max() < 10
     assert np.abs(image[30, 56].astype(int) - RIGHT).max() < 10
     middle = image[30, 39].astype(int)
@@ -41,7 +41,7 @@ def test_a_hole_takes_the_colours_around_it():
 
 
 def test_one_colour_reaches_everywhere():
-    image = average_neighbors(np.array([LEFT], np.uint8), np.array([[0, 0]]),
+    image = interpolate_colors(np.array([LEFT], np.uint8), np.array([[0, 0]]),
                               np.ones((50, 300), bool), 1, 3)
     assert (image == LEFT).all()
 
@@ -49,7 +49,7 @@ def test_one_colour_reaches_everywhere():
 def test_what_is_not_wanted_stays_black():
     wanted = np.zeros((60, 80), bool)
     wanted[20:30, 10:50] = True
-    image = average_neighbors(*two_tones(2), wanted, 1, 2)
+    image = interpolate_colors(*two_tones(2), wanted, 1, 2)
     assert not image[~wanted].any()
     assert image[wanted].any(axis=1).all()
     assert image.dtype == np.uint8
@@ -62,12 +62,12 @@ def test_a_mean_is_within_what_it_is_of(seed, count, low, span, radius):
     rng = np.random.default_rng(seed)
     colors = rng.integers(low, low + span + 1, (count, 3)).astype(np.uint8)
     places = np.column_stack([rng.integers(0, 30, count), rng.integers(0, 40, count)])
-    image = average_neighbors(colors, places, np.ones((30, 40), bool), radius, 2 * radius)
+    image = interpolate_colors(colors, places, np.ones((30, 40), bool), radius, 2 * radius)
     assert (image >= colors.min(axis=0)).all()
     assert (image <= colors.max(axis=0)).all()
 
 
 def test_nothing_to_average_is_named():
     with pytest.raises(ValueError, match="colors must not be empty"):
-        average_neighbors(np.zeros((0, 3), np.uint8), np.zeros((0, 2), int),
+        interpolate_colors(np.zeros((0, 3), np.uint8), np.zeros((0, 2), int),
                           np.ones((4, 4), bool), 1, 1)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from denseface.recon.segmentation.depth_kmeans import split_depths
+from denseface.recon.segmentation._depth_kmeans import split_depths
 
 
 def spread(groups):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from denseface.recon.segmentation._edge_color_kernels import box_sums, take_out
+from denseface.recon.segmentation._edge_color_kernels import box_sums, remove_background
 
 SKIN, WALL = np.array((200, 150, 120)), np.array((30, 220, 40))
 ALIKE, SHARE, ASIDE, ASIDE_LEAST, CONTRAST, MUCH = 10.0, 0.35, 0.5, 10.0, 60.0, 0.5
@@ -16,7 +16,7 @@ def cleared(color, inner=False, near=SKIN, far=WALL, farther=WALL, counts=(4, 7,
     own, edge = np.array([[inner]]), np.array([[True]])
     sums = (np.array([[*(count * mean), count]], np.int32)
             for mean, count in zip((near, far, farther), counts, strict=True))
-    take_out(colors, own, edge, *sums, ALIKE, SHARE, ASIDE, ASIDE_LEAST, CONTRAST, MUCH)
+    remove_background(colors, own, edge, *sums, ALIKE, SHARE, ASIDE, ASIDE_LEAST, CONTRAST, MUCH)
     return colors[0, 0].tolist(), bool(own[0, 0])
 
 

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from denseface.recon.segmentation.edge_colors import seed_colors
+from denseface.recon.segmentation._edge_colors import seed_colors
 from tests.unit.recon.shapes import NEAR, ellipsoid, registration
 
 HEAD = ellipsoid()

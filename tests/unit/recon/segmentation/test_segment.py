@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from denseface.recon.errors import FaceWithoutDepthError
-from denseface.recon.segmentation.segment import (
+from denseface.recon.segmentation._segment import (
     cluster_depths,
     crop_to_box,
     keep_face,

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from denseface.recon.errors import TooLittleDepthError
-from denseface.recon.surface.rbf import MIN_SEEDS, fit_surface
+from denseface.recon.surface import MIN_SEEDS, fit_surface
 from tests.unit.recon.dense_reference import dense_heights
 
 

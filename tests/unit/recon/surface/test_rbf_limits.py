@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from denseface.recon.errors import TooLittleDepthError
-from denseface.recon.surface.rbf import MIN_SEEDS, fit_surface
+from denseface.recon.surface import MIN_SEEDS, fit_surface
 from tests.unit.recon.dense_reference import dense_heights
 
 SEEDS = st.integers(0, 2**32 - 1)

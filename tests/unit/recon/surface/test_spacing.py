@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from denseface.recon.settings import Neighbors
-from denseface.recon.surface.spacing import (
+from denseface.recon.surface._spacing import (
     exact_spacing,
     lattice_spacing,
     mean_spacing,

@@ -12,23 +12,23 @@ from denseface.recon.errors import FaceWithoutDepthError
 from denseface.recon.face import Box, Seeds
 from denseface.recon.intermediate import Registration
 from denseface.recon.numerics.components import large_components
-from denseface.recon.numerics.morphology import fill_holes, opened
+from denseface.recon.numerics.morphology import binary_fill_holes, opened
 from denseface.recon.numerics.percentile import percentile
-from denseface.recon.segmentation._kernels import (
-    connect,
-    cut_beside,
-    cut_depth,
-    cut_under,
-    long_axis,
-    nearest_to,
+from denseface.recon.segmentation._depth_kmeans import split_depths
+from denseface.recon.segmentation._edge_colors import seed_colors
+from denseface.recon.segmentation._region_kernels import (
+    nearest_pixel,
+    principal_axis,
+    priority_flood,
     row_medians,
-    within,
-    within_reach,
+    square_mask,
+    superellipse_mask,
+    trim_below_drop,
+    trim_beside_rise,
+    trim_to_profile,
 )
-from denseface.recon.segmentation.depth_kmeans import split_depths
-from denseface.recon.segmentation.edge_colors import seed_colors
 
-__all__ = ["cluster_depths", "crop_to_box", "keep_face", "segment_face", "window_of_box"]
+__all__ = ["box_window", "cluster_depths", "crop_to_box", "keep_face", "segment_face"]
 
 # The cascades' box ends inside the forehead and near the chin, and sits aside of a turned face:
 # how far a face reaches from its centre, in widths of the box.
@@ -118,7 +118,7 @@ def segment_face(registered: Registration, box: Box, focal_px: float) -> Seeds:
                  seed_colors(registered, face, _solid(face)), pixels)
 
 
-def window_of_box(registered: Registration, box: Box) -> tuple[slice, slice]:
+def box_window(registered: Registration, box: Box) -> tuple[slice, slice]:
     """Give the rows and columns of the depth image that hold all a face's box can show.
 
     Parameters
@@ -154,7 +154,7 @@ def crop_to_box(registered: Registration, box: Box) -> NDArray[np.bool_]:
     Gives (H, W) bool.
     """
     reach = box[2] * np.array((_REACH_SIDE, _REACH_UP, _REACH_DOWN))
-    return within_reach(registered.valid, registered.pixels, _middle(box),
+    return superellipse_mask(registered.valid, registered.pixels, _middle(box),
                         reach.astype(np.float32))
 
 
@@ -191,21 +191,21 @@ def keep_face(
     wanted = cluster & ~cover
     start = _nearest_pixel(registered, wanted, box)
     middle, width = _middle(box), box[2]
-    upright = _upright(z, within(wanted, registered.pixels, middle, _SLANT_PART * width))
+    upright = _upright(z, square_mask(wanted, registered.pixels, middle, _SLANT_PART * width))
     face = _connected(upright, wanted, cover, start, px)
     hand = _before(z, registered.valid, face, px)
     if hand.any():
         cover |= hand
         face = _connected(upright, wanted, cover, start, px)
-    inner = within(face, registered.pixels, middle, _FRONT_PART * width)
+    inner = square_mask(face, registered.pixels, middle, _FRONT_PART * width)
     inner = inner if inner.any() else face
     front = percentile(z[inner], 2)
     box_mm = width * front / focal_px
-    cut_beside(face, z, *start, round(_SIDE * box_mm * px), _SIDE_RISE_MM)
-    axis = long_axis(face & (upright < percentile(upright[inner], 2) + np.float32(_OVAL_MM)))
-    cut_under(face, z, *start, round(_CHIN * box_mm * px), _CHIN_DROP_MM,
+    trim_beside_rise(face, z, *start, round(_SIDE * box_mm * px), _SIDE_RISE_MM)
+    axis = principal_axis(face & (upright < percentile(upright[inner], 2) + np.float32(_OVAL_MM)))
+    trim_below_drop(face, z, *start, round(_CHIN * box_mm * px), _CHIN_DROP_MM,
               max(round(_CHIN_GAP_MM * px), _BRIDGE_PX))
-    cut_depth(face, z, registered.pixels, front, middle, axis, width * _BELOW,
+    trim_to_profile(face, z, registered.pixels, front, middle, axis, width * _BELOW,
               min(max(box_mm, _NARROWEST_MM), _BROADEST_MM) * _BEHIND)
     return face & _smooth_outline(
         face | cover, registered.valid & ~face, start, _EAR * box_mm * px, px)
@@ -229,8 +229,8 @@ def _connected(
     z: NDArray[np.float32], wanted: NDArray[np.bool_], cover: NDArray[np.bool_],
     start: tuple[int, int], px: float,
 ) -> NDArray[np.bool_]:
-    return connect(z, wanted, cover, *start, max(_STEP_MM, _STEEPEST / px), _RISE_MM, _BRIDGE_PX,
-                   max(round(_COVERED_MM * px), _BRIDGE_PX))
+    return priority_flood(z, wanted, cover, *start, max(_STEP_MM, _STEEPEST / px), _RISE_MM,
+                          _BRIDGE_PX, max(round(_COVERED_MM * px), _BRIDGE_PX))
 
 
 def _frames_of_glasses(
@@ -269,7 +269,7 @@ def _nearest_pixel(
     registered: Registration, among: NDArray[np.bool_], box: Box
 ) -> tuple[int, int]:
     """The depth pixel of `among` that is seen nearest the middle of the box."""
-    row, column = nearest_to(among, registered.visible, registered.pixels, _middle(box))
+    row, column = nearest_pixel(among, registered.visible, registered.pixels, _middle(box))
     if row < 0:
         raise FaceWithoutDepthError("no depth was measured where the colour camera sees the face")
     return row, column
@@ -303,4 +303,4 @@ def _smooth_outline(
 def _solid(face: NDArray[np.bool_]) -> NDArray[np.uint8]:
     """The face's area, (H, W) uint8, 0 or 1, its holes filled."""
     closed = cv2.morphologyEx(face.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    return fill_holes(np.asarray(closed, np.uint8))
+    return binary_fill_holes(np.asarray(closed, np.uint8))

@@ -1,16 +1,16 @@
 import numpy as np
 import pytest
 
-from denseface.recon.segmentation._kernels import (
-    connect,
-    cut_beside,
-    cut_depth,
-    cut_under,
-    long_axis,
-    nearest_to,
+from denseface.recon.segmentation._region_kernels import (
+    nearest_pixel,
+    principal_axis,
+    priority_flood,
     row_medians,
-    within,
-    within_reach,
+    square_mask,
+    superellipse_mask,
+    trim_below_drop,
+    trim_beside_rise,
+    trim_to_profile,
 )
 
 STEP, RISE, GAP, COVERED = 12.0, 25.0, 5, 12
@@ -21,7 +21,8 @@ def followed(z, hidden=(), wanted=None):
     z = np.array([z], np.float32)
     cover = np.zeros(z.shape, bool)
     cover[0, list(hidden)] = True
-    found = connect(z, z > 0 if wanted is None else wanted, cover, 0, 0, STEP, RISE, GAP, COVERED)
+    found = priority_flood(z, z > 0 if wanted is None else wanted, cover, 0, 0, STEP, RISE, GAP,
+                           COVERED)
     return "".join(".x"[int(one)] for one in found[0])
 
 
@@ -48,7 +49,7 @@ def test_a_surface_goes_on_behind_what_covers_it():
 def test_what_is_not_wanted_is_not_followed():
     z = np.full((1, 5), 700, np.float32)
     wanted = np.array([[True, True, False, True, True]])
-    found = connect(z, wanted, np.zeros(z.shape, bool), 0, 0, STEP, RISE, GAP, COVERED)
+    found = priority_flood(z, wanted, np.zeros(z.shape, bool), 0, 0, STEP, RISE, GAP, COVERED)
     assert found.tolist() == [[True, True, False, False, False]]
 
 
@@ -62,7 +63,7 @@ def test_the_reach_is_a_superellipse():
     pixels = seen_at(81)
     (u, v), (side, up, down) = (100.0, 150.0), (75, 60, 100)
     valid = pixels[..., 0] < 150
-    inside = within_reach(valid, pixels, (u, v), np.array((side, up, down), np.float32))
+    inside = superellipse_mask(valid, pixels, (u, v), np.array((side, up, down), np.float32))
     below = pixels[..., 1] - v
     expected = (np.abs((pixels[..., 0] - u) / side) ** 2.5
                 + np.abs(below / np.where(below < 0, up, down)) ** 2.5)
@@ -75,7 +76,7 @@ def test_a_square_is_as_wide_as_it_is_high():
     among = np.random.default_rng(0).random((40, 40)) < 0.7
     expected = among & (np.abs(pixels - (51, 90)) < 25).all(axis=2)
     assert expected.any()
-    np.testing.assert_array_equal(within(among, pixels, (51.0, 90.0), 25.0), expected)
+    np.testing.assert_array_equal(square_mask(among, pixels, (51.0, 90.0), 25.0), expected)
 
 
 def test_the_nearest_is_one_that_is_seen():
@@ -83,8 +84,8 @@ def test_the_nearest_is_one_that_is_seen():
     rng = np.random.default_rng(1)
     among, visible = rng.random((2, 40, 40)) < 0.3
     away = np.where(among & visible, np.hypot(*(pixels - (51.3, 90.1)).transpose(2, 0, 1)), np.inf)
-    assert nearest_to(among, visible, pixels, (51.3, 90.1)) == divmod(int(away.argmin()), 40)
-    assert nearest_to(among, np.zeros_like(among), pixels, (51.3, 90.1)) == (-1, -1)
+    assert nearest_pixel(among, visible, pixels, (51.3, 90.1)) == divmod(int(away.argmin()), 40)
+    assert nearest_pixel(among, np.zeros_like(among), pixels, (51.3, 90.1)) == (-1, -1)
 
 
 def test_each_second_of_the_rows_that_hold_some_has_a_median():
@@ -103,12 +104,12 @@ def test_the_long_axis_is_that_of_an_ellipse(degrees):
     row, column = np.mgrid[-60:60, -70:80]
     down, right = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     along, across = down * row + right * column, right * row - down * column
-    np.testing.assert_allclose(long_axis((along / 45) ** 2 + (across / 30) ** 2 < 1),
+    np.testing.assert_allclose(principal_axis((along / 45) ** 2 + (across / 30) ** 2 < 1),
                                (down, right), atol=0.01)
 
 
 def test_without_a_longer_way_the_axis_points_down():
-    assert long_axis(np.ones((9, 9), bool)) == (1.0, 0.0)
+    assert principal_axis(np.ones((9, 9), bool)) == (1.0, 0.0)
 
 
 def test_depth_is_cut_downward_or_along_the_axis_whichever_is_farther():
@@ -117,7 +118,8 @@ def test_depth_is_cut_downward_or_along_the_axis_whichever_is_farther():
     middle, axis = (80.0, 130.0), (np.cos(0.5), np.sin(0.5))
     face = np.ones(z.shape, bool)
     # 50 mm behind the front are allowed up to 10 below.
-    cut_depth(face, z, pixels, 700.0, middle, axis, np.array((0.0, 20.0)), np.array((100.0, 0.0)))
+    trim_to_profile(face, z, pixels, 700.0, middle, axis, np.array((0.0, 20.0)),
+                    np.array((100.0, 0.0)))
     u, v = (pixels - middle).transpose(2, 0, 1)
     np.testing.assert_array_equal(face, np.maximum(v, axis[0] * v + axis[1] * u) < 10)
 
@@ -128,7 +130,7 @@ def stepped(drop_mm, *, gap=0, at=12):
     z[at:] += drop_mm
     face = np.ones(z.shape, bool)
     face[at:at + gap] = False
-    cut_under(face, z, 2, 10, 5, 30.0, 4)
+    trim_below_drop(face, z, 2, 10, 5, 30.0, 4)
     return face
 
 
@@ -149,7 +151,7 @@ def test_beyond_a_step_nothing_comes_back():
     z = np.full((24, 1), 700, np.float32)
     z[12:15] = 750
     face = np.ones(z.shape, bool)
-    cut_under(face, z, 0, 0, 5, 30.0, 4)
+    trim_below_drop(face, z, 0, 0, 5, 30.0, 4)
     assert face[:12].all()
     assert not face[12:].any()
 
@@ -162,7 +164,7 @@ def test_what_comes_nearer_again_beside_a_face_is_cut_on_straight_ways_alone(mir
     face = np.ones(z.shape, bool)
     start = 40 - 10 if mirrored else 10
     z, face = (np.ascontiguousarray(one[:, ::-1]) if mirrored else one for one in (z, face))
-    cut_beside(face, z, 10, start, 8, 12.0)
+    trim_beside_rise(face, z, 10, start, 8, 12.0)
     cut = ~(face[:, ::-1] if mirrored else face)
     np.testing.assert_array_equal(cut, (aside > 17) & (np.abs(row - 10) <= aside))
 
@@ -172,5 +174,5 @@ def test_nearer_than_that_a_face_may_rise_again_and_elsewhere_it_may_a_little():
     z[0, 3:6] = 740                                    # beside a nose
     z[0, 20:] = 690
     face = np.ones(z.shape, bool)
-    cut_beside(face, z, 0, 0, 8, 12.0)
+    trim_beside_rise(face, z, 0, 0, 8, 12.0)
     assert face.all()

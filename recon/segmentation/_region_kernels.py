@@ -5,14 +5,23 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["connect", "cut_beside", "cut_depth", "cut_under", "long_axis",
-           "nearest_to", "row_medians", "within", "within_reach"]
+__all__ = [
+    "nearest_pixel",
+    "principal_axis",
+    "priority_flood",
+    "row_medians",
+    "square_mask",
+    "superellipse_mask",
+    "trim_below_drop",
+    "trim_beside_rise",
+    "trim_to_profile",
+]
 
 _EMPTY, _HIDDEN, _WANTED, _FOUND, _BLOCKED = 0, 1, 2, 3, 4
 
 
 @compiled
-def within_reach(
+def superellipse_mask(
     valid: NDArray[np.bool_], pixels: NDArray[np.float32], middle: tuple[float, float],
     reach: NDArray[np.float32],
 ) -> NDArray[np.bool_]:
@@ -40,7 +49,7 @@ def within_reach(
 
 
 @compiled
-def within(
+def square_mask(
     among: NDArray[np.bool_], pixels: NDArray[np.float32], middle: tuple[float, float],
     reach: float,
 ) -> NDArray[np.bool_]:
@@ -57,7 +66,7 @@ def within(
 
 
 @compiled
-def nearest_to(
+def nearest_pixel(
     among: NDArray[np.bool_], visible: NDArray[np.bool_], pixels: NDArray[np.float32],
     middle: tuple[float, float],
 ) -> tuple[int, int]:
@@ -98,7 +107,7 @@ def row_medians(
 
 
 @compiled
-def connect(
+def priority_flood(
     z: NDArray[np.float32],
     wanted: NDArray[np.bool_],
     hidden: NDArray[np.bool_],
@@ -181,7 +190,7 @@ def connect(
 
 
 @compiled
-def long_axis(among: NDArray[np.bool_]) -> tuple[float, float]:
+def principal_axis(among: NDArray[np.bool_]) -> tuple[float, float]:
     """Give the direction, (down, right), in which some pixels reach farthest, by second moments.
 
     A unit vector that never points up; straight down where they reach alike in all directions.
@@ -206,7 +215,7 @@ def long_axis(among: NDArray[np.bool_]) -> tuple[float, float]:
 
 
 @compiled
-def cut_depth(
+def trim_to_profile(
     face: NDArray[np.bool_],
     z: NDArray[np.float32],
     pixels: NDArray[np.float32],
@@ -240,7 +249,7 @@ def cut_depth(
 
 
 @compiled
-def cut_under(
+def trim_below_drop(
     face: NDArray[np.bool_], z: NDArray[np.float32], start_row: int, start_column: int,
     beyond: int, drop: float, reach: int,
 ) -> None:
@@ -273,7 +282,7 @@ def cut_under(
 
 
 @compiled
-def cut_beside(
+def trim_beside_rise(
     face: NDArray[np.bool_], z: NDArray[np.float32], start_row: int, start_column: int,
     beyond: int, rise: float,
 ) -> None:

@@ -5,9 +5,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.intermediate import Registration
-from denseface.recon.numerics.morphology import at_pixels
-from denseface.recon.numerics.push_pull import average_missing
-from denseface.recon.segmentation._edge_color_kernels import box_sums, take_out
+from denseface.recon.numerics.morphology import select_pixels
+from denseface.recon.numerics.push_pull import inpaint_colors
+from denseface.recon.segmentation._edge_color_kernels import box_sums, remove_background
 
 __all__ = ["seed_colors"]
 
@@ -56,7 +56,7 @@ def seed_colors(
     solid : (H, W) uint8, 0 or 1, the same with its holes filled: holes have no outline
     """
     if not face.any():
-        return at_pixels(registered.colors, face)
+        return select_pixels(registered.colors, face)
     window = _window(face, _MARGIN_PX)
     face, solid = face[window], solid[window]
     colors = registered.colors[window].copy()
@@ -64,21 +64,21 @@ def seed_colors(
     inner = seen & (cv2.erode(solid, _RIM) > 0)
     inner = inner if inner.any() else seen
     if not inner.any():
-        return at_pixels(colors, face)
+        return select_pixels(colors, face)
     deep = inner & (cv2.erode(solid, _FRAYED) > 0)
     deep = deep if deep.any() else inner
     behind = _behind(registered, window, face, solid)
     own = inner.copy()
     edge = seen & ~deep
-    take_out(colors, own, edge, box_sums(colors, deep, edge, _INSIDE // 2),
+    remove_background(colors, own, edge, box_sums(colors, deep, edge, _INSIDE // 2),
              box_sums(colors, behind, edge, _BESIDE // 2),
              box_sums(colors, behind, edge, _FARTHER // 2), _ALIKE, _SHARE, _ASIDE, _ASIDE_LEAST,
              _CONTRAST, _MUCH)
     # What is missing is found in the face alone.
     close = _window(face, 0)
     colors, own, face = colors[close].copy(), own[close].copy(), face[close].copy()
-    average_missing(colors, own, face & ~own)
-    return at_pixels(colors, face)
+    inpaint_colors(colors, own, face & ~own)
+    return select_pixels(colors, face)
 
 
 def _window(face: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
