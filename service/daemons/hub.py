@@ -111,7 +111,7 @@ class _Loop:
                 self._give_out(outputs)
             for incoming in self._listeners.receive(max(0, math.ceil((due - now) * 1000))):
                 self._take_in(incoming)
-            if self._writer.any_ended():
+            if self._writer.has_results():
                 self._give_out(self._hub.written(time.monotonic()))
             stop.drain()
         # What is being written is kept and said; the sockets linger for it.

@@ -34,8 +34,8 @@ from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage.base import Store
-from denseface.service.storage.records import FaceAbout, FrameAbout
+from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage.records import FaceMetadata, FrameMetadata
 from denseface.service.storage.writer import InlineWriter, Writer, WriteResult
 
 __all__ = ["Hub", "settings_hash"]
@@ -63,7 +63,7 @@ class Hub:
     """
 
     def __init__(
-        self, store: Store, settings: ServiceSettings, recon: Settings,
+        self, store: FolderStore, settings: ServiceSettings, recon: Settings,
         figures: Figures | None = None, rejections: Rejections | None = None,
         writer: Writer | None = None, opened: float = -math.inf,
     ) -> None:
@@ -132,23 +132,23 @@ class Hub:
 
     def _process_writes(self, now: float) -> Iterator[Output]:
         """Do what has become possible."""
-        written = self._writer.take()
+        written = self._writer.take_results()
         while True:
             yield from self._written(now, written)
             yield from self._jobs.dispatch(now)
-            written = self._writer.take()
+            written = self._writer.take_results()
             if not written:
                 return
 
     def _written(self, now: float, written: Sequence[WriteResult]) -> Iterator[Output]:
         yield from self._presses.written(
-            [one for one in written if isinstance(one.draft.about, FrameAbout)])
+            [one for one in written if isinstance(one.pending.metadata, FrameMetadata)])
         yield from self._jobs.written(
-            now, [one for one in written if isinstance(one.draft.about, FaceAbout)])
+            now, [one for one in written if isinstance(one.pending.metadata, FaceMetadata)])
 
     def _settle(self, now: float) -> Iterator[Output]:
-        self._writer.settle()
-        yield from self._written(now, self._writer.take())
+        self._writer.wait()
+        yield from self._written(now, self._writer.take_results())
 
     def tick(self, now: float) -> list[Output]:
         """Do what is due: time-outs, silent peers, removals, status.

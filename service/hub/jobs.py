@@ -17,7 +17,8 @@ from denseface.service.protocol.outgoing import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.failpoints import failpoint
-from denseface.service.storage.base import CaptureRow, Store
+from denseface.service.storage.base import CaptureRow
+from denseface.service.storage.folder_store import FolderStore
 from denseface.service.storage.writer import Writer, WriteResult
 
 __all__ = ["Jobs"]
@@ -31,7 +32,7 @@ class Jobs:
     """Frames that wait for a worker or are held by one."""
 
     def __init__(
-        self, store: Store, writer: Writer, peers: Peers, attempts: int,
+        self, store: FolderStore, writer: Writer, peers: Peers, attempts: int,
         publish: Callable[[str], Iterator[Output]], rejections: Rejections,
     ) -> None:
         """Take up what the store has unfinished; `publish` announces an outcome."""
@@ -177,7 +178,7 @@ class Jobs:
         for capture_id in reversed(capture_ids):
             worker.jobs.remove(capture_id)
             try:
-                self._store.take_back_attempt(capture_id)
+                self._store.undo_attempt(capture_id)
             except StoreError as error:
                 self._log.warning("attempt not taken back", reason=str(error))
             self._retry(capture_id, "HandedBack", "the worker that held it was stopped")
@@ -187,7 +188,7 @@ class Jobs:
     ) -> Iterator[Output]:
         try:
             kept = self._store.frame(capture_id)
-            settings = Settings.model_validate_json(kept.about.settings)
+            settings = Settings.model_validate_json(kept.metadata.settings)
         except (CorruptFileError, ValidationError) as error:
             yield from self._give_up(capture_id, type(error).__name__, str(error))
             return

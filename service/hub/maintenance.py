@@ -13,7 +13,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage.base import Store
+from denseface.service.storage.folder_store import FolderStore
 
 __all__ = ["Maintenance"]
 
@@ -30,7 +30,7 @@ class Maintenance:
     """Retention, dead letters, purges."""
 
     def __init__(
-        self, store: Store, settings: ServiceSettings, presses: Presses, jobs: Jobs,
+        self, store: FolderStore, settings: ServiceSettings, presses: Presses, jobs: Jobs,
         outcomes: Outcomes, counters: Counters,
     ) -> None:
         self._store = store

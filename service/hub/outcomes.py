@@ -8,7 +8,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, Publish, Send, send
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
-from denseface.service.storage.base import Store
+from denseface.service.storage.folder_store import FolderStore
 
 __all__ = ["Outcomes"]
 
@@ -27,7 +27,7 @@ class Outcomes:
     """What ended, and who waits for what has not."""
 
     def __init__(
-        self, store: Store, requeue_damaged: Callable[[DamagedFaceError, bool], None]
+        self, store: FolderStore, requeue_damaged: Callable[[DamagedFaceError, bool], None]
     ) -> None:
         """Publish and give; `requeue_damaged` has a damaged face made again.
 
@@ -105,9 +105,9 @@ class Outcomes:
     def find_start(self, peer: bytes, message: messages.FindStart) -> Iterator[Output]:
         """Give the number after which the outcomes come that are asked for."""
         if message.since is not None:
-            sequence = self._store.before_time(message.since)
+            sequence = self._store.sequence_before_time(message.since)
         else:
-            sequence = self._store.before_last(message.last or 1)
+            sequence = self._store.sequence_before_last(message.last or 1)
         yield send(peer, messages.StartAt(
             request=message.request, epoch=self._store.epoch, sequence=sequence))
 

@@ -15,7 +15,7 @@ from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.bounded_dict import BoundedDict
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage.base import Store
+from denseface.service.storage.folder_store import FolderStore
 from denseface.service.storage.writer import Writer, WriteResult
 
 __all__ = ["Presses"]
@@ -45,7 +45,7 @@ class Presses:
     """Presses that wait for their frame, or for their frame to be safe."""
 
     def __init__(
-        self, store: Store, writer: Writer, peers: Peers, settings: ServiceSettings,
+        self, store: FolderStore, writer: Writer, peers: Peers, settings: ServiceSettings,
         recon: Settings, recon_hash: str, accepted: Callable[[str], None], sensors_due: float,
     ) -> None:
         """Take presses; `accepted` is told of each frame that is safe.
@@ -129,17 +129,17 @@ class Presses:
         press = self._presses[capture_id]
         press.frame_sender = peer
         try:
-            draft = self._store.frame_draft(packet, self._recon, self._recon_hash, press.key)
+            pending = self._store.prepare_frame(packet, self._recon, self._recon_hash, press.key)
         except StoreError as error:
             yield from self._not_kept(capture_id, error)
             return
-        self._writer.start(draft)
+        self._writer.start(pending)
 
     def written(self, frames: Sequence[WriteResult]) -> Iterator[Output]:
         """Say that frames are safe, or not: to the sensor and to all who pressed."""
         for one in frames:
             if isinstance(one.error, ServiceError):
-                yield from self._not_kept(one.draft.capture_id, one.error)
+                yield from self._not_kept(one.pending.capture_id, one.error)
             elif one.error:
                 raise one.error
         good = [one for one in frames if one.error is None]
@@ -147,7 +147,7 @@ class Presses:
             if len(good) > 1:  # one sync of the database for all
                 self._store.accept(good)
                 for one in good:
-                    yield from self._kept(one.draft.capture_id)
+                    yield from self._kept(one.pending.capture_id)
                 return
         except StoreError as error:
             self._log.warning("frames are kept one by one", reason=str(error))
@@ -155,10 +155,10 @@ class Presses:
             try:
                 self._store.accept([one])
             except StoreError as error:
-                one.draft.discard()
-                yield from self._not_kept(one.draft.capture_id, error)
+                one.pending.discard()
+                yield from self._not_kept(one.pending.capture_id, error)
             else:
-                yield from self._kept(one.draft.capture_id)
+                yield from self._kept(one.pending.capture_id)
 
     def _kept(self, capture_id: str) -> Iterator[Output]:
         self._log.info("accepted", capture_id=capture_id)

@@ -6,7 +6,7 @@ import structlog
 
 from denseface.service.errors import StoreError
 from denseface.service.protocol.wire import Packet
-from denseface.service.storage.base import Store
+from denseface.service.storage.folder_store import FolderStore
 from denseface.service.storage.records import PendingWrite
 from denseface.service.storage.writer import Writer, WriteResult
 
@@ -19,7 +19,7 @@ _MAX_UNSAVED = 16
 class UnsavedFaces:
     """Captures that are CONCLUDING."""
 
-    def __init__(self, store: Store, writer: Writer) -> None:
+    def __init__(self, store: FolderStore, writer: Writer) -> None:
         self._store = store
         self._writer = writer
         self._pending: dict[str, PendingWrite] = {}
@@ -34,9 +34,9 @@ class UnsavedFaces:
 
     def keep(self, result: Packet) -> None:
         """Begin to write a face; StoreError where it is of no use."""
-        draft = self._store.face_draft(result)
-        self._pending[draft.capture_id] = draft
-        self._writer.start(draft)
+        pending = self._store.prepare_face(result)
+        self._pending[pending.capture_id] = pending
+        self._writer.start(pending)
 
     def retry_refused(self) -> bool:
         """Begin anew to write what the disk refused; True where there is room for more faces.
@@ -62,7 +62,7 @@ class UnsavedFaces:
     def _written(self, faces: Sequence[WriteResult]) -> Iterator[tuple[str, Exception | None]]:
         for one in faces:
             if one.error:
-                yield one.draft.capture_id, self._not_kept(one.draft.capture_id, one.error)
+                yield one.pending.capture_id, self._not_kept(one.pending.capture_id, one.error)
         good = [one for one in faces if one.error is None]
         try:
             if len(good) > 1:  # one sync of the database for all
@@ -76,7 +76,7 @@ class UnsavedFaces:
             try:
                 self._store.finish([one])
             except StoreError as error:
-                yield one.draft.capture_id, self._not_kept(one.draft.capture_id, error)
+                yield one.pending.capture_id, self._not_kept(one.pending.capture_id, error)
             else:
                 yield self._kept(one)
 
@@ -86,8 +86,8 @@ class UnsavedFaces:
         self._refused.pop(capture_id, None)
 
     def _kept(self, written: WriteResult) -> tuple[str, None]:
-        self.drop(written.draft.capture_id)
-        return written.draft.capture_id, None
+        self.drop(written.pending.capture_id)
+        return written.pending.capture_id, None
 
     def _not_kept(self, capture_id: str, error: Exception) -> Exception:
         self._refused[capture_id] = False

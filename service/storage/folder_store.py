@@ -30,9 +30,9 @@ from denseface.service.storage.folder_lock import lock
 from denseface.service.storage.frame_cache import FrameCache
 from denseface.service.storage.record_file import naming, store_error
 from denseface.service.storage.records import (
-    FaceAbout,
+    FaceMetadata,
     FaceRecord,
-    FrameAbout,
+    FrameMetadata,
     FrameRecord,
     PendingWrite,
     read_face,
@@ -111,7 +111,7 @@ class FolderStore(Closing):
         except OSError as error:
             raise store_error(self._layout.frames, error) from error
 
-    def frame_draft(
+    def prepare_frame(
         self, frame: Packet, settings: Settings, settings_hash: str, pressed_by: str = ""
     ) -> PendingWrite:
         """Give what is to be written of a `Frame`."""
@@ -121,21 +121,21 @@ class FolderStore(Closing):
         capture_id = message.capture_id
         self._removal.finish(capture_id)
         clock = self._account.save()
-        about = FrameAbout(
+        metadata = FrameMetadata(
             accepted_at=stamp(self._account.wall()), clock=clock,
             settings=settings.model_dump_json(), settings_hash=settings_hash,
             pressed_by=pressed_by)
-        return PendingWrite(capture_id, self._layout.frame(capture_id), about, frame)
+        return PendingWrite(capture_id, self._layout.frame(capture_id), metadata, frame)
 
     def accept(self, frames: Sequence[WriteResult]) -> None:
         """Keep frames that were written, all or none."""
-        fresh = {one.draft.capture_id: _kept_frame(one) for one in frames}
+        fresh = {one.pending.capture_id: _frame_record(one) for one in frames}
         with self._database.transaction() as database:
             database.executemany(
                 "INSERT INTO captures (capture_id, state, settings_hash, frame_sha256,"
                 " accepted_at, pressed_by) VALUES (?, ?, ?, ?, ?, ?)",
-                [(capture_id, CaptureState.ACCEPTED, kept.about.settings_hash, kept.checksum,
-                  kept.about.accepted_at, kept.about.pressed_by)
+                [(capture_id, CaptureState.ACCEPTED, kept.metadata.settings_hash, kept.checksum,
+                  kept.metadata.accepted_at, kept.metadata.pressed_by)
                  for capture_id, kept in fresh.items()])
         self._fresh.add(fresh.values())
         failpoint("hub.frame.stored")
@@ -170,7 +170,7 @@ class FolderStore(Closing):
         failpoint("hub.attempt.counted")
         return int(rows[0]["attempts"])
 
-    def take_back_attempt(self, capture_id: str) -> None:
+    def undo_attempt(self, capture_id: str) -> None:
         """Count an attempt no more that was not made to its end."""
         self._database.all(
             "UPDATE captures SET attempts = max(attempts - 1, 0) WHERE capture_id = ?", capture_id)
@@ -191,7 +191,7 @@ class FolderStore(Closing):
             self._quarantine.take(path, str(error), capture_id)
             raise
 
-    def face_draft(self, result: Packet) -> PendingWrite:
+    def prepare_face(self, result: Packet) -> PendingWrite:
         """Give what is to be written of a `Result`; StoreError where it is of no use."""
         message = result.message
         if not isinstance(message, Result):
@@ -199,21 +199,21 @@ class FolderStore(Closing):
         stored = self.find(message.capture_id)
         if stored is None or stored.state is not CaptureState.ACCEPTED:
             raise StoreError(f"capture {message.capture_id} waits for no face")
-        about = FaceAbout(
+        metadata = FaceMetadata(
             accepted_at=stored.accepted_at, finished_at=stamp(self._account.wall()),
             clock=self._account.save())
         return PendingWrite(message.capture_id,
-                     self._layout.face(message.capture_id, message.settings_hash), about, result)
+                     self._layout.face(message.capture_id, message.settings_hash), metadata, result)
 
     def finish(self, faces: Sequence[WriteResult]) -> None:
         """Keep faces that were written as outcomes, in order, all or none.
 
         A second outcome of a capture changes nothing.
         """
-        fresh = {one.draft.capture_id: _kept_face(one) for one in faces}
+        fresh = {one.pending.capture_id: _face_record(one) for one in faces}
         with self._database.transaction() as database:
             for capture_id, kept in fresh.items():
-                self._conclude(database, capture_id, CaptureState.DONE, kept.about.finished_at,
+                self._conclude(database, capture_id, CaptureState.DONE, kept.metadata.finished_at,
                                face_sha256=kept.checksum)
         self._fresh_faces = fresh
         self._unread.update(fresh)
@@ -253,7 +253,7 @@ class FolderStore(Closing):
         row = self._database.one("SELECT seq FROM sqlite_sequence WHERE name = 'outcomes'")
         return int(row["seq"]) if row else 0
 
-    def before_last(self, count: int) -> int:
+    def sequence_before_last(self, count: int) -> int:
         """Give the number after which the last `count` outcomes come that are kept."""
         row = self._database.one(
             "SELECT coalesce(min(sequence) - 1, ?) AS number FROM"
@@ -261,7 +261,7 @@ class FolderStore(Closing):
             self.last_sequence(), count)
         return int(row["number"]) if row else 0
 
-    def before_time(self, since: datetime) -> int:
+    def sequence_before_time(self, since: datetime) -> int:
         """Give the number after which the outcomes come that are as old as `since`, or newer."""
         row = self._database.one(
             "SELECT coalesce(min(sequence) - 1, ?) AS number FROM outcomes WHERE finished_at >= ?",
@@ -352,15 +352,15 @@ class FolderStore(Closing):
         return Packet(FaceDone(**common, face=fresh.message.face), fresh.arrays)
 
 
-def _kept_frame(written: WriteResult) -> FrameRecord:
-    draft = written.draft
-    if not isinstance(draft.packet.message, Frame) or not isinstance(draft.about, FrameAbout):
-        raise TypeError(f"a frame is accepted, found {draft.packet.message.kind}")
-    return FrameRecord(draft.packet.message, draft.packet.arrays, draft.about, written.checksum)
+def _frame_record(written: WriteResult) -> FrameRecord:
+    packet, metadata = written.pending.packet, written.pending.metadata
+    if not isinstance(packet.message, Frame) or not isinstance(metadata, FrameMetadata):
+        raise TypeError(f"a frame is accepted, found {packet.message.kind}")
+    return FrameRecord(packet.message, packet.arrays, metadata, written.checksum)
 
 
-def _kept_face(written: WriteResult) -> FaceRecord:
-    draft = written.draft
-    if not isinstance(draft.packet.message, Result) or not isinstance(draft.about, FaceAbout):
-        raise TypeError(f"a face finishes a capture, found {draft.packet.message.kind}")
-    return FaceRecord(draft.packet.message, draft.packet.arrays, draft.about, written.checksum)
+def _face_record(written: WriteResult) -> FaceRecord:
+    packet, metadata = written.pending.packet, written.pending.metadata
+    if not isinstance(packet.message, Result) or not isinstance(metadata, FaceMetadata):
+        raise TypeError(f"a face finishes a capture, found {packet.message.kind}")
+    return FaceRecord(packet.message, packet.arrays, metadata, written.checksum)

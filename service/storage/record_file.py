@@ -24,8 +24,6 @@ from denseface.service.runtime.files import write_atomically
 __all__ = ["naming", "read_parts", "store_error", "write_parts"]
 
 _MAGIC = b"denseface spool 3\n"
-_BEFORE = b"denseface spool 2\n"
-"""The same with the SHA-256 of index and parts as checksum: read, no more written."""
 _DIGEST_BYTES = hashlib.sha256().digest_size
 _MOST_BYTES = 128 * 2**20
 """Of a file that is read: more than any message."""
@@ -88,18 +86,12 @@ def read_parts(path: Path, checksum: str | None = None) -> tuple[list[memoryview
     start = len(_MAGIC) + _DIGEST_BYTES
     magic, stated, body = data[:len(_MAGIC)], bytes(data[len(_MAGIC):start]).hex(), data[start:]
     parts = _split(body)
-    if magic == _BEFORE:
-        found = hashlib.sha256(body).hexdigest()
-    elif magic == _MAGIC and parts is not None:
+    if parts is not None and magic == _MAGIC:
         found = _checksum(bytes(body[:len(body) - sum(map(len, parts))]), parts).hex()
-    else:
-        found = ""
-    if not found or found != stated or found != (checksum or found):
-        raise CorruptFileError(
-            f"{path}: contents do not have the checksum {(checksum or stated)[:12]}...")
-    if parts is None:
-        raise CorruptFileError(f"{path}: its parts are not those that its index names")
-    return parts, found
+        if found == stated and found == (checksum or found):
+            return parts, found
+    raise CorruptFileError(
+        f"{path}: contents do not have the checksum {(checksum or stated)[:12]}...")
 
 
 def _split(data: memoryview) -> list[memoryview] | None:

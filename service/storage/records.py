@@ -14,14 +14,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from denseface.service.errors import CorruptFileError, ProtocolError
 from denseface.service.protocol.messages import Frame, Result
 from denseface.service.protocol.payload import Arrays
-from denseface.service.protocol.wire import Packet, encode
-from denseface.service.storage.former import decode_former
+from denseface.service.protocol.wire import Packet, decode_kept, encode
 from denseface.service.storage.record_file import read_parts, write_parts
 
 __all__ = [
-    "FaceAbout",
+    "FaceMetadata",
     "FaceRecord",
-    "FrameAbout",
+    "FrameMetadata",
     "FrameRecord",
     "PendingWrite",
     "read_face",
@@ -31,7 +30,7 @@ __all__ = [
 _Time = Annotated[str, Field(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}\+00:00$")]
 
 
-class _About(BaseModel):
+class _Metadata(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     accepted_at: _Time
@@ -39,7 +38,7 @@ class _About(BaseModel):
     """The store's account of its age when this was written."""
 
 
-class FrameAbout(_About):
+class FrameMetadata(_Metadata):
     """What a frame does not say of itself."""
 
     settings: str
@@ -49,7 +48,7 @@ class FrameAbout(_About):
     """Fingerprint of the key that pressed; empty where none was needed."""
 
 
-class FaceAbout(_About):
+class FaceMetadata(_Metadata):
     """What a face does not say of itself."""
 
     finished_at: _Time
@@ -61,7 +60,7 @@ class FrameRecord:
 
     message: Frame
     arrays: Arrays
-    about: FrameAbout
+    metadata: FrameMetadata
     checksum: str
 
 
@@ -71,7 +70,7 @@ class FaceRecord:
 
     message: Result
     arrays: Arrays
-    about: FaceAbout
+    metadata: FaceMetadata
     checksum: str
 
 
@@ -81,13 +80,13 @@ class PendingWrite:
 
     capture_id: str
     path: Path
-    about: FrameAbout | FaceAbout
+    metadata: FrameMetadata | FaceMetadata
     packet: Packet
 
     @property
     def steps(self) -> str:
         """How the names of its failpoints begin."""
-        return "hub.frame" if isinstance(self.about, FrameAbout) else "hub.face"
+        return "hub.frame" if isinstance(self.metadata, FrameMetadata) else "hub.face"
 
     def write(self) -> str:
         """Write the file, whose name is not yet durable, and give its checksum.
@@ -95,7 +94,7 @@ class PendingWrite:
         Raises as `write_parts`.
         """
         return write_parts(
-            self.path, [self.about.model_dump_json().encode(), *encode(self.packet)],
+            self.path, [self.metadata.model_dump_json().encode(), *encode(self.packet)],
             named=False, direct=True, steps=self.steps)
 
     def discard(self) -> None:
@@ -112,28 +111,28 @@ def read_frame(path: Path, checksum: str | None = None) -> FrameRecord:
     CorruptFileError, StoreError
         As `read_parts`; the first also where the contents are whole and no frame.
     """
-    packet, about, found = _read(path, checksum, FrameAbout)
+    packet, metadata, found = _read(path, checksum, FrameMetadata)
     if not isinstance(packet.message, Frame):
         raise CorruptFileError(f"{path}: holds a {packet.message.kind}, a frame expected")
-    return FrameRecord(packet.message, packet.arrays, about, found)
+    return FrameRecord(packet.message, packet.arrays, metadata, found)
 
 
 def read_face(path: Path, checksum: str | None = None) -> FaceRecord:
     """Read a face; errors as `read_frame`."""
-    packet, about, found = _read(path, checksum, FaceAbout)
+    packet, metadata, found = _read(path, checksum, FaceMetadata)
     if not isinstance(packet.message, Result):
         raise CorruptFileError(f"{path}: holds a {packet.message.kind}, a result expected")
-    return FaceRecord(packet.message, packet.arrays, about, found)
+    return FaceRecord(packet.message, packet.arrays, metadata, found)
 
 
-_A = TypeVar("_A", bound=_About)
+_A = TypeVar("_A", bound=_Metadata)
 
 
 def _read(path: Path, checksum: str | None, kind: type[_A]) -> tuple[Packet, _A, str]:
     parts, found = read_parts(path, checksum)
     try:
-        about = kind.model_validate_json(bytes(parts[0]) if parts else b"")
-        return decode_former(parts[1:]), about, found
+        metadata = kind.model_validate_json(bytes(parts[0]) if parts else b"")
+        return decode_kept(parts[1:]), metadata, found
     except (ProtocolError, ValidationError) as error:
         # Whole, so written by another version.
         raise CorruptFileError(f"{path}: {error}") from error

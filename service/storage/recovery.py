@@ -88,7 +88,7 @@ def _account(layout: FolderLayout, clock: Clock) -> StoreClock:
     for names, read in ((layout.all_frames(), read_frame), (layout.all_faces(), read_face)):
         for _, path in () if accounts else names:
             with suppress(StoreError):
-                accounts.append(StoreClock(clock, read(path).about.clock))
+                accounts.append(StoreClock(clock, read(path).metadata.clock))
     return max(accounts, key=lambda account: account.now(), default=StoreClock(clock, None))
 
 
@@ -149,8 +149,8 @@ class _Adoption:
     def _frame(self, capture_id: str, path: Path) -> None:
         if kept := self._read(capture_id, path, read_frame):
             self._captures[capture_id] = _Capture(
-                kept.about.accepted_at, kept.about.settings_hash, kept.checksum,
-                kept.about.pressed_by)
+                kept.metadata.accepted_at, kept.metadata.settings_hash, kept.checksum,
+                kept.metadata.pressed_by)
 
     def _face(self, capture_id: str, path: Path) -> None:
         kept = self._read(capture_id, path, read_face)
@@ -165,13 +165,13 @@ class _Adoption:
             expected = capture.settings_hash, capture.frame_sha256
         else:
             expected = made_of
-            self._captures[capture_id] = _Capture(kept.about.accepted_at, *made_of)
+            self._captures[capture_id] = _Capture(kept.metadata.accepted_at, *made_of)
         if made_of != expected:
             self._quarantine.take(path, "a face of another frame or settings", capture_id)
             return
         self._outcomes[capture_id] = _Outcome(
-            kept.about.finished_at, StoreClock.seconds_of(kept.about.clock), CaptureState.DONE,
-            face_sha256=kept.checksum)
+            kept.metadata.finished_at, StoreClock.seconds_of(kept.metadata.clock),
+            CaptureState.DONE, face_sha256=kept.checksum)
 
     def _read(
         self, capture_id: str, path: Path, read: Callable[[Path], _KeptT]

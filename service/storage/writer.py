@@ -18,7 +18,7 @@ from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.files import sync_folder
 from denseface.service.runtime.wake_pipe import WakePipe
 from denseface.service.storage.record_file import store_error
-from denseface.service.storage.records import FrameAbout, PendingWrite
+from denseface.service.storage.records import FrameMetadata, PendingWrite
 
 __all__ = ["InlineWriter", "WriteResult", "Writer", "WriterThreads", "write"]
 
@@ -28,9 +28,9 @@ _BATCH = 8
 
 @dataclass(frozen=True)
 class WriteResult:
-    """What became of a draft."""
+    """What became of a `PendingWrite`."""
 
-    draft: PendingWrite
+    pending: PendingWrite
     checksum: str = ""
     """Of its file, where there is no error."""
     error: Exception | None = None
@@ -38,41 +38,41 @@ class WriteResult:
 
 
 class Writer(Protocol):
-    """Writes the files of drafts; those of one kind in the order in which they came."""
+    """Writes files; those of one kind in the order in which they came."""
 
-    def start(self, draft: PendingWrite) -> None:
+    def start(self, pending: PendingWrite) -> None:
         """Begin to write one."""
 
-    def take(self) -> list[WriteResult]:
+    def take_results(self) -> list[WriteResult]:
         """Give what has ended since the last call."""
 
-    def settle(self) -> None:
+    def wait(self) -> None:
         """Wait until all that was begun has ended."""
 
 
-def write(drafts: Sequence[PendingWrite]) -> list[WriteResult]:
+def write(pending_writes: Sequence[PendingWrite]) -> list[WriteResult]:
     """Write and sync files, then each of their folders once; nothing stays of a frame that fails.
 
     Whatever is raised is in what is given back.
     """
-    written = [_write(draft) for draft in drafts]
-    failed = {folder: error for folder in {one.draft.path.parent for one in written
+    written = [_write(pending) for pending in pending_writes]
+    failed = {folder: error for folder in {one.pending.path.parent for one in written
                                            if one.error is None} if (error := _sync(folder))}
     written = [one if one.error else WriteResult(
-        one.draft, one.checksum, failed.get(one.draft.path.parent)) for one in written]
+        one.pending, one.checksum, failed.get(one.pending.path.parent)) for one in written]
     for one in written:
         if one.error is None:
-            failpoint(f"{one.draft.steps}.named")
-        elif isinstance(one.draft.about, FrameAbout):
-            one.draft.discard()
+            failpoint(f"{one.pending.steps}.named")
+        elif isinstance(one.pending.metadata, FrameMetadata):
+            one.pending.discard()
     return written
 
 
-def _write(draft: PendingWrite) -> WriteResult:
+def _write(pending: PendingWrite) -> WriteResult:
     try:
-        return WriteResult(draft, draft.write())
+        return WriteResult(pending, pending.write())
     except Exception as error:
-        return WriteResult(draft, error=error)
+        return WriteResult(pending, error=error)
 
 
 def _sync(folder: Path) -> StoreError | None:
@@ -89,16 +89,16 @@ class InlineWriter:
     def __init__(self) -> None:
         self._done: list[WriteResult] = []
 
-    def start(self, draft: PendingWrite) -> None:
+    def start(self, pending: PendingWrite) -> None:
         """Write."""
-        self._done += write([draft])
+        self._done += write([pending])
 
-    def take(self) -> list[WriteResult]:
+    def take_results(self) -> list[WriteResult]:
         """Give what was written."""
         done, self._done = self._done, []
         return done
 
-    def settle(self) -> None:
+    def wait(self) -> None:
         """Do nothing: it has ended."""
 
 
@@ -122,18 +122,18 @@ class WriterThreads(Closing):
         """Give the descriptor that is readable where something has ended."""
         return self._wake.fileno()
 
-    def any_ended(self) -> bool:
-        """Whether `take` would give anything; `fileno` is readable as long as it would."""
+    def has_results(self) -> bool:
+        """Whether `take_results` would give anything; `fileno` is readable as long as it would."""
         with self._changed:
             return bool(self._done)
 
-    def start(self, draft: PendingWrite) -> None:
+    def start(self, pending: PendingWrite) -> None:
         """Begin to write one."""
         with self._changed:
             self._begun += 1
-        (self._frames if isinstance(draft.about, FrameAbout) else self._faces).put(draft)
+        (self._frames if isinstance(pending.metadata, FrameMetadata) else self._faces).put(pending)
 
-    def take(self) -> list[WriteResult]:
+    def take_results(self) -> list[WriteResult]:
         """Give what has ended since the last call."""
         with self._changed:
             done, self._done = self._done, []
@@ -141,7 +141,7 @@ class WriterThreads(Closing):
                 self._wake.drain()
         return done
 
-    def settle(self) -> None:
+    def wait(self) -> None:
         """Wait until all that was begun has ended."""
         with self._changed:
             self._changed.wait_for(lambda: self._begun == 0)
@@ -154,7 +154,7 @@ class WriterThreads(Closing):
             self._changed.notify_all()
 
     def close(self) -> None:
-        """Write what was begun and end both threads; `take` still gives it."""
+        """Write what was begun and end both threads; `take_results` still gives it."""
         for lane in (self._frames, self._faces):
             lane.close()
         self._wake.close()
@@ -168,19 +168,19 @@ class _Lane:
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def put(self, draft: PendingWrite) -> None:
-        self._waiting.put(draft)
+    def put(self, pending: PendingWrite) -> None:
+        self._waiting.put(pending)
 
     def close(self) -> None:
         self._waiting.put(None)
         self._thread.join()
 
     def _run(self) -> None:
-        while (draft := self._waiting.get()) is not None:
-            batch = [draft]
+        while (pending := self._waiting.get()) is not None:
+            batch = [pending]
             with suppress(Empty):
-                while len(batch) < _BATCH and (draft := self._waiting.get_nowait()) is not None:
-                    batch.append(draft)
+                while len(batch) < _BATCH and (pending := self._waiting.get_nowait()) is not None:
+                    batch.append(pending)
             self._ended(write(batch))
-            if draft is None:
+            if pending is None:
                 return

@@ -30,7 +30,7 @@ from denseface.service.protocol.wire import Packet, decode_from_hub, encode
 from denseface.service.storage.folder_store import FolderStore
 from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, service
 from tests.unit.service.faces import small_face, small_frame
-from tests.unit.service.keep import accept, finish
+from tests.unit.service.storing import accept, finish
 from tests.waiting import until
 
 FRAME, FRAME_ARRAYS = FrameHeader.of(small_frame())

@@ -260,7 +260,7 @@ def test_a_full_disk_does_not_keep_a_job_from_being_handed_back(bench, monkeypat
     bench.accepted("a")
     bench.worker()
     with monkeypatch.context() as patch:
-        patch.setattr(bench.store, "take_back_attempt", full)
+        patch.setattr(bench.store, "undo_attempt", full)
         assert bench.say(WORKER, messages.Goodbye()) == []
     (job,) = bench.worker(OTHER)
     assert (job[1].kind, job[1].attempt) == ("job", 2)

@@ -129,7 +129,7 @@ def test_a_store_that_cannot_be_read_when_a_worker_goes_loses_no_job(bench, monk
         bench.worker(credit=0)
         with monkeypatch.context() as patch:
             patch.setattr(bench.store, "find", broken)
-            patch.setattr(bench.store, "take_back_attempt", broken)
+            patch.setattr(bench.store, "undo_attempt", broken)
             go()
         bench.wait(1.1)
         assert jobs(bench.worker(OTHER, credit=0)) == [(OTHER, "a", 2)]

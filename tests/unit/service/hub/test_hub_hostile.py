@@ -27,8 +27,8 @@ from denseface.service.settings import ServiceSettings
 from denseface.service.storage.folder_store import FolderStore
 from tests.fuzzing.corpus import Parts, encoded, kinds
 from tests.fuzzing.mutate import mutate
+from tests.unit.service.faulty import StepWriter
 from tests.unit.service.hub.test_hub import FACE, FACE_ARRAYS, FRAME, FRAME_ARRAYS
-from tests.unit.service.unkind import StepWriter
 
 SETTINGS = ServiceSettings(address="ipc:///unused", attempts=2, queue=6, reserve_mib=0)
 _MEMORY = Path("/dev/shm")  # noqa: S108
@@ -93,7 +93,7 @@ class Hostile:
         peer = self.rng.choice(PEERS)
         match self.rng.randrange(10):
             case 0 if self.rng.random() < 0.5:
-                self.writer.at_once = not self.writer.at_once
+                self.writer.immediate = not self.writer.immediate
                 self.writer.step(self.rng.randrange(4))
                 self.give(self.hub.written(self.now))
             case 0:

@@ -22,10 +22,10 @@ from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage import records, retention, writer
-from denseface.service.storage.records import FrameAbout
+from denseface.service.storage.records import FrameMetadata
 from tests.unit.service.clocks import FakeClock
+from tests.unit.service.faulty import FaultyStore, KilledError, StepWriter
 from tests.unit.service.hub.test_hub import FACE, FACE_ARRAYS, FRAME, FRAME_ARRAYS
-from tests.unit.service.unkind import KilledError, StepWriter, UnkindStore
 
 HASH = settings_hash(Settings())
 SETTINGS = ServiceSettings(
@@ -51,7 +51,7 @@ class AnyOrder(RuleBasedStateMachine):
             one.start()
         self.folder = Path(tempfile.mkdtemp(dir=_MEMORY if _MEMORY.is_dir() else None))
         self.clock = FakeClock()
-        self.store = UnkindStore(self.folder / "data", self.clock)
+        self.store = FaultyStore(self.folder / "data", self.clock)
         self.now = 0.0
         self.credit = 0
         self.request = self.frames = 0
@@ -67,7 +67,7 @@ class AnyOrder(RuleBasedStateMachine):
         try:
             self.dies_after = None
             self.store.full = False
-            self.writer.at_once = True
+            self.writer.immediate = True
             self.the_disk_goes_on(9)
             self.jobs.clear()  # those workers died; two good ones finish
             self.work()
@@ -150,9 +150,9 @@ class AnyOrder(RuleBasedStateMachine):
         except KilledError:
             self.kill()
 
-    def writes(self, draft):
-        if isinstance(draft.about, FrameAbout):
-            self.shown[draft.capture_id] = draft.packet.message.frame.calibration_origin
+    def writes(self, pending):
+        if isinstance(pending.metadata, FrameMetadata):
+            self.shown[pending.capture_id] = pending.packet.message.frame.calibration_origin
 
     @rule()
     def restart(self):
@@ -166,15 +166,15 @@ class AnyOrder(RuleBasedStateMachine):
         self.start_hub()
 
     def start_hub(self):
-        at_once = self.writer.at_once if hasattr(self, "writer") else True
+        immediate = self.writer.immediate if hasattr(self, "writer") else True
         self.writer = StepWriter(self.store.room, self.writes)
-        self.writer.at_once = at_once
+        self.writer.immediate = immediate
         self.hub = Hub(self.store, SETTINGS, Settings(), writer=self.writer)
 
-    @rule(at_once=st.booleans())
-    def the_disk_becomes(self, at_once):
+    @rule(immediate=st.booleans())
+    def the_disk_becomes(self, immediate):
         """Slow, or as quick as in other tests."""
-        self.writer.at_once = at_once
+        self.writer.immediate = immediate
 
     @rule(count=st.integers(1, 3))
     def the_disk_goes_on(self, count):
@@ -269,7 +269,7 @@ class AnyOrder(RuleBasedStateMachine):
     @rule(capture_id=ids, worker=workers, another=workers)
     def two_faces_come_before_the_first_is_safe(self, capture_id, worker, another):
         self.all_goes_well_until_the_job(capture_id, worker)
-        self.writer.at_once = False
+        self.writer.immediate = False
         copies = [job for job in self.jobs.get(worker, []) if job.capture_id == capture_id]
         self.jobs.setdefault(another, []).extend(copies)
         self.result(worker)
@@ -378,7 +378,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.dies_after = None
         self.killed = True
         self.store.__exit__()
-        self.store = UnkindStore(self.folder / "data", self.clock)
+        self.store = FaultyStore(self.folder / "data", self.clock)
         self.start_hub()
         # What was safe and not yet acknowledged may be there.
         self.accepted |= self.rows() & self.taken
@@ -400,7 +400,7 @@ class AnyOrder(RuleBasedStateMachine):
                 path.write_bytes(content[:5000] + b"\xff" * 4000 + content[9000:])
         known = {path.name.partition(".")[0] for folder in ("frames", "faces")
                  for path in (self.folder / "data" / folder).iterdir()}
-        self.store = UnkindStore(self.folder / "data", self.clock)
+        self.store = FaultyStore(self.folder / "data", self.clock)
         self.start_hub()
         self.published.clear()  # another epoch
         self.accepted &= known  # a dead letter whose frame is gone is known to the rows alone

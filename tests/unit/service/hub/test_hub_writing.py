@@ -10,8 +10,8 @@ from denseface.service.hub.unsaved_faces import _MAX_UNSAVED
 from denseface.service.protocol import messages
 from denseface.service.protocol.states import CaptureState
 from denseface.service.storage.folder_store import FolderStore
+from tests.unit.service.faulty import StepWriter
 from tests.unit.service.hub.test_hub import CLIENT, OTHER, SENSOR, SETTINGS, WORKER, Bench, kinds
-from tests.unit.service.unkind import StepWriter
 
 IDS = [f"c{number}" for number in range(40)]
 
@@ -38,7 +38,7 @@ def bench(tmp_path):
     with FolderStore(tmp_path / "data") as store:
         bench = SlowBench(None, store)
         bench.writer = StepWriter(bench.room, lambda _: None)
-        bench.writer.at_once = False
+        bench.writer.immediate = False
         bench.hub = Hub(store, SETTINGS.model_copy(update={"queue": 100}), Settings(),
                         writer=bench.writer)
         bench.sensor()
@@ -104,7 +104,7 @@ def test_frames_that_wait_together_get_their_rows_together(bench, monkeypatch):
     rows, real = [], bench.store.accept
 
     def accept(frames):
-        rows.append([one.draft.capture_id for one in frames])
+        rows.append([one.pending.capture_id for one in frames])
         real(frames)
 
     monkeypatch.setattr(bench.store, "accept", accept)
@@ -116,7 +116,7 @@ def test_frames_that_wait_together_get_their_rows_together(bench, monkeypatch):
 @pytest.mark.parametrize("kind", ["accept", "finish"])
 def test_rows_that_cannot_be_written_together_are_written_one_by_one(bench, monkeypatch, kind):
     def fails_for_b(written):
-        if any(one.draft.capture_id == "b" for one in written):
+        if any(one.pending.capture_id == "b" for one in written):
             raise StoreError("the disk fails")
         real(written)
 

@@ -125,17 +125,17 @@ def test_what_grows_when_written_again_is_kept_and_passed_on():
     assert check(decode_to_hub, parts)
 
 
-def spooled(path: Path, body: bytes) -> Path:
-    path.write_bytes(b"denseface spool 2\n" + hashlib.sha256(body).digest() + body)
+def record_file(path: Path, body: bytes) -> Path:
+    path.write_bytes(b"denseface spool 3\n" + hashlib.sha256(body).digest() + body)
     return path
 
 
 @pytest.mark.parametrize("body", [
     b"", b"\1", struct.pack("<I", 2**32 - 1), struct.pack("<IQ", 1, 5) + b"four",
     struct.pack("<IQ", 1, 3) + b"four", struct.pack("<IQQ", 2, 2**64 - 1, 5) + b"four"])
-def test_a_file_that_vouches_for_a_wrong_index_is_corrupt(tmp_path, body):
-    path = spooled(tmp_path / "x.frame", body)
-    with pytest.raises(CorruptFileError, match=r"x\.frame: its parts"):
+def test_a_file_with_a_wrong_index_is_corrupt(tmp_path, body):
+    path = record_file(tmp_path / "x.frame", body)
+    with pytest.raises(CorruptFileError, match=r"x\.frame: contents"):
         read_parts(path)
 
 
@@ -168,4 +168,4 @@ def test_letters_of_z85_that_are_no_key(tmp_path, half):
 def test_a_file_larger_than_any_message_is_not_read_whole(tmp_path, monkeypatch):
     monkeypatch.setattr("denseface.service.storage.record_file._MOST_BYTES", 1000)
     with pytest.raises(CorruptFileError, match="more than 1000 bytes"):
-        read_parts(spooled(tmp_path / "x", bytes(1000)))
+        read_parts(record_file(tmp_path / "x", bytes(1000)))

@@ -1,9 +1,7 @@
 """The data folder."""
 
-import hashlib
 import os
 import stat
-import struct
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +18,7 @@ from denseface.service.storage.frame_cache import FrameCache
 from denseface.service.storage.record_file import read_parts, write_parts
 from denseface.service.storage.writer import write
 from tests.unit.service.faces import small_face, small_frame
-from tests.unit.service.keep import accept, finish
+from tests.unit.service.storing import accept, finish
 
 
 @pytest.fixture
@@ -54,7 +52,7 @@ def test_an_accepted_frame_survives_closing(tmp_path):
         assert stored is not None
         assert (stored.state, stored.attempts) == (CaptureState.ACCEPTED, 0)
         kept = store.frame("a")
-        assert Settings.model_validate_json(kept.about.settings) == settings
+        assert Settings.model_validate_json(kept.metadata.settings) == settings
         depth = kept.message.frame.join(kept.arrays).depth
         np.testing.assert_array_equal(depth, small_frame().depth)
         assert store.start_attempt("a") == 1
@@ -79,9 +77,9 @@ def test_a_row_comes_after_its_file_is_safe(store, monkeypatch):
 
     monkeypatch.setattr("denseface.service.storage.record_file.os.fsync", synced)
     monkeypatch.setattr(Path, "replace", renamed)
-    draft = store.frame_draft(frame("a"), Settings(), "0f")
+    pending = store.prepare_frame(frame("a"), Settings(), "0f")
     monkeypatch.setattr(store._database, "transaction", begun)
-    store.accept(write([draft]))
+    store.accept(write([pending]))
     assert steps == ["file", "a.frame", "folder", "row"]
     assert store._database.one("PRAGMA synchronous")[0] == 2
     assert store._database.one("PRAGMA journal_mode")[0] == "wal"
@@ -154,16 +152,6 @@ def test_parts_come_back_as_they_were(tmp_path):
     assert read_parts(tmp_path / "x", checksum) == read_parts(tmp_path / "x") == (parts, checksum)
     with pytest.raises(CorruptFileError):
         read_parts(tmp_path / "x", "0" * 64)
-
-
-def test_parts_of_the_format_before_are_read(tmp_path):
-    body = struct.pack("<I2Q", 2, 1, 3) + b"a" + b"bcd"
-    digest = hashlib.sha256(body)
-    (tmp_path / "x").write_bytes(b"denseface spool 2\n" + digest.digest() + body)
-    assert read_parts(tmp_path / "x", digest.hexdigest()) == ([b"a", b"bcd"], digest.hexdigest())
-    (tmp_path / "x").write_bytes(b"denseface spool 2\n" + digest.digest() + body[:-1] + b"x")
-    with pytest.raises(CorruptFileError, match="contents"):
-        read_parts(tmp_path / "x")
 
 
 def test_no_flipped_bit_and_no_swap_of_parts_goes_unseen(tmp_path):

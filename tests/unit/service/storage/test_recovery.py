@@ -17,8 +17,8 @@ from denseface.service.errors import (
 from denseface.service.protocol.states import CaptureState
 from denseface.service.storage.folder_store import FolderStore
 from tests.unit.service.clocks import FakeClock
-from tests.unit.service.keep import accept, finish
 from tests.unit.service.storage.test_folder_store import frame, result
+from tests.unit.service.storing import accept, finish
 
 DAY = 86400.0
 
@@ -71,7 +71,7 @@ def test_a_damaged_database_is_made_again_from_the_files(data, damage):
         assert store.outcome_after(0).message.capture_id == "done"
         assert store.last_sequence() == 1
         assert sorted(store.unfinished()) == ["dead", "failed", "waits"]
-        assert "settings" in json.loads(store.frame("waits").about.model_dump_json())
+        assert "settings" in json.loads(store.frame("waits").metadata.model_dump_json())
     (report,) = reports(data)
     assert report["file"].endswith("captures.sqlite3")
     assert next((data / "quarantine").glob("*.captures.sqlite3")).read_bytes() == damaged

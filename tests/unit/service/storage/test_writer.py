@@ -11,8 +11,8 @@ from denseface.recon.settings import Settings
 from denseface.service.errors import DiskFullError
 from denseface.service.storage.folder_store import FolderStore
 from denseface.service.storage.writer import WriterThreads, write
-from tests.unit.service.keep import accept
 from tests.unit.service.storage.test_folder_store import frame, result
+from tests.unit.service.storing import accept
 
 
 @pytest.fixture
@@ -21,8 +21,8 @@ def store(tmp_path):
         yield store
 
 
-def draft(store, capture_id):
-    return store.frame_draft(frame(capture_id), Settings(), "0f")
+def pending(store, capture_id):
+    return store.prepare_frame(frame(capture_id), Settings(), "0f")
 
 
 def synced(monkeypatch):
@@ -43,17 +43,18 @@ def readable(writer):
 
 def test_files_that_wait_together_share_the_sync_of_their_folder(store, monkeypatch):
     accept(store, frame("z"), Settings(), "0f")
-    drafts = [draft(store, "a"), store.face_draft(result("z", store)), draft(store, "b")]
+    pending_writes = [
+        pending(store, "a"), store.prepare_face(result("z", store)), pending(store, "b")]
     steps = synced(monkeypatch)
-    written = write(drafts)
+    written = write(pending_writes)
     assert steps == ["file", "file", "file", "folder", "folder"]
-    assert [one.draft for one in written] == drafts
+    assert [one.pending for one in written] == pending_writes
     assert all(one.checksum and one.error is None for one in written)
 
 
 def test_one_that_fails_takes_none_with_it(store, monkeypatch):
-    drafts = [draft(store, name) for name in "abc"]
-    replace = type(drafts[0].path).replace
+    pending_writes = [pending(store, name) for name in "abc"]
+    replace = type(pending_writes[0].path).replace
 
     def full(path, target):
         if target.name == "b.frame":
@@ -61,13 +62,13 @@ def test_one_that_fails_takes_none_with_it(store, monkeypatch):
         return replace(path, target)
 
     monkeypatch.setattr("pathlib.Path.replace", full)
-    written = write(drafts)
+    written = write(pending_writes)
     assert [type(one.error) for one in written] == [type(None), DiskFullError, type(None)]
     assert sorted(path.name for path in store._layout.frames.iterdir()) == ["a.frame", "c.frame"]
 
 
 def test_a_folder_that_cannot_be_synced_fails_all_of_it(store, monkeypatch):
-    drafts = [draft(store, name) for name in "ab"]
+    pending_writes = [pending(store, name) for name in "ab"]
     fsync = os.fsync
 
     def no_folder(descriptor):
@@ -76,14 +77,14 @@ def test_a_folder_that_cannot_be_synced_fails_all_of_it(store, monkeypatch):
         fsync(descriptor)
 
     monkeypatch.setattr("denseface.service.storage.record_file.os.fsync", no_folder)
-    assert [type(one.error) for one in write(drafts)] == [DiskFullError, DiskFullError]
+    assert [type(one.error) for one in write(pending_writes)] == [DiskFullError, DiskFullError]
     assert not list(store._layout.frames.iterdir())
 
 
 def test_frames_do_not_wait_for_a_face_and_each_kind_stays_in_order(store, monkeypatch):
     go, waits = threading.Event(), threading.Event()
     accept(store, frame("z"), Settings(), "0f")
-    face = store.face_draft(result("z", store))
+    face = store.prepare_face(result("z", store))
     real = type(face).write
 
     def slow_for_faces(self):
@@ -96,42 +97,42 @@ def test_frames_do_not_wait_for_a_face_and_each_kind_stays_in_order(store, monke
     with WriterThreads() as writer:
         writer.start(face)
         assert waits.wait(20)
-        frames = [draft(store, name) for name in "abc"]
+        frames = [pending(store, name) for name in "abc"]
         for one in frames:
             writer.start(one)
         done = []
         while len(done) < len(frames):
             assert select.select([writer], [], [], 20)[0]
-            assert writer.any_ended()
-            done += writer.take()
-        assert [one.draft for one in done] == frames
-        assert not writer.any_ended()
+            assert writer.has_results()
+            done += writer.take_results()
+        assert [one.pending for one in done] == frames
+        assert not writer.has_results()
         assert not readable(writer)
         go.set()
-        writer.settle()
-        assert writer.any_ended()
+        writer.wait()
+        assert writer.has_results()
         assert readable(writer)
-        assert [one.draft for one in writer.take()] == [face]
-        assert not writer.any_ended()
+        assert [one.pending for one in writer.take_results()] == [face]
+        assert not writer.has_results()
         assert not readable(writer)
 
 
 def test_at_the_end_what_was_begun_is_written(store):
-    drafts = [draft(store, f"c{number}") for number in range(20)]
+    pending_writes = [pending(store, f"c{number}") for number in range(20)]
     with WriterThreads() as writer:
-        for one in drafts:
+        for one in pending_writes:
             writer.start(one)
-    assert [one.draft for one in writer.take()] == drafts
-    assert all(one.path.exists() for one in drafts)
+    assert [one.pending for one in writer.take_results()] == pending_writes
+    assert all(one.path.exists() for one in pending_writes)
 
 
 def test_what_nobody_expected_is_told_too(store, monkeypatch):
     def broken(_):
         raise RuntimeError("a mistake")
 
-    one = draft(store, "a")
+    one = pending(store, "a")
     monkeypatch.setattr(type(one), "write", broken)
     with WriterThreads() as writer:
         writer.start(one)
-        writer.settle()
-    assert isinstance(writer.take()[0].error, RuntimeError)
+        writer.wait()
+    assert isinstance(writer.take_results()[0].error, RuntimeError)

@@ -8,14 +8,14 @@ from denseface.service.storage.folder_store import FolderStore
 from denseface.service.storage.records import PendingWrite
 from denseface.service.storage.writer import WriteResult, write
 
-__all__ = ["KilledError", "StepWriter", "UnkindStore"]
+__all__ = ["FaultyStore", "KilledError", "StepWriter"]
 
 
 class KilledError(BaseException):
     """The hub ends here."""
 
 
-class UnkindStore(FolderStore):
+class FaultyStore(FolderStore):
     """Has no room where it is told so."""
 
     full = False
@@ -42,25 +42,25 @@ class UnkindStore(FolderStore):
 
 
 class StepWriter:
-    """Writes when it is told to, some files at a time; with `at_once`, as soon as it can.
+    """Writes when it is told to, some files at a time; with `immediate`, as soon as it can.
 
     Parameters
     ----------
     room : raises DiskFullError where there is none
-    writes : is told of each draft that is going to be a file
+    writes : is told of each write before it
     """
 
     def __init__(self, room: Callable[[], None], writes: Callable[[PendingWrite], None]) -> None:
-        self.at_once = True
+        self.immediate = True
         self.waiting: deque[PendingWrite] = deque()
         self._room = room
         self._writes = writes
         self._done: list[WriteResult] = []
 
-    def start(self, draft: PendingWrite) -> None:
-        self.waiting.append(draft)
-        if self.at_once:
-            self.settle()
+    def start(self, pending: PendingWrite) -> None:
+        self.waiting.append(pending)
+        if self.immediate:
+            self.wait()
 
     def step(self, count: int) -> None:
         """Write so many that wait, as one batch."""
@@ -68,15 +68,15 @@ class StepWriter:
         try:
             self._room()
         except DiskFullError as error:
-            self._done += [WriteResult(draft, error=error) for draft in batch]
+            self._done += [WriteResult(pending, error=error) for pending in batch]
             return
-        for draft in batch:  # before: the hub may be killed when one is written
-            self._writes(draft)
+        for pending in batch:  # before: the hub may be killed when one is written
+            self._writes(pending)
         self._done += write(batch)
 
-    def take(self) -> list[WriteResult]:
+    def take_results(self) -> list[WriteResult]:
         done, self._done = self._done, []
         return done
 
-    def settle(self) -> None:
+    def wait(self) -> None:
         self.step(len(self.waiting))
