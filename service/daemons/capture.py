@@ -70,14 +70,14 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None) ->
 
 
 def _close(driver: Background[RgbdFrame | None], sensor: SensorReader) -> None:
-    if not driver.ends_within(_CLOSING_S):
+    if not driver.wait(_CLOSING_S):
         structlog.get_logger("capture").error("the driver hangs", source=sensor.uri)
         os._exit(1)
     with suppress(CaptureError):
         if driver:
-            driver.take()
+            driver.result()
     driver.start(sensor.close)
-    driver.take()
+    driver.result()
 
 
 @dataclass
@@ -113,7 +113,7 @@ class _Capture:
         for packet in self._link.packets(stop, self._driver, lambda: None):
             if packet is not None:
                 self._receive(packet)
-            if self._driver.ended():
+            if self._driver.done():
                 self._called()
             elif self._driver.elapsed_s > self._settings.take_timeout_s:
                 self._log.error("the driver hangs", source=self._sensor.uri,
@@ -151,14 +151,14 @@ class _Capture:
 
     def _called(self) -> None:
         if not self._open:
-            self._driver.take()
+            self._driver.result()
             self._open = True
             self._log.info("source open", source=self._sensor.uri)
             self._ready()
             return
         looking, self._looking = self._looking, False
         try:
-            frame = self._driver.take()
+            frame = self._driver.result()
         except CaptureError as error:
             self._no_frame(error, looking=looking)
             return

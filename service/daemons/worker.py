@@ -89,10 +89,10 @@ class _Worker:
             if packet is not None:
                 self._receive(packet)
             self._deliver()
-            while self._answer is None and self._compute.ended():
+            while self._answer is None and self._compute.done():
                 self._answer = self._computed()
                 self._deliver()
-            if not self._compute.ended() and (
+            if not self._compute.done() and (
                     self._compute.elapsed_s > self._settings.job_timeout_s):
                 self._log.error("job takes too long", capture_id=self._holding(),
                                 seconds=self._compute.elapsed_s)
@@ -106,11 +106,11 @@ class _Worker:
     def finish(self) -> None:
         """End the job under way and deliver it; where that takes too long, leave it."""
         self._deliver()
-        if self._compute.withdraw():
+        if self._compute.cancel_queued():
             self._jobs.pop()
         deadline = time.monotonic() + _FINISH_S
         while self._compute:
-            while not self._compute.ends_within(min(self._settings.heartbeat_s, _FINISH_S)):
+            while not self._compute.wait(min(self._settings.heartbeat_s, _FINISH_S)):
                 if time.monotonic() >= deadline:
                     self._log.warning("job handed back", capture_id=self._holding(),
                                       seconds=round(self._compute.elapsed_s, 1))
@@ -154,7 +154,7 @@ class _Worker:
         job = self._jobs.popleft()
         self._begun()
         try:
-            face = self._compute.take()
+            face = self._compute.result()
             failpoint("worker.job.computed")
             report = face.report.model_copy(update={"capture_id": job.capture_id})
             header, arrays = FaceHeader.of(Face(face.initial, face.dense, report))

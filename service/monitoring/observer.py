@@ -76,9 +76,9 @@ class Observer(Closing):
                     self.figures.latencies.stages(), dict(subscriptions))
 
     def _measure_folder(self, now: float) -> None:
-        if self._measurement.ended():
+        if self._measurement.done():
             try:
-                self.figures.kept_bytes = self._measurement.take()
+                self.figures.kept_bytes = self._measurement.result()
             except OSError as error:
                 structlog.get_logger("hub").warning(
                     "what is kept cannot be measured", reason=str(error))

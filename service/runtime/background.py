@@ -54,17 +54,17 @@ class Background(Closing, Generic[_T]):
         self._begun = time.monotonic()
         return call()
 
-    def ended(self) -> bool:
+    def done(self) -> bool:
         """Say whether there is an end to be taken."""
         return bool(self._calls) and self._calls[0].done()
 
-    def take(self) -> _T:
+    def result(self) -> _T:
         """Wait for the first call's end and give what it gave, or raise what it raised."""
         if not self._calls:
             raise RuntimeError("no call was started")
         return self._calls.popleft().result()
 
-    def withdraw(self) -> bool:
+    def cancel_queued(self) -> bool:
         """Take back the call that waits; False where there is none, or it has begun."""
         if len(self._calls) < _MOST or not self._calls[-1].cancel():
             return False
@@ -72,10 +72,10 @@ class Background(Closing, Generic[_T]):
         return True
 
     def drain(self) -> None:
-        """Forget what woke the poll; to be called before `ended` is asked."""
+        """Forget what woke the poll; to be called before `done` is asked."""
         self._wake.drain()
 
-    def ends_within(self, seconds: float) -> bool:
+    def wait(self, seconds: float) -> bool:
         """Wait for the first call, if any; False where it takes longer."""
         return not self._calls or not wait([self._calls[0]], seconds).not_done
 

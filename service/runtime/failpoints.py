@@ -18,12 +18,13 @@ import structlog
 
 from denseface.service.errors import SettingsError
 
-__all__ = ["ACTIONS", "NAMES", "TOKENS", "VARIABLE", "arm", "failpoint"]
+__all__ = ["ACTIONS", "FAILPOINTS_VARIABLE", "FAILPOINT_NAMES", "TOKENS_VARIABLE", "arm",
+           "failpoint"]
 
-VARIABLE = "DENSEFACE_FAILPOINTS"
-TOKENS = "DENSEFACE_FAILPOINTS_TOKENS"
+FAILPOINTS_VARIABLE = "DENSEFACE_FAILPOINTS"
+TOKENS_VARIABLE = "DENSEFACE_FAILPOINTS_TOKENS"
 
-NAMES = (
+FAILPOINT_NAMES = (
     "hub.take.sent", "capture.take.received", "capture.frame.taken", "capture.frame.sent",
     "hub.frame.received", "hub.frame.written", "hub.frame.synced", "hub.frame.renamed",
     "hub.frame.named", "hub.frame.stored", "hub.frame.acknowledged", "hub.press.acknowledged",
@@ -64,24 +65,25 @@ def arm(environment: Mapping[str, str]) -> None:
     """
     _armed.clear()
     _tokens.clear()
-    text = environment.get(VARIABLE, "")
+    text = environment.get(FAILPOINTS_VARIABLE, "")
     if not text:
         return
     for entry in text.split(","):
         name, _, what = entry.partition("=")
         action, at, number = what.partition("@")
-        if name not in NAMES:
-            raise SettingsError(f"{VARIABLE}: no failpoint {name!r}, expected one of "
-                                f"{', '.join(NAMES)}")
+        if name not in FAILPOINT_NAMES:
+            raise SettingsError(f"{FAILPOINTS_VARIABLE}: no failpoint {name!r}, expected one of "
+                                f"{', '.join(FAILPOINT_NAMES)}")
         possible = [one for one in ACTIONS
                     if not one.startswith("raise") or name.endswith(_DISK)]
         if action not in possible:
-            raise SettingsError(f"{VARIABLE}: {name} cannot {action!r}, expected one of "
+            raise SettingsError(f"{FAILPOINTS_VARIABLE}: {name} cannot {action!r}, expected one of "
                                 f"{', '.join(possible)}")
         if at and not (number.isdecimal() and int(number) > 0):
-            raise SettingsError(f"{VARIABLE}: {name}={what}: expected a number from 1 after @")
+            raise SettingsError(
+                f"{FAILPOINTS_VARIABLE}: {name}={what}: expected a number from 1 after @")
         _armed[name] = _Failpoint(action, int(number) if at else None)
-    if folder := environment.get(TOKENS):
+    if folder := environment.get(TOKENS_VARIABLE):
         _tokens.append(Path(folder))
     structlog.get_logger("failpoints").warning(
         "failpoints are set: this process is to fail", failpoints=text)

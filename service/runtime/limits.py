@@ -38,7 +38,7 @@ class MemoryWatch:
         self._limit = self._ceiling = limit
         self._cut = False
 
-    def beyond(self) -> int:
+    def over_limit(self) -> int:
         """Give the bytes in use where they are too many, else 0."""
         used = self._used()
         if used > self._limit:
@@ -82,7 +82,7 @@ class DescriptorWatch:
         if soft != resource.RLIM_INFINITY and soft < wanted:
             resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
 
-    def beyond(self) -> int:
+    def over_limit(self) -> int:
         """Give the number of descriptors in use where too few are left, else 0."""
         limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
         try:

@@ -23,7 +23,7 @@ from denseface.service.security.keys import (
     write_key_file,
 )
 
-__all__ = ["AllowList", "Allowed", "Role", "allow", "revoke"]
+__all__ = ["AllowList", "AllowedKey", "Role", "allow", "revoke"]
 
 _WRITABLE_BY_OTHERS = 0o022
 
@@ -39,7 +39,7 @@ class Role(StrEnum):
 
 
 @dataclass(frozen=True)
-class Allowed:
+class AllowedKey:
     """A key that may come in."""
 
     name: str
@@ -71,7 +71,7 @@ class AllowList:
     def __init__(self, keys: Path) -> None:
         self._folder = keys / "allowed"
         self._seen: dict[str, tuple[int, ...]] | None = None
-        self._by_public: Mapping[str, Allowed] = {}
+        self._by_public: Mapping[str, AllowedKey] = {}
         self._tokens: frozenset[bytes] = frozenset()
         self.changes = 0
         """How often the list has changed since it was first read."""
@@ -82,14 +82,14 @@ class AllowList:
     def __len__(self) -> int:
         return len(self._by_public)
 
-    def __iter__(self) -> Iterator[Allowed]:
+    def __iter__(self) -> Iterator[AllowedKey]:
         return iter(self._by_public.values())
 
-    def get(self, public: str) -> Allowed | None:
+    def get(self, public: str) -> AllowedKey | None:
         """Give what a key is allowed, None where it is not."""
         return self._by_public.get(public)
 
-    def holds(self, token: bytes) -> bool:
+    def has_token(self, token: bytes) -> bool:
         """Say whether a key is still allowed, with the same roles."""
         return token in self._tokens
 
@@ -99,7 +99,7 @@ class AllowList:
         if seen == self._seen:
             return False
         before, self._seen = self._seen, seen
-        found: dict[str, Allowed] = {}
+        found: dict[str, AllowedKey] = {}
         for name in sorted(seen):
             try:
                 one = _read(self._folder / name)
@@ -137,7 +137,7 @@ class AllowList:
         return seen
 
 
-def allow(keys: Path, name: str, public: str, roles: frozenset[Role]) -> Allowed:
+def allow(keys: Path, name: str, public: str, roles: frozenset[Role]) -> AllowedKey:
     """Let a key in from now on, with these roles in place of those it had.
 
     Raises
@@ -145,7 +145,7 @@ def allow(keys: Path, name: str, public: str, roles: frozenset[Role]) -> Allowed
     KeyFileError, SettingsError
         Where the key has another name already, the name another key, or it cannot be written.
     """
-    one = Allowed(check_name(name), public, roles)
+    one = AllowedKey(check_name(name), public, roles)
     folder = private_folder(private_folder(keys) / "allowed")
     for other in AllowList(keys):
         if (other.public == public) != (other.name == name):
@@ -177,11 +177,11 @@ def _out_of_descriptors(error: BaseException | None) -> bool:
     return isinstance(error, OSError) and error.errno in OUT_OF_DESCRIPTORS
 
 
-def _read(path: Path) -> Allowed:
+def _read(path: Path) -> AllowedKey:
     name = check_name(path.name)
     try:
         file = _File.model_validate_json(read_private_text(path, _WRITABLE_BY_OTHERS))
     except ValidationError as error:
         field, message = first_error(error)
         raise KeyFileError(f"{path}: {field or 'file'}: {message}") from error
-    return Allowed(name, check_key(path, file.public_key), frozenset(file.roles))
+    return AllowedKey(name, check_key(path, file.public_key), frozenset(file.roles))

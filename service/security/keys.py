@@ -18,10 +18,10 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from denseface.service.errors import KeyFileError
 from denseface.service.runtime.files import private_folder, read_private_text, write_private_text
 
-__all__ = ["HUB", "KeyPair", "check_key", "check_name", "fingerprint", "new_pair", "read_pair",
+__all__ = ["HUB_NAME", "KeyPair", "check_key", "check_name", "fingerprint", "new_pair", "read_pair",
            "read_public", "write_key_file"]
 
-HUB = "hub"
+HUB_NAME = "hub"
 """Name of the hub's own pair."""
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
@@ -44,7 +44,7 @@ class KeyPair:
     secret: str
 
     @classmethod
-    def made(cls) -> Self:
+    def generate(cls) -> Self:
         """Make a new one."""
         public, secret = zmq.curve_keypair()
         return cls(public.decode(), secret.decode())
@@ -107,7 +107,7 @@ def new_pair(folder: Path, name: str) -> tuple[Path, Path]:
     for path in (secret, public):
         if path.exists():
             raise KeyFileError(f"{path}: exists; remove it or choose another name")
-    pair = KeyPair.made()
+    pair = KeyPair.generate()
     write_key_file(secret, _File(name=name, public_key=pair.public, secret_key=pair.secret))
     write_key_file(public, _File(name=name, public_key=pair.public))
     return secret, public

@@ -8,19 +8,19 @@ from denseface.service.protocol.messages import Message
 from denseface.service.protocol.topics import Topic
 from denseface.service.security.allow_list import Role
 
-__all__ = ["EVERY_ROLE", "KINDS", "TOPICS", "missing_role"]
+__all__ = ["ALL_ROLES", "ROLES_BY_KIND", "ROLES_BY_TOPIC", "missing_role"]
 
-EVERY_ROLE = frozenset(Role)
+ALL_ROLES = frozenset(Role)
 _S, _W = frozenset({Role.SENSOR}), frozenset({Role.WORKER})
 _OPERATOR = frozenset({Role.OPERATOR})
 
-KINDS: dict[str, frozenset[Role]] = {
+ROLES_BY_KIND: dict[str, frozenset[Role]] = {
     "press": frozenset({Role.PRESSER}),
     # Also a presser, for what it pressed itself.
     "get_face": frozenset({Role.SUBSCRIBER}),
     "get_next": frozenset({Role.SUBSCRIBER}),
     "find_start": frozenset({Role.SUBSCRIBER}),
-    "get_status": EVERY_ROLE,
+    "get_status": ALL_ROLES,
     "list_dead": _OPERATOR,
     "retry_dead": _OPERATOR,
     "drop_dead": _OPERATOR,
@@ -37,7 +37,7 @@ KINDS: dict[str, frozenset[Role]] = {
 }
 """Kind of message -> roles of which one is needed. A kind that is not here is for nobody."""
 
-TOPICS: dict[Topic, frozenset[Role]] = dict.fromkeys(Topic, frozenset({Role.SUBSCRIBER}))
+ROLES_BY_TOPIC: dict[Topic, frozenset[Role]] = dict.fromkeys(Topic, frozenset({Role.SUBSCRIBER}))
 """Topic -> roles of which one is needed."""
 
 
@@ -48,7 +48,7 @@ def missing_role(roles: frozenset[Role], message: Message, *, own: bool = False)
     ----------
     own : the message asks for a capture that this key pressed
     """
-    needed = KINDS.get(message.kind, frozenset())
+    needed = ROLES_BY_KIND.get(message.kind, frozenset())
     if roles & needed or (own and message.kind == "get_face" and Role.PRESSER in roles):
         return None
     return f"{message.kind} needs the role {' or '.join(sorted(needed)) or 'of nobody'}"

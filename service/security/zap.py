@@ -10,11 +10,11 @@ import zmq
 import zmq.utils.z85
 
 from denseface.service.monitoring.rejections import Rejections
-from denseface.service.security.allow_list import Allowed, AllowList
+from denseface.service.security.allow_list import AllowedKey, AllowList
 
-__all__ = ["DOMAIN", "TOPICS_DOMAIN", "Authenticator"]
+__all__ = ["MESSAGES_DOMAIN", "PUBLICATIONS_DOMAIN", "Authenticator"]
 
-DOMAIN, TOPICS_DOMAIN = b"denseface", b"denseface.topics"
+MESSAGES_DOMAIN, PUBLICATIONS_DOMAIN = b"denseface", b"denseface.topics"
 """Of the sockets for messages and of those for publications."""
 
 _ENDPOINT = "inproc://zeromq.zap.01"
@@ -31,12 +31,12 @@ class Authenticator:
     """
 
     def __init__(
-        self, context: "zmq.Context[zmq.Socket[bytes]]", keyring: AllowList, rejections: Rejections,
-        admits: Callable[[Allowed, bytes], bool],
+        self, context: "zmq.Context[zmq.Socket[bytes]]", allow_list: AllowList,
+        rejections: Rejections, is_permitted: Callable[[AllowedKey, bytes], bool],
     ) -> None:
-        self._keyring = keyring
+        self._allow_list = allow_list
         self._rejections = rejections
-        self._admits = admits
+        self._is_permitted = is_permitted
         # A ROUTER: one question that goes wrong does not block the next, as with a REP.
         self.socket = context.socket(zmq.ROUTER)
         self.socket.set(zmq.LINGER, 0)
@@ -59,7 +59,7 @@ class Authenticator:
         """Let nobody in any more."""
         self.socket.close()
 
-    def _user(self, request: list[bytes]) -> Allowed | None:
+    def _user(self, request: list[bytes]) -> AllowedKey | None:
         if len(request) != 7 or request[0] != _VERSION:
             self._rejections.note("handshake", detail="not a request of ZAP 1.0")
             return None
@@ -70,11 +70,11 @@ class Authenticator:
                 "handshake", address=where, detail=f"mechanism {mechanism[:16]!r}, not CURVE")
             return None
         public = zmq.utils.z85.encode(key).decode()
-        user = self._keyring.get(public)
+        user = self._allow_list.get(public)
         if user is None:
             self._rejections.note("unknown key", address=where, key=public)
             return None
-        if not self._admits(user, domain):
+        if not self._is_permitted(user, domain):
             self._rejections.note(
                 "role", address=where, key=user.name, detail="no topic for its roles")
             return None

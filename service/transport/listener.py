@@ -16,10 +16,10 @@ from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol.payload import MAX_PAYLOAD_BYTES
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import MAX_HEADER_BYTES, MAX_PARTS, Buffer
-from denseface.service.security.allow_list import Allowed, AllowList
+from denseface.service.security.allow_list import AllowedKey, AllowList
 from denseface.service.security.keys import KeyPair
-from denseface.service.security.permissions import EVERY_ROLE, TOPICS
-from denseface.service.security.zap import DOMAIN, TOPICS_DOMAIN
+from denseface.service.security.permissions import ALL_ROLES, ROLES_BY_TOPIC
+from denseface.service.security.zap import MESSAGES_DOMAIN, PUBLICATIONS_DOMAIN
 from denseface.service.transport.addresses import publications_of, socket_file
 from denseface.service.transport.handshakes import HandshakeMonitor
 from denseface.service.transport.sockets import (
@@ -60,13 +60,13 @@ class Incoming:
     """Names the sender's key with its roles, and its connection."""
     parts: list[memoryview]
     """In libzmq's own memory, not to be written to."""
-    sender: Allowed
+    sender: AllowedKey
     key: str
     """Fingerprint of the sender's key; empty where it needed none."""
     address: str
 
 
-_ANYONE = Allowed("", "", EVERY_ROLE)
+_ANYONE = AllowedKey("", "", ALL_ROLES)
 """Whoever came by the local door."""
 
 
@@ -105,9 +105,9 @@ class Listener:
         self._publisher.set(zmq.XPUB_MANUAL, 1)
         self._publisher.set(zmq.MAXMSGSIZE, _MAX_SUBSCRIPTION_BYTES)
         try:
-            for socket, one, domain in ((self._router, address, DOMAIN),
+            for socket, one, domain in ((self._router, address, MESSAGES_DOMAIN),
                                         (self._publisher, publications_of(address),
-                                         TOPICS_DOMAIN)):
+                                         PUBLICATIONS_DOMAIN)):
                 self._bind(socket, one, domain)
         except BaseException:
             self.close()
@@ -179,14 +179,17 @@ class Listener:
     def is_allowed(self, peer: bytes) -> bool:
         """Say whether a peer's key is allowed still, with the roles that it had."""
         token = peer[:_TOKEN_BYTES]
-        return self._credentials.allow_list.holds(token) if self._credentials else token == _LOCAL
+        if self._credentials is None:
+            return token == _LOCAL
+        return self._credentials.allow_list.has_token(token)
 
     def disconnect_revoked(self) -> None:
         """Cut off the keys that are allowed no more, if they subscribed or do not fall silent."""
         if self._revoked > _FLOOD:
             self._unbind(self._router)
         self._revoked = 0
-        if self._credentials and not all(map(self._credentials.allow_list.holds, self._subscribed)):
+        if self._credentials and not all(
+                map(self._credentials.allow_list.has_token, self._subscribed)):
             self._unbind(self._publisher)
 
     def rebind(self) -> None:
@@ -238,12 +241,12 @@ class Listener:
         except zmq.ZMQError as error:
             raise AddressError(f"{address}: {zmq.strerror(error.errno or 0)}") from error
 
-    def _user(self, first: zmq.Frame) -> Allowed | None:
+    def _user(self, first: zmq.Frame) -> AllowedKey | None:
         if self._credentials is None:
             return _ANYONE
         return self._credentials.allow_list.get(_property(first, "User-Id"))
 
-    def _known(self, first: zmq.Frame) -> Allowed | None:
+    def _known(self, first: zmq.Frame) -> AllowedKey | None:
         user = self._user(first)
         if user is None:
             self._revoked += 1
@@ -269,7 +272,7 @@ class Listener:
         if said[:1] != b"\1" or topic is None:
             self._rejections.note("malformed", key=user.name, address=_address(first),
                                 detail=f"no topic {name[:32]!r}")
-        elif not user.roles & TOPICS[topic]:
+        elif not user.roles & ROLES_BY_TOPIC[topic]:
             self._rejections.note("role", key=user.name, address=_address(first),
                                 detail=f"topic {topic}")
         else:

@@ -11,10 +11,10 @@ from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Buffer
 from denseface.service.runtime.limits import DescriptorWatch, MemoryWatch
-from denseface.service.security.allow_list import Allowed, AllowList
-from denseface.service.security.keys import HUB, read_pair
-from denseface.service.security.permissions import TOPICS
-from denseface.service.security.zap import TOPICS_DOMAIN, Authenticator
+from denseface.service.security.allow_list import AllowedKey, AllowList
+from denseface.service.security.keys import HUB_NAME, read_pair
+from denseface.service.security.permissions import ROLES_BY_TOPIC
+from denseface.service.security.zap import PUBLICATIONS_DOMAIN, Authenticator
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_bindable, is_local, socket_file
 from denseface.service.transport.listener import Incoming, Listener, ServerCredentials
@@ -57,7 +57,8 @@ class Listeners:
             if guarded:
                 keys = server_credentials(settings)
                 self._allow_list = keys.allow_list
-                self._authenticator = Authenticator(context, keys.allow_list, rejections, _admits)
+                self._authenticator = Authenticator(
+                    context, keys.allow_list, rejections, _is_permitted)
                 self._poller.register(self._authenticator.socket, zmq.POLLIN)
                 self._listeners += [Listener(context, one, keys, rejections) for one in guarded]
         except BaseException:
@@ -89,9 +90,9 @@ class Listeners:
         self._changes = self._allow_list.changes
         for listener in self._listeners:
             listener.disconnect_revoked()
-        if used := self._memory.beyond():
+        if used := self._memory.over_limit():
             self._disconnect_all("memory", f"{used >> 20} MB in use")
-        if used := self._descriptors.beyond():
+        if used := self._descriptors.over_limit():
             self._disconnect_all("connections", f"{used} descriptors in use")
         else:  # libzmq ends the process where it has no descriptor to bind with
             for listener in self._listeners:
@@ -171,11 +172,12 @@ def server_credentials(settings: ServiceSettings) -> ServerCredentials:
         Where the hub's key cannot be used.
     """
     address = guarded_addresses(settings)[0]
-    path = settings.key or settings.keys / f"{HUB}.secret"
+    path = settings.key or settings.keys / f"{HUB_NAME}.secret"
     if not path.exists():
         raise AddressError(
             f"{address}: refused, it is not local to this machine: others are only let in with "
-            f"CURVE security, and there is no hub key {path}; `denseface keys new {HUB}` makes one")
+            f"CURVE security, and there is no hub key {path}; `denseface keys new {HUB_NAME}` "
+            "makes one")
     allow_list = AllowList(settings.keys)
     if not len(allow_list):
         raise AddressError(
@@ -184,5 +186,6 @@ def server_credentials(settings: ServiceSettings) -> ServerCredentials:
     return ServerCredentials(read_pair(path), allow_list)
 
 
-def _admits(user: Allowed, domain: bytes) -> bool:
-    return domain != TOPICS_DOMAIN or any(user.roles & needed for needed in TOPICS.values())
+def _is_permitted(user: AllowedKey, domain: bytes) -> bool:
+    return domain != PUBLICATIONS_DOMAIN or any(
+        user.roles & needed for needed in ROLES_BY_TOPIC.values())

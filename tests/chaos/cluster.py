@@ -16,7 +16,11 @@ from typing import Any, Self
 
 from denseface.service.client import Client
 from denseface.service.errors import ServiceError
-from denseface.service.runtime.failpoints import NAMES, TOKENS, VARIABLE
+from denseface.service.runtime.failpoints import (
+    FAILPOINT_NAMES,
+    FAILPOINTS_VARIABLE,
+    TOKENS_VARIABLE,
+)
 
 __all__ = ["PACE", "Cluster", "Nursery", "Part", "until"]
 
@@ -155,10 +159,10 @@ class Cluster:
         self._sockets = tempfile.TemporaryDirectory(prefix="df-")  # their paths must be short
         self.address = f"ipc://{self._sockets.name}/hub"
         self.fired: Counter[str] = Counter()
-        points = dict.fromkeys(NAMES, "kill") | (actions or {})
+        points = dict.fromkeys(FAILPOINT_NAMES, "kill") | (actions or {})
         settings = PACE | (environment or {}) | {
-            VARIABLE: ",".join(f"{name}={action}" for name, action in points.items()),
-            TOKENS: str(self._tokens)}
+            FAILPOINTS_VARIABLE: ",".join(f"{name}={action}" for name, action in points.items()),
+            TOKENS_VARIABLE: str(self._tokens)}
 
         def part(name: str, command: str, address: str, *arguments: str) -> Part:
             return Part(nursery, name, [command, "--address", address, *arguments],

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from denseface.service.runtime.failpoints import NAMES
+from denseface.service.runtime.failpoints import FAILPOINT_NAMES
 from denseface.service.storage.folder_layout import FolderLayout
 from tests.chaos.cluster import Part
 from tests.chaos.scene import Scene
@@ -23,7 +23,7 @@ _DISK = ("written", "synced", "renamed")
 def random_actions(source: random.Random) -> dict[str, str]:
     """Draw what each failpoint does in this run."""
     actions = {}
-    for name in NAMES:
+    for name in FAILPOINT_NAMES:
         possible = ["kill", "kill", "stop"]
         if name.endswith(_DISK):
             possible += ["raise:ENOSPC", "raise:EIO"]
@@ -102,7 +102,7 @@ class Storm(threading.Thread):
             part.send(signal.SIGCONT)
 
     def _failpoint(self) -> None:
-        name = self._random.choice(NAMES)
+        name = self._random.choice(FAILPOINT_NAMES)
         if name not in self._asked:
             self._asked.add(name)
             self._scene.cluster.let_fail(name)

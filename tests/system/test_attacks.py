@@ -44,7 +44,7 @@ def test_without_keys_the_hub_does_not_open_the_door(tmp_path):
     for wrong, mend in (("no hub key", lambda: new_pair(keys, "hub")),
                         ("no key is allowed", lambda: (keys / "hub.secret").chmod(0o644)),
                         ("no key is allowed", lambda: allow(
-                            keys, "a", KeyPair.made().public, frozenset({Role.WORKER})))):
+                            keys, "a", KeyPair.generate().public, frozenset({Role.WORKER})))):
         done = denseface(*hub)
         assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
         assert address in done.stderr
@@ -105,7 +105,7 @@ def test_when_the_authenticator_is_silent_nobody_comes_in_and_the_rest_goes_on(t
 # --- keys
 
 def test_an_unknown_key_is_refused(hub, knock, refused, tmp_path):
-    peer = knock(hub.address, KeyPair.made(), read_public(hub.hub_key))
+    peer = knock(hub.address, KeyPair.generate(), read_public(hub.hub_key))
     peer.say(PRESS)
     assert happened(peer, zmq.Event.HANDSHAKE_FAILED_AUTH)
     refused("unknown key")
@@ -127,7 +127,7 @@ def test_a_key_revoked_before_is_unknown(hub, refused):
 @pytest.mark.parametrize("show", ["another hub's key", "no key", "a password"])
 def test_another_mechanism_or_hub_is_refused(hub, knock, refused, show):
     if show == "another hub's key":
-        peer = knock(hub.address, read_pair(hub.secret("presser")), KeyPair.made().public)
+        peer = knock(hub.address, read_pair(hub.secret("presser")), KeyPair.generate().public)
     elif show == "no key":
         peer = knock(hub.address)
     else:

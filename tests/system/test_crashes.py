@@ -10,7 +10,7 @@ import pytest
 import zmq
 
 from denseface.service.protocol.topics import Topic
-from denseface.service.runtime.failpoints import NAMES
+from denseface.service.runtime.failpoints import FAILPOINT_NAMES
 from denseface.service.storage.folder_layout import FolderLayout
 from denseface.service.transport.addresses import publications_of
 from tests.chaos.cluster import Nursery, Part, until
@@ -77,10 +77,10 @@ def is_stopped(part: Part) -> bool:
 @pytest.mark.timeout(300)
 def test_a_kill_at_each_step_of_a_capture_s_life(scene):
     running = scene()
-    for name in NAMES:
+    for name in FAILPOINT_NAMES:
         fail_at(running, name, presses=2)
         running.settle()
-    assert running.cluster.restarts() == len(NAMES)
+    assert running.cluster.restarts() == len(FAILPOINT_NAMES)
     check(running)
 
 

@@ -30,7 +30,7 @@ class Driver:
 
     def __init__(self):
         self.call = None
-        self.done = False
+        self.call_done = False
 
     def __bool__(self):
         return self.call is not None
@@ -39,11 +39,11 @@ class Driver:
         assert self.call is None
         self.call = call
 
-    def ended(self):
-        return self.done
+    def done(self):
+        return self.call_done
 
-    def take(self):
-        call, self.call, self.done = self.call, None, False
+    def result(self):
+        call, self.call, self.call_done = self.call, None, False
         return call()
 
 
@@ -67,7 +67,7 @@ class Link:
     def packets(self, *_):
         for one in self.script:
             if one is ENDED:
-                self.driver.done = True
+                self.driver.call_done = True
                 yield None
             elif isinstance(one, float):
                 Link.now += one

@@ -22,7 +22,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, Publish
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, decode_from_hub, decode_to_hub, encode
-from denseface.service.security.permissions import KINDS
+from denseface.service.security.permissions import ROLES_BY_KIND
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage.folder_store import FolderStore
 from tests.fuzzing.corpus import Parts, encoded, kinds
@@ -36,7 +36,7 @@ _MEMORY = Path("/dev/shm")  # noqa: S108
 IDS = ("a", "b", "c", "d")
 PEERS = tuple(b"p%d" % number for number in range(6))
 OPERATOR = {messages.Purge, messages.DropDead, messages.RetryDead}
-CORPUS = [parts for parts in encoded() if json.loads(parts[0])["kind"] in KINDS]
+CORPUS = [parts for parts in encoded() if json.loads(parts[0])["kind"] in ROLES_BY_KIND]
 
 
 @pytest.fixture

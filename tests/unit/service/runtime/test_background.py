@@ -23,9 +23,9 @@ def test_the_call_that_waits_begins_when_the_one_before_ends(calls):
     assert not second.is_set()
     first.set()
     assert second.wait(20)  # though nobody took the first
-    assert calls.take() == "first"
+    assert calls.result() == "first"
     assert calls
-    assert calls.take() == "second"
+    assert calls.result() == "second"
     assert not calls
 
 
@@ -33,12 +33,12 @@ def test_a_call_that_waits_can_be_withdrawn_one_that_has_begun_cannot(calls):
     gate, begun = threading.Event(), threading.Event()
     calls.start(lambda: begun.set() or gate.wait(20))
     assert begun.wait(20)
-    assert not calls.withdraw()
+    assert not calls.cancel_queued()
     calls.start(lambda: pytest.fail("was withdrawn"))
-    assert calls.withdraw()
+    assert calls.cancel_queued()
     gate.set()
-    assert calls.take()
-    assert not calls.withdraw()
+    assert calls.result()
+    assert not calls.cancel_queued()
 
 
 def test_a_call_that_has_begun_by_itself_cannot_be_withdrawn(calls):
@@ -46,10 +46,10 @@ def test_a_call_that_has_begun_by_itself_cannot_be_withdrawn(calls):
     calls.start(lambda: "first")
     calls.start(lambda: begun.set() or gate.wait(20))
     assert begun.wait(20)
-    assert not calls.withdraw()
+    assert not calls.cancel_queued()
     gate.set()
-    assert calls.take() == "first"
-    assert calls.take() is True
+    assert calls.result() == "first"
+    assert calls.result() is True
 
 
 def test_the_time_is_that_of_the_call_under_way(calls):
@@ -66,8 +66,8 @@ def test_the_time_is_that_of_the_call_under_way(calls):
     assert begun[1].wait(20)
     assert time.monotonic() - calls.elapsed_s > since + 0.01
     gates[1].set()
-    assert calls.take()
-    assert calls.take()
+    assert calls.result()
+    assert calls.result()
 
 
 def test_what_a_call_raises_is_raised_by_take_and_the_next_goes_on(calls):
@@ -77,7 +77,7 @@ def test_what_a_call_raises_is_raised_by_take_and_the_next_goes_on(calls):
     calls.start(fails)
     calls.start(lambda: "fine")
     with pytest.raises(ValueError, match="no"):
-        calls.take()
-    assert calls.take() == "fine"
+        calls.result()
+    assert calls.result() == "fine"
     with pytest.raises(RuntimeError, match="no call"):
-        calls.take()
+        calls.result()

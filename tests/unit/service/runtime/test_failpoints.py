@@ -12,7 +12,13 @@ import pytest
 
 from denseface.service.errors import SettingsError
 from denseface.service.runtime import failpoints
-from denseface.service.runtime.failpoints import NAMES, TOKENS, VARIABLE, arm, failpoint
+from denseface.service.runtime.failpoints import (
+    FAILPOINT_NAMES,
+    FAILPOINTS_VARIABLE,
+    TOKENS_VARIABLE,
+    arm,
+    failpoint,
+)
 
 SERVICE = Path(failpoints.__file__).parents[1]
 
@@ -33,18 +39,18 @@ def outcome(name: str) -> str | None:
 
 def test_nothing_happens_where_nothing_is_set():
     arm({})
-    assert [outcome(name) for name in NAMES] == [None] * len(NAMES)
+    assert [outcome(name) for name in FAILPOINT_NAMES] == [None] * len(FAILPOINT_NAMES)
 
 
 def test_an_error_each_time_or_at_one_time_only():
-    arm({VARIABLE: "hub.frame.synced=raise:ENOSPC,hub.face.written=raise:EIO@2"})
+    arm({FAILPOINTS_VARIABLE: "hub.frame.synced=raise:ENOSPC,hub.face.written=raise:EIO@2"})
     assert [outcome("hub.frame.synced") for _ in range(3)] == ["ENOSPC"] * 3
     assert [outcome("hub.face.written") for _ in range(3)] == [None, "EIO", None]
     assert outcome("hub.frame.written") is None
 
 
 def test_with_tokens_each_token_is_good_for_one_failure(tmp_path):
-    arm({VARIABLE: "hub.frame.synced=raise:ENOSPC", TOKENS: str(tmp_path)})
+    arm({FAILPOINTS_VARIABLE: "hub.frame.synced=raise:ENOSPC", TOKENS_VARIABLE: str(tmp_path)})
     assert outcome("hub.frame.synced") is None
     (tmp_path / "hub.frame.synced").touch()
     assert [outcome("hub.frame.synced") for _ in range(2)] == ["ENOSPC", None]
@@ -63,8 +69,8 @@ def test_with_tokens_each_token_is_good_for_one_failure(tmp_path):
 ])
 def test_what_is_unknown_is_refused_in_one_line(text, named):
     with pytest.raises(SettingsError, match=named) as refused:
-        arm({VARIABLE: text})
-    assert VARIABLE in str(refused.value)
+        arm({FAILPOINTS_VARIABLE: text})
+    assert FAILPOINTS_VARIABLE in str(refused.value)
     assert "\n" not in str(refused.value)
 
 
@@ -76,7 +82,8 @@ def test_a_process_ends_or_stops_at_the_third_time(action, number):
             "for time in range(4):\n print(time, flush=True)\n failpoint('hub.job.sent')\n")
     with subprocess.Popen(
             [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            text=True, env={VARIABLE: f"hub.job.sent={action}@3", "PYTHONPATH": ":".join(sys.path)},
+            text=True, env={FAILPOINTS_VARIABLE: f"hub.job.sent={action}@3",
+                            "PYTHONPATH": ":".join(sys.path)},
     ) as process:
         said = [process.stdout.readline() for _ in range(3)]
         if action == "stop":
@@ -100,4 +107,4 @@ def test_every_failpoint_is_somewhere_and_none_else():
                          and one.value.count(".") == 2)
     spool = {f"{steps}.{step}" for steps in ("hub.frame", "hub.face")
              for step in ("written", "synced", "renamed", "named")}
-    assert found | spool == set(NAMES)
+    assert found | spool == set(FAILPOINT_NAMES)

@@ -44,7 +44,7 @@ def test_a_name_is_a_file_s(keys, name):
     with pytest.raises(KeyFileError, match="key name"):
         new_pair(keys, name)
     with pytest.raises(KeyFileError, match="key name"):
-        allow(keys, name, KeyPair.made().public, ROLES)
+        allow(keys, name, KeyPair.generate().public, ROLES)
     with pytest.raises(KeyFileError, match="key name"):
         revoke(keys, name)
 
@@ -63,7 +63,7 @@ def test_what_is_no_key_is_named(tmp_path, text, message):
 def test_the_halves_of_two_pairs_are_none(keys):
     secret, _ = new_pair(keys, "a")
     text = json.loads(secret.read_text())
-    secret.write_text(json.dumps(text | {"public_key": KeyPair.made().public}))
+    secret.write_text(json.dumps(text | {"public_key": KeyPair.generate().public}))
     with pytest.raises(KeyFileError, match="do not belong together"):
         read_pair(secret)
     _, public = new_pair(keys, "b")
@@ -79,23 +79,23 @@ def test_a_folder_is_no_key(tmp_path):
 def test_the_list_is_live(keys):
     ring = AllowList(keys)
     assert (len(ring), ring.refresh()) == (0, False)
-    one = allow(keys, "a", KeyPair.made().public, ROLES)
+    one = allow(keys, "a", KeyPair.generate().public, ROLES)
     assert ring.refresh()
     assert not ring.refresh()
     assert ring.get(one.public) == one
-    assert ring.holds(one.token)
+    assert ring.has_token(one.token)
     more = allow(keys, "a", one.public, ROLES | {Role.PRESSER})
     assert ring.refresh()
-    assert (ring.holds(one.token), ring.holds(more.token)) == (False, True)
+    assert (ring.has_token(one.token), ring.has_token(more.token)) == (False, True)
     revoke(keys, "a")
     assert ring.refresh()
-    assert (ring.get(one.public), ring.holds(more.token), len(ring)) == (None, False, 0)
+    assert (ring.get(one.public), ring.has_token(more.token), len(ring)) == (None, False, 0)
     with pytest.raises(KeyFileError, match="no key of that name"):
         revoke(keys, "a")
 
 
 def test_a_name_and_a_key_belong_together(keys):
-    one, other = KeyPair.made().public, KeyPair.made().public
+    one, other = KeyPair.generate().public, KeyPair.generate().public
     allow(keys, "a", one, ROLES)
     with pytest.raises(KeyFileError, match="in use: a"):
         allow(keys, "b", one, ROLES)
@@ -113,7 +113,7 @@ def test_a_name_and_a_key_belong_together(keys):
     lambda path: (path.unlink(), path.symlink_to("nothing")),
 ])
 def test_a_damaged_file_keeps_its_key_out_and_no_other(keys, damage):
-    one, other = (allow(keys, name, KeyPair.made().public, ROLES) for name in "ab")
+    one, other = (allow(keys, name, KeyPair.generate().public, ROLES) for name in "ab")
     ring = AllowList(keys)
     assert len(ring) == 2
     damage(keys / "allowed" / "a")
@@ -122,17 +122,17 @@ def test_a_damaged_file_keeps_its_key_out_and_no_other(keys, damage):
 
 
 def test_a_folder_that_went_lets_nobody_in(keys):
-    one = allow(keys, "a", KeyPair.made().public, ROLES)
+    one = allow(keys, "a", KeyPair.generate().public, ROLES)
     ring = AllowList(keys)
     (keys / "allowed").rename(keys / "gone")
     assert ring.refresh()
-    assert not ring.holds(one.token)
+    assert not ring.has_token(one.token)
 
 
 @pytest.mark.parametrize("where", [
     "pathlib.Path.iterdir", "denseface.service.security.allow_list.read_private_text"])
 def test_a_want_of_descriptors_revokes_nobody(keys, monkeypatch, where):
-    one = allow(keys, "a", KeyPair.made().public, ROLES)
+    one = allow(keys, "a", KeyPair.generate().public, ROLES)
     ring = AllowList(keys)
 
     def none_left(*_):
@@ -142,15 +142,15 @@ def test_a_want_of_descriptors_revokes_nobody(keys, monkeypatch, where):
     with monkeypatch.context() as patched:
         patched.setattr(where, none_left)
         revoke(keys, "a")
-        other = KeyPair.made().public
+        other = KeyPair.generate().public
         if "iterdir" not in where:
             monkeypatch.undo()
             other = allow(keys, "b", other, ROLES).public
             patched.setattr(where, none_left)
         assert not ring.refresh()
-        assert ring.holds(one.token)
+        assert ring.has_token(one.token)
     assert ring.refresh()
-    assert not ring.holds(one.token)
+    assert not ring.has_token(one.token)
     assert (ring.get(other) is None) is ("iterdir" in where)
 
 

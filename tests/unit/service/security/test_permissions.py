@@ -11,7 +11,12 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.payload import FrameHeader
 from denseface.service.protocol.topics import Topic
 from denseface.service.security.allow_list import Role
-from denseface.service.security.permissions import EVERY_ROLE, KINDS, TOPICS, missing_role
+from denseface.service.security.permissions import (
+    ALL_ROLES,
+    ROLES_BY_KIND,
+    ROLES_BY_TOPIC,
+    missing_role,
+)
 from tests.unit.service.faces import small_frame
 
 FRAME, _ = FrameHeader.of(small_frame())
@@ -49,13 +54,15 @@ def test_a_role_may_say_this_and_nothing_else(role):
 
 def test_every_kind_and_every_topic_has_its_roles():
     kinds = {one.model_fields["kind"].default for one in get_args(messages.ToHub)}
-    assert set(KINDS) == kinds
-    assert set(TOPICS) == set(Topic)
-    assert all(roles and roles <= EVERY_ROLE for roles in [*KINDS.values(), *TOPICS.values()])
+    assert set(ROLES_BY_KIND) == kinds
+    assert set(ROLES_BY_TOPIC) == set(Topic)
+    assert all(roles and roles <= ALL_ROLES
+               for roles in [*ROLES_BY_KIND.values(), *ROLES_BY_TOPIC.values()])
 
 
 def test_no_worker_sensor_or_presser_reads_faces():
-    for roles in (TOPICS[Topic.FACES], KINDS["get_next"], KINDS["get_face"]):
+    for roles in (
+            ROLES_BY_TOPIC[Topic.FACES], ROLES_BY_KIND["get_next"], ROLES_BY_KIND["get_face"]):
         assert not roles & {Role.WORKER, Role.SENSOR, Role.PRESSER}
 
 
@@ -68,7 +75,7 @@ def test_what_the_hub_says_is_for_nobody_to_say():
     job = messages.Job(
         capture_id="a", attempt=1, settings=Settings(), settings_hash="0",
         frame_sha256="0" * 64, frame=FRAME)
-    assert missing_role(EVERY_ROLE, job)
+    assert missing_role(ALL_ROLES, job)
 
 
 @pytest.mark.parametrize(("role", "own", "may"), [

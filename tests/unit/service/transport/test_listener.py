@@ -91,7 +91,7 @@ def test_who_was_refused_comes_in_once_allowed(context, wakes, tmp_path, monkeyp
     monkeypatch.setattr("denseface.service.transport.connection._RECONNECT_S", 0.1)
     _, hub_key = new_pair(tmp_path, "hub")
     secret, public = new_pair(tmp_path, "late")
-    allow(tmp_path, "other", KeyPair.made().public, frozenset({Role.WORKER}))
+    allow(tmp_path, "other", KeyPair.generate().public, frozenset({Role.WORKER}))
     address, rejections = _address(), Rejections(Counters())
     settings = ServiceSettings(address=address, key=secret, hub_key=hub_key)
     hub_settings = ServiceSettings(address=_address(), listen=(address,), keys=tmp_path)
@@ -150,10 +150,10 @@ def test_memory_that_stays_with_the_process_is_said_once(monkeypatch, tmp_path):
     monkeypatch.setattr("denseface.service.runtime.limits._PAGE_BYTES", 1)
     watch = MemoryWatch(100)
 
-    def beyond(used):
+    def over_limit(used):
         statm.write_text(f"1000 {used} 3 4")
-        return watch.beyond()
+        return watch.over_limit()
 
-    assert [beyond(used) for used in (50, 120, 110, 130, 140, 150)] == [0, 120, 0, 0, 140, 0]
-    assert [beyond(used) for used in (50, 120)] == [0, 120]
+    assert [over_limit(used) for used in (50, 120, 110, 130, 140, 150)] == [0, 120, 0, 0, 140, 0]
+    assert [over_limit(used) for used in (50, 120)] == [0, 120]
     watch.close()
