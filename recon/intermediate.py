@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,10 +10,19 @@ from numpy.typing import NDArray
 from denseface.recon.numerics.bilinear import add_resampled
 from denseface.recon.support import Support
 
-__all__ = ["ColorSampler", "Registration", "SurfaceGrid"]
+__all__ = ["ColorSampler", "Registration", "SurfaceGrid", "ZBuffer"]
 
 ColorSampler = Callable[[NDArray[np.float32]], tuple[NDArray[np.uint8], NDArray[np.bool_]]]
 """Points, (n, 3) float32, mm, to their colours, (n, 3) uint8, and which are seen, (n,) bool."""
+
+
+class ZBuffer(NamedTuple):
+    """The nearest z in the colour camera's frame, in cells of the colour image."""
+
+    nearest: NDArray[np.float32]
+    """(rows, columns), mm, 1e30 where nothing is."""
+    pitch: float
+    """Side of a cell, pixels of the colour image."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +38,8 @@ class Registration:
     pixels : (H, W, 2) float32, (u, v) in the colour image; NaN where not `valid`
     color_depth : (H, W) float32, mm, z in the colour camera's frame; zero where not `valid`
     visible : (H, W) bool, inside the colour image and not hidden by a nearer surface
-    colors : (H, W, 3) uint8, RGB, bilinear; zero where not `visible`, or not looked up
-    pitch : side of the z-buffer's cells, pixels of the colour image
-    nearest : (rows, columns) float32, mm, the z-buffer: nearest z in the colour camera's frame in
-        each cell and the cells around it, 1e30 where nothing
+    colors : (H, W, 3) uint8, RGB, bilinear; zero where not `visible`, or not sampled
+    z_buffer : each cell holds the nearest z in it and the cells around it
     """
 
     rows: slice
@@ -43,8 +51,7 @@ class Registration:
     color_depth: NDArray[np.float32]
     visible: NDArray[np.bool_]
     colors: NDArray[np.uint8]
-    pitch: float
-    nearest: NDArray[np.float32]
+    z_buffer: ZBuffer
 
 
 @dataclass(frozen=True, eq=False)

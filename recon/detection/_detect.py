@@ -273,7 +273,7 @@ def judge_box(box: Box, registered: Registration, focal_px: float) -> FaceCandid
     depths = depths_in_box(registered.pixels, registered.color_depth, registered.visible,
                            float(x), float(y), float(w), float(h))
     z = middle_depths(depths, _MIDDLE)
-    if len(z) < _LEAST_MIDDLE_SHARE * w * h * (_MIDDLE / registered.pitch)**2:
+    if len(z) < _LEAST_MIDDLE_SHARE * w * h * (_MIDDLE / registered.z_buffer.pitch)**2:
         return FaceCandidate(box=box, depth_mm=None, width_mm=None, verdict="no depth")
     depth = percentile(z, 50)
     width = w * depth / focal_px

@@ -9,9 +9,12 @@ from numpy.typing import NDArray
 from denseface.capture.calibration import CameraModel
 from denseface.capture.frame import RgbdFrame
 from denseface.recon.errors import NoDepthError
-from denseface.recon.intermediate import Registration
+from denseface.recon.intermediate import Registration, ZBuffer
 from denseface.recon.registration._kernels import (
     EMPTY,
+    ColorCamera,
+    PixelGrid,
+    Projected,
     project,
     project_points,
     sample_image,
@@ -19,11 +22,6 @@ from denseface.recon.registration._kernels import (
 )
 
 __all__ = ["register", "sample_colors"]
-
-# A point is hidden when another, nearer one falls on the same spot of the colour image. A steep
-# surface differs by a few millimetres from spot to spot without hiding itself.
-_HIDDEN_MM = 15.0
-_HIDDEN_SHARE = 0.02
 
 _ALL = slice(None)
 
@@ -46,7 +44,7 @@ def register(
     frame : depth, mm, and colour with their calibration
     depth_offset_mm : added to each depth, mm
     rows, columns : the part of the depth image to register, every pixel or every k-th
-    colors : whether to look them up; zero otherwise
+    colors : whether to sample them; zero otherwise
 
     Raises
     ------
@@ -57,46 +55,42 @@ def register(
     valid = depth > 0
     if not valid.any():
         raise NoDepthError("the depth image is empty: every pixel is 0 (no reading)")
-    points = np.zeros((*depth.shape, 3), np.float32)
-    pixels = np.full((*depth.shape, 2), np.nan, np.float32)
-    color_depth = np.zeros(depth.shape, np.float32)
+    out = Projected(np.zeros((*depth.shape, 3), np.float32),
+                    np.full((*depth.shape, 2), np.nan, np.float32),
+                    np.zeros(depth.shape, np.float32))
     (first_row, _, row_step), (first_column, _, column_step) = (
         part.indices(side) for part, side in zip((rows, columns), frame.depth.shape, strict=True))
-    camera = frame.calibration.color
-    pitch = max(1.0, camera.fx / frame.depth_camera.fx * row_step)
-    height, width = frame.color.shape[:2]
-    nearest = np.full([int(np.ceil(side / pitch)) + 1 for side in (height, width)], EMPTY)
-    top, bottom, left, right = project(
-        depth, depth_offset_mm, _rays(frame.depth_camera), (first_row, first_column),
-        (row_step, column_step), *_pose(frame), pitch, points, pixels, color_depth, nearest)
+    grid = PixelGrid(*_rays(frame.depth_camera), (first_row, first_column), (row_step, column_step))
+    camera = _color_camera(frame)
+    pitch = max(1.0, camera.intrinsics[0] / frame.depth_camera.fx * row_step)
+    nearest = np.full([int(np.ceil(side / pitch)) + 1 for side in frame.color.shape[:2]], EMPTY)
+    z_buffer = ZBuffer(nearest, pitch)
+    top, bottom, left, right = project(depth, depth_offset_mm, grid, camera, out, z_buffer)
     # Each point covers about its cell and the next: without this, a far surface would shine
     # through between the samples of a near one.
     if bottom >= 0:
         part = (slice(max(top - 1, 0), bottom + 2), slice(max(left - 1, 0), right + 2))
         nearest[part] = cv2.erode(nearest[part], np.ones((3, 3), np.uint8))
-    visible = visible_mask(pixels, color_depth, nearest, pitch, _HIDDEN_MM, _HIDDEN_SHARE, width,
-                           height)
-    seen = sample_image(pixels, visible, _read_only(frame.color)) if colors else np.zeros(
-        (*depth.shape, 3), np.uint8)
+    visible = visible_mask(out.pixels, out.color_depth, z_buffer, camera.size)
     return Registration(
         rows=rows,
         columns=columns,
         focal_px=frame.depth_camera.fx,
-        points=points,
+        points=out.points,
         valid=valid,
-        pixels=pixels,
-        color_depth=color_depth,
+        pixels=out.pixels,
+        color_depth=out.color_depth,
         visible=visible,
-        colors=seen,
-        pitch=pitch,
-        nearest=nearest,
+        colors=(sample_image(out.pixels, visible, _read_only(frame.color)) if colors
+                else np.zeros((*depth.shape, 3), np.uint8)),
+        z_buffer=z_buffer,
     )
 
 
 def sample_colors(
     frame: RgbdFrame, registered: Registration, points: NDArray[np.float32]
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
-    """Look any points' colours up in the colour image, as if they had been measured.
+    """Sample the colour image at any points, as if they had been measured.
 
     Parameters
     ----------
@@ -106,23 +100,22 @@ def sample_colors(
 
     Returns
     -------
-    colors : (n, 3) uint8, RGB, bilinear; zero where not `seen`
-    seen : (n,) bool, inside the colour image and hidden by nothing registered
+    colors : (n, 3) uint8, RGB, bilinear; zero where not `visible`
+    visible : (n,) bool, inside the colour image and hidden by nothing registered
     """
-    pixels = np.empty((1, len(points), 2), np.float32)
-    z = np.empty((1, len(points)), np.float32)
-    project_points(np.ascontiguousarray(points)[None], *_pose(frame), pixels, z)
-    height, width = frame.color.shape[:2]
-    seen = visible_mask(pixels, z, registered.nearest, registered.pitch, _HIDDEN_MM, _HIDDEN_SHARE,
-                        width, height)
-    return sample_image(pixels, seen, _read_only(frame.color))[0], seen[0]
+    camera = _color_camera(frame)
+    out = Projected(np.ascontiguousarray(points)[None], np.empty((1, len(points), 2), np.float32),
+                    np.empty((1, len(points)), np.float32))
+    project_points(out, camera)
+    visible = visible_mask(out.pixels, out.color_depth, registered.z_buffer, camera.size)
+    return sample_image(out.pixels, visible, _read_only(frame.color))[0], visible[0]
 
 
 @lru_cache(maxsize=8)
 def _rays(camera: CameraModel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Give x and y at z = 1 of each pixel, read-only.
 
-    Without distortion x is that of the column and y that of the row: megabytes need not be read.
+    Without distortion they are broadcast from one row and one column, which stay in the cache.
     """
     rays = camera.rays()
     if any(camera.distortion):
@@ -131,18 +124,16 @@ def _rays(camera: CameraModel) -> tuple[NDArray[np.float64], NDArray[np.float64]
             np.broadcast_to(rays[:, :1, 1].copy(), rays.shape[:2]))
 
 
-def _pose(
-    frame: RgbdFrame,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Rotation, translation and intrinsics of the colour camera, as the loops take them."""
-    camera, moved = frame.calibration.color, frame.depth_to_color
-    return (np.array(moved.rotation, np.float64), np.array(moved.translation_mm, np.float64),
-            np.array((camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
-                      *camera.distortion), np.float64))
+def _color_camera(frame: RgbdFrame) -> ColorCamera:
+    camera, pose = frame.calibration.color, frame.depth_to_color
+    return ColorCamera(
+        tuple(float(number) for row in pose.rotation for number in row),
+        tuple(map(float, pose.translation_mm)), (float(camera.width), float(camera.height)),
+        tuple(map(float, (camera.fx, camera.fy, camera.cx, camera.cy))), camera.distortion)
 
 
 def _read_only(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The same image, of one kind whatever it was: a loop is compiled anew for each."""
+    """Give the same image, contiguous and read-only: loops are compiled for that type alone."""
     same = np.ascontiguousarray(image).view()
     same.setflags(write=False)
     return same
