@@ -1,4 +1,4 @@
-"""Looks for faces over a part of an image, rolled and mirrored as wanted."""
+"""A pass of a Haar cascade over a part of an image, rotated and mirrored as wanted."""
 
 from typing import NamedTuple
 
@@ -9,100 +9,102 @@ from numpy.typing import NDArray
 from denseface.recon.detection._haar import load_cascade, passing_boxes
 from denseface.recon.face import Box
 
-__all__ = ["Look", "Middles", "look_for_faces"]
+__all__ = ["CascadePass", "CenterMask", "run_pass"]
 
-# How much two boxes may differ to be of one face: OpenCV's own.
-_ALIKE = 0.2
+_GROUP_EPS = 0.2
+"""How much boxes of one face may differ, as a share of their size: OpenCV's default."""
 
 
-class Look(NamedTuple):
-    """One way to look for faces in a part of an image."""
+class CascadePass(NamedTuple):
+    """Which cascade runs, at which resolution, in which orientation."""
 
     cascade: str
     face_px: float
-    """The part is shrunk until a face of ordinary size is about so wide; never enlarged."""
+    """The part is shrunk until a typical face is about this wide; never enlarged."""
     scale_step: float = 1.1
     min_neighbors: int = 5
     roll: float = 0.0
-    """Faces tipped clockwise by so many degrees are looked for."""
+    """Finds faces that are tipped clockwise by this angle, degrees."""
     mirrored: bool = False
 
 
-class Middles(NamedTuple):
-    """Where in an image the middle of a box may be."""
+class CenterMask(NamedTuple):
+    """Where in an image the centre of a box may be."""
 
-    wanted: NDArray[np.bool_]
+    allowed: NDArray[np.bool_]
     """(rows, columns), cells of the image."""
-    side: float
-    """Of a cell, pixels."""
+    cell_px: float
+    """Side of a cell, pixels."""
     left: float = 0.0
     top: float = 0.0
-    """Where the first cell begins, pixels, counted from the image's corner."""
+    """The upper left cell's corner, pixels from the image's corner."""
 
 
-def look_for_faces(
+def run_pass(
     gray: NDArray[np.uint8],
-    part: Box,
-    look: Look,
-    ordinary: float,
-    sizes: tuple[float, float],
-    middles: Middles,
+    roi: Box,
+    cascade_pass: CascadePass,
+    typical_px: float,
+    size_limits: tuple[float, float],
+    centers: CenterMask,
 ) -> list[Box]:
     """Find faces in a part of an image.
 
     Parameters
     ----------
     gray : (H, W) uint8
-    part : x, y, width, height of what is searched; inside the image
-    look : how
-    ordinary : how wide a face of ordinary size is there, pixels of the image
-    sizes : the smallest and the largest box, pixels of the image
-    middles : where in the image a box's middle may be
+    roi : x, y, width, height of the part; inside the image
+    typical_px : width of a typical face in it, pixels of the image
+    size_limits : widths of the smallest and the largest box, pixels of the image
+    centers : where in the image a box's centre may be
 
     Returns
     -------
     Boxes in pixels of the image, upright whatever the roll: a rolled face's box is turned
-    about its own middle.
+    about its own centre.
     """
-    x, y, width, height = part
-    shrink = min(1.0, look.face_px / ordinary)
+    x, y, width, height = roi
+    shrink = min(1.0, cascade_pass.face_px / typical_px)
     small = np.ascontiguousarray(gray[y:y + height, x:x + width])
     if shrink < 1:
         columns, rows = max(1, round(width * shrink)), max(1, round(height * shrink))
         small = np.asarray(
             cv2.resize(small, (columns, rows), interpolation=cv2.INTER_AREA), np.uint8)
-    # From the part's own pixels to those of the image that the cascade sees, middles of pixels.
-    across, down = small.shape[1] / width, small.shape[0] / height
-    back = np.array([[1 / across, 0, x - 0.5 + 0.5 / across], [0, 1 / down, y - 0.5 + 0.5 / down]])
-    if look.roll:
-        small, turned_back = _turned(small, look.roll)
-        back = back @ np.vstack([turned_back, (0, 0, 1)])
-    if look.mirrored:
+    scale_x, scale_y = small.shape[1] / width, small.shape[0] / height
+    # From pixels that the cascade sees to pixels of `gray`; whole numbers are pixel centres.
+    to_image = np.array([[1 / scale_x, 0, x - 0.5 + 0.5 / scale_x],
+                         [0, 1 / scale_y, y - 0.5 + 0.5 / scale_y]])
+    if cascade_pass.roll:
+        small, back = _rotated(small, cascade_pass.roll)
+        to_image = to_image @ np.vstack([back, (0, 0, 1)])
+    if cascade_pass.mirrored:
         small = np.ascontiguousarray(small[:, ::-1])
-        back = back @ np.array([[-1, 0, small.shape[1] - 1], [0, 1, 0], [0, 0, 1]])
-    to_cells = back.copy()
-    to_cells[:, 2] += 0.5 - np.array((middles.left, middles.top))
-    boxes = passing_boxes(small, load_cascade(look.cascade), sizes[0] * shrink, sizes[1] * shrink,
-                          look.scale_step, middles.wanted, to_cells / middles.side)
-    grouped, _ = cv2.groupRectangles(boxes, look.min_neighbors, _ALIKE)
+        to_image = to_image @ np.array([[-1, 0, small.shape[1] - 1], [0, 1, 0], [0, 0, 1]])
+    to_cells = to_image.copy()
+    to_cells[:, 2] += 0.5 - np.array((centers.left, centers.top))
+    boxes = passing_boxes(small, load_cascade(cascade_pass.cascade),
+                          (size_limits[0] * shrink, size_limits[1] * shrink),
+                          cascade_pass.scale_step, centers.allowed, to_cells / centers.cell_px)
+    grouped, _ = cv2.groupRectangles(boxes, cascade_pass.min_neighbors, _GROUP_EPS)
     found = []
     for left, top, w, h in grouped:
-        u, v = back @ (left + (w - 1) / 2, top + (h - 1) / 2, 1)
-        wide, high = w / across, h / down
-        found.append((round(u - (wide - 1) / 2), round(v - (high - 1) / 2),
-                      round(wide), round(high)))
+        u, v = to_image @ (left + (w - 1) / 2, top + (h - 1) / 2, 1)
+        box_width, box_height = w / scale_x, h / scale_y
+        found.append((round(u - (box_width - 1) / 2), round(v - (box_height - 1) / 2),
+                      round(box_width), round(box_height)))
     return found
 
 
-def _turned(
+def _rotated(
     image: NDArray[np.uint8], degrees: float
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-    """Turn an image against the clock, whole; and give the (2, 3) way of its pixels back."""
+    """Rotate a whole image counterclockwise; give also the (2, 3) transform of its pixels back."""
     height, width = image.shape
-    there = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), degrees, 1.0)
-    c, s = abs(there[0, 0]), abs(there[0, 1])
-    wide, high = int(np.ceil(width * c + height * s)), int(np.ceil(width * s + height * c))
-    there[:, 2] += (wide - width) / 2, (high - height) / 2
-    turned = cv2.warpAffine(image, there, (wide, high), flags=cv2.INTER_LINEAR,
-                            borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(turned, np.uint8), np.asarray(cv2.invertAffineTransform(there), np.float64)
+    transform = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), degrees, 1.0)
+    c, s = abs(transform[0, 0]), abs(transform[0, 1])
+    columns, rows = int(np.ceil(width * c + height * s)), int(np.ceil(width * s + height * c))
+    transform[:, 2] += (columns - width) / 2, (rows - height) / 2
+    rotated = cv2.warpAffine(image, transform, (columns, rows), flags=cv2.INTER_LINEAR,
+                             borderMode=cv2.BORDER_REPLICATE)
+    return (np.asarray(rotated, np.uint8),
+            np.asarray(cv2.invertAffineTransform(transform), np.float64))

@@ -1,4 +1,4 @@
-"""A part of an image with its contrast evened out, as a cascade sees faces best."""
+"""Contrast equalisation of a part of an image, for faces in the dark or against the light."""
 
 import cv2
 import numpy as np
@@ -6,35 +6,44 @@ from numpy.typing import NDArray
 
 from denseface.recon.face import Box
 
-__all__ = ["evened"]
+__all__ = ["equalize_contrast"]
 
-# The brightness of what is at a face's depth is spread to the whole range: a wall behind it, or a
-# lamp, is not to decide what is dark. Percentiles; and the least range that is spread.
 _LOW, _HIGH = 2.0, 98.0
-_LEAST_RANGE = 8.0
-# Then tiles of so many pixels get contrast of their own (CLAHE, Zuiderveld, 1994).
+"""Percentiles of the samples' brightness that become black and white."""
+_MIN_RANGE = 8.0
+"""Grey levels: a narrower range is stretched no further, so that noise stays small."""
 _TILE_PX = (80, 60)
-_CLIP = 4.0
+"""Width and height of CLAHE's tiles, pixels, about."""
+_CLIP_LIMIT = 4.0
+"""CLAHE's limit of contrast (Zuiderveld, 1994)."""
 
 
-def evened(
-    gray: NDArray[np.uint8], part: Box, brightness: NDArray[np.uint8]
+def equalize_contrast(
+    gray: NDArray[np.uint8], roi: Box, samples: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
-    """Give an image with the contrast of a part of it evened out.
+    """Stretch a part of an image to the whole range of the samples, then apply CLAHE.
+
+    The samples are what lies at a face's depth: neither a wall behind it nor a lamp then decides
+    what is dark.
 
     Parameters
     ----------
     gray : (H, W) uint8
-    part : x, y, width, height of it; inside the image
-    brightness : (n,) uint8, that of what is wanted in it; all of the part where n is 0
+    roi : x, y, width, height of the part; inside the image
+    samples : (n,) uint8, brightness; all of the part where n is 0
+
+    Returns
+    -------
+    (H, W) uint8, unchanged outside the part
     """
-    x, y, width, height = part
-    there = np.s_[y:y + height, x:x + width]
-    dark, bright = np.percentile(brightness if len(brightness) else gray[there], (_LOW, _HIGH))
-    spread = (np.arange(256) - dark) / max(bright - dark, _LEAST_RANGE)
-    spread = np.rint(255 * np.clip(spread, 0, 1)).astype(np.uint8)
+    x, y, width, height = roi
+    inside = np.s_[y:y + height, x:x + width]
+    dark, bright = np.percentile(samples if len(samples) else gray[inside], (_LOW, _HIGH))
+    stretch = (np.arange(256) - dark) / max(bright - dark, _MIN_RANGE)
+    stretch = np.rint(255 * np.clip(stretch, 0, 1)).astype(np.uint8)
     tiles = [max(1, round(side / tile)) for side, tile in
              zip((width, height), _TILE_PX, strict=True)]
     out = gray.copy()
-    out[there] = cv2.createCLAHE(clipLimit=_CLIP, tileGridSize=tiles).apply(spread[gray[there]])
+    out[inside] = cv2.createCLAHE(clipLimit=_CLIP_LIMIT, tileGridSize=tiles).apply(
+        stretch[gray[inside]])
     return out

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["depths_in_box", "fill_layers", "middle_depths", "nearest_in_cells"]
+__all__ = ["center_depths", "depths_in_box", "fill_layers", "nearest_in_cells"]
 
 
 @compiled
@@ -72,12 +72,12 @@ def depths_in_box(
 
 
 @compiled
-def middle_depths(depths: NDArray[np.float64], middle: float) -> NDArray[np.float64]:
-    """Give the z of (n, 3) u, v and z with both u and v nearer to 0 than `middle`."""
+def center_depths(depths: NDArray[np.float64], half: float) -> NDArray[np.float64]:
+    """Give the z of (n, 3) u, v and z with both u and v nearer to 0 than `half`."""
     found = np.empty(len(depths))
     count = 0
     for i in range(len(depths)):
         found[count] = depths[i, 2]
-        if abs(depths[i, 0]) < middle and abs(depths[i, 1]) < middle:
+        if abs(depths[i, 0]) < half and abs(depths[i, 1]) < half:
             count += 1
     return found[:count]

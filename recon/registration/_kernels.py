@@ -14,9 +14,8 @@ __all__ = ["EMPTY", "ColorCamera", "PixelGrid", "Projected", "project", "project
 EMPTY = np.float32(1e30)
 """z of an empty cell of the z-buffer, mm. Not inf: compiled code assumes finite numbers."""
 
-_OCCLUSION_MM = np.float32(15.0)
-_OCCLUSION_SHARE = np.float32(0.02)
-"""A point this much behind the z-buffer, mm and as a share of its z (the larger counts), is hidden.
+_HIDDEN_MM, _HIDDEN_SHARE = np.float32(15.0), np.float32(0.02)
+"""A point behind the z-buffer by more than this, mm or by its z (the larger counts), is hidden.
 Neighbouring cells of a steep surface differ by a few millimetres."""
 
 
@@ -161,7 +160,7 @@ def visible_mask(
             u, v = pixels[i, j, 0], pixels[i, j, 1]
             if _inside(u, v, size):
                 row, column = _cell(u, v, per_cell)
-                visible[i, j] = z <= nearest[row, column] + max(_OCCLUSION_MM, _OCCLUSION_SHARE * z)
+                visible[i, j] = z <= nearest[row, column] + max(_HIDDEN_MM, _HIDDEN_SHARE * z)
     return visible
 
 

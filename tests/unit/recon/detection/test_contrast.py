@@ -1,12 +1,12 @@
-"""Contrast evened out by the brightness of what is wanted, in a part of an image alone."""
+"""Contrast is equalised by samples of what is wanted, in a part of an image alone."""
 
 import numpy as np
 import pytest
 
-from denseface.recon.detection._contrast import evened
+from denseface.recon.detection._contrast import equalize_contrast
 
-PART = (60, 40, 200, 180)
-THERE = np.s_[40:220, 60:260]
+ROI = (60, 40, 200, 180)
+IN_ROI = np.s_[40:220, 60:260]
 INSIDE = np.s_[90:170, 110:210]
 NOTHING = np.empty(0, np.uint8)
 
@@ -22,33 +22,33 @@ def dark_before_bright():
 def test_what_is_wanted_gets_the_whole_range_whatever_is_behind(dark_before_bright):
     wanted = dark_before_bright[INSIDE].ravel()
     before = np.ptp(dark_before_bright[INSIDE])
-    after = np.percentile(evened(dark_before_bright, PART, wanted)[INSIDE], (10, 90))
+    after = np.percentile(equalize_contrast(dark_before_bright, ROI, wanted)[INSIDE], (10, 90))
     assert before < 12
     assert np.diff(after) > 120
 
 
 def test_by_all_of_the_part_the_wall_counts(dark_before_bright):
-    by_all = np.percentile(evened(dark_before_bright, PART, NOTHING)[INSIDE], (10, 90))
+    by_all = np.percentile(equalize_contrast(dark_before_bright, ROI, NOTHING)[INSIDE], (10, 90))
     wanted = dark_before_bright[INSIDE].ravel()
-    by_wanted = np.percentile(evened(dark_before_bright, PART, wanted)[INSIDE], (10, 90))
+    by_wanted = np.percentile(equalize_contrast(dark_before_bright, ROI, wanted)[INSIDE], (10, 90))
     assert np.diff(by_all) < 0.5 * np.diff(by_wanted)
 
 
 def test_the_rest_of_the_image_stays_and_the_image_itself(dark_before_bright):
     kept = dark_before_bright.copy()
-    after = evened(dark_before_bright, PART, NOTHING)
+    after = equalize_contrast(dark_before_bright, ROI, NOTHING)
     np.testing.assert_array_equal(dark_before_bright, kept)
-    after[THERE] = kept[THERE]
+    after[IN_ROI] = kept[IN_ROI]
     np.testing.assert_array_equal(after, kept)
 
 
 @pytest.mark.parametrize("shade", [0, 128, 255])
 def test_one_shade_is_spread_to_no_noise(shade):
     image = np.full((240, 320), shade, np.uint8)
-    assert np.ptp(evened(image, PART, image[THERE].ravel())) <= 255
-    assert np.ptp(evened(image, PART, image[THERE].ravel())[THERE]) == 0
+    assert np.ptp(equalize_contrast(image, ROI, image[IN_ROI].ravel())) <= 255
+    assert np.ptp(equalize_contrast(image, ROI, image[IN_ROI].ravel())[IN_ROI]) == 0
 
 
 def test_a_part_smaller_than_a_tile_is_evened(dark_before_bright):
-    after = evened(dark_before_bright, (100, 80, 30, 25), NOTHING)
+    after = equalize_contrast(dark_before_bright, (100, 80, 30, 25), NOTHING)
     assert after.shape == dark_before_bright.shape

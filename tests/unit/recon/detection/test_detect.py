@@ -48,7 +48,7 @@ def test_the_face_is_found_where_the_head_is(shot):
     assert chosen.width_mm == pytest.approx(w * chosen.depth_mm / calib.color.fx)
 
 
-def test_the_nearest_of_two_wins_and_nothing_behind_it_is_looked_at(pair):
+def test_the_nearest_of_two_wins_and_nothing_behind_it_is_searched(pair):
     found = detected(pair.frame)
     near, = found.candidates
     assert near.verdict == "chosen"
@@ -98,8 +98,8 @@ def test_a_photograph_before_a_face_is_named_and_not_chosen(pair):
     assert {c.verdict for c in others} == {"flat"}
 
 
-def middle_off(found, shot):
-    """How far the box's middle is from the true face's, in widths of the box."""
+def center_off(found, shot):
+    """How far the box's centre is from the true face's, in widths of the box."""
     calib = shot.frame.calibration
     pixels = calib.color.project(calib.depth_to_color.apply(shot.truth.face_points()))
     x, y, w, h = found.box
@@ -109,16 +109,16 @@ def middle_off(found, shot):
 
 @pytest.mark.parametrize(("turn", "off"), [
     ({"roll": 25.0}, 0.15), ({"roll": -35.0}, 0.15), ({"yaw": 60.0}, 0.28), ({"yaw": -60.0}, 0.28)])
-def test_a_face_tipped_aside_or_in_profile_is_found_in_its_middle(turn, off):
+def test_a_face_tipped_aside_or_in_profile_is_found_about_its_center(turn, off):
     shot, = simulate(Scene((Person(distance_mm=750, **turn),)), seed=3)
     found = detected(shot.frame)
-    assert middle_off(found, shot) < off
+    assert center_off(found, shot) < off
     assert 130 < found.candidates[0].width_mm < 205
     _, _, w, h = found.box
     assert abs(w - h) <= 1
 
 
-def test_the_middle_stays_when_the_images_are_turned(shot):
+def test_the_center_stays_when_the_images_are_turned(shot):
     """The same head, both images turned about the same place, off the middle of the image."""
     known = shot.frame.calibration
     one = known.color
@@ -145,7 +145,7 @@ def test_the_middle_stays_when_the_images_are_turned(shot):
      {"distance_mm": 730, "offset_mm": (110, -10)}),
     ({"distance_mm": 715, "roll": 18, "skin_gain": (0.02,) * 3},
      {"distance_mm": 1000, "offset_mm": (110, -10)})])
-def test_a_nearer_face_wins_though_the_first_look_sees_only_the_farther(nearer, farther):
+def test_a_nearer_face_wins_though_the_coarse_pass_sees_only_the_farther(nearer, farther):
     one = Person(offset_mm=(-110, 10), **nearer)
     shot, = simulate(Scene((Person(**farther), one)), seed=1)
     alone, = simulate(Scene((one,)), seed=1)
@@ -156,7 +156,7 @@ def test_a_nearer_face_wins_though_the_first_look_sees_only_the_farther(nearer, 
 
 
 @pytest.mark.parametrize("distance_mm", [600, 1000])
-def test_the_box_is_as_wide_as_a_face_whatever_the_first_look_gave(distance_mm):
+def test_the_box_is_as_wide_as_a_face_whatever_the_coarse_pass_gave(distance_mm):
     widths = []
     for step in range(3):
         shot, = simulate(Scene((Person(distance_mm=distance_mm + 35 * step),)), seed=step)
@@ -199,7 +199,7 @@ def test_depth_behind_the_colour_camera_is_named(shot):
         detected(frame)
 
 
-def test_a_dark_picture_is_evened_out(shot):
+def test_a_face_in_a_dark_picture_is_found(shot):
     dark = np.rint(shot.frame.color * 0.12).astype(np.uint8)
     x, y, w, _ = detected(replace(shot.frame, color=dark)).box
     bright = detected(shot.frame).box
@@ -208,11 +208,11 @@ def test_a_dark_picture_is_evened_out(shot):
 
 def test_a_dark_face_is_found_though_tipped():
     shot, = simulate(Scene((Person(roll=18, skin_gain=(0.015,) * 3),)), seed=1)
-    assert middle_off(detected(shot.frame), shot) < 0.2
+    assert center_off(detected(shot.frame), shot) < 0.2
 
 
 def test_a_face_against_the_light_is_found_by_the_contrast_at_its_own_depth():
     against = Light((0.3, -0.5, 1.0), intensity=1.6, ambient=0.02)
     shot, = simulate(Scene((Person(roll=-18),), wall_mm=1500, wall_color=(255, 255, 250),
                            light=against), seed=1)
-    assert middle_off(detected(shot.frame), shot) < 0.2
+    assert center_off(detected(shot.frame), shot) < 0.2

@@ -1,4 +1,4 @@
-"""The cascades' own loop finds what OpenCV's finds, and looks only where it is asked to."""
+"""The cascades' own loop finds what OpenCV's finds, and searches only where it is asked to."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from denseface.recon.detection._haar import load_cascade, passing_boxes
 
 ALT2, DEFAULT = "haarcascade_frontalface_alt2", "haarcascade_frontalface_default"
 PROFILE = "haarcascade_profileface"
-ANYWHERE = np.ones((1, 1), np.bool_)
+EVERYWHERE = np.ones((1, 1), np.bool_)
 
 
 @pytest.fixture(scope="module")
@@ -24,8 +24,8 @@ def whole(image):
     return np.array([[1 / width, 0, 0.5 / width], [0, 1 / height, 0.5 / height]])
 
 
-def ours(image, name, smallest, largest, step, wanted=ANYWHERE, to_cells=None):
-    return set(passing_boxes(image, load_cascade(name), smallest, largest, step, wanted,
+def ours(image, name, smallest, largest, step, allowed=EVERYWHERE, to_cells=None):
+    return set(passing_boxes(image, load_cascade(name), (smallest, largest), step, allowed,
                              whole(image) if to_cells is None else to_cells))
 
 
@@ -50,22 +50,22 @@ def test_the_same_windows_pass_as_in_opencv(gray, name, shrink, smallest, larges
     assert expected or name == PROFILE
 
 
-def test_only_boxes_whose_middle_is_wanted_are_given(gray):
+def test_only_boxes_whose_center_is_allowed_are_given(gray):
     side = 8
     everywhere = ours(gray, ALT2, 80, 160, 1.05)
-    wanted = np.zeros((60, 80), np.bool_)
+    allowed = np.zeros((60, 80), np.bool_)
     x, y, w, h = sorted(everywhere)[len(everywhere) // 2]
     row, column = int((y + h / 2) / side), int((x + w / 2) / side)
-    wanted[row, column] = True
+    allowed[row, column] = True
     to_cells = np.array([[1 / side, 0, 0.5 / side], [0, 1 / side, 0.5 / side]])
-    found = ours(gray, ALT2, 80, 160, 1.05, wanted, to_cells)
+    found = ours(gray, ALT2, 80, 160, 1.05, allowed, to_cells)
     assert (x, y, w, h) in found
     for left, top, wide, high in found:
         assert column * side - 4 <= left + wide / 2 <= (column + 1) * side + 4
         assert row * side - 4 <= top + high / 2 <= (row + 1) * side + 4
     # Where OpenCV leaves a window out beside one that the first stage refused, ours may not.
     assert len(found) < len(everywhere)
-    assert ours(gray, ALT2, 80, 160, 1.05, np.zeros_like(wanted), to_cells) == set()
+    assert ours(gray, ALT2, 80, 160, 1.05, np.zeros_like(allowed), to_cells) == set()
 
 
 def test_boxes_keep_to_their_bounds(gray):

@@ -23,7 +23,7 @@ def regions(depth, every=1, **limit):
     return regions_by_depth(registration(depth, every), SIZE, FOCAL_PX, **limit)
 
 
-def curved(depth, every=4):
+def bulging(depth, every=4):
     one = registration(depth, every)
     return without_flat(regions_by_depth(one, SIZE, FOCAL_PX), one, SIZE, FOCAL_PX)
 
@@ -46,7 +46,7 @@ def two():
 
 
 def covers(region, left, top, right, bottom):
-    x, y, w, h = region.part
+    x, y, w, h = region.roi
     return x <= left and y <= top and x + w >= right and y + h >= bottom
 
 
@@ -62,7 +62,7 @@ def test_a_region_holds_a_face_whose_sides_are_in_the_next_layer(two):
     near, far = regions(two)
     around = 80 * FOCAL_PX / 1300
     assert covers(far, 400 - around, 150 - around, 500 + around, 260 + around)
-    x, y, w, h = near.part
+    x, y, w, h = near.roi
     assert (x, y) >= (0, 0)
     assert w * h < 0.3 * 640 * 480
 
@@ -82,7 +82,7 @@ def test_each_region_lies_inside_the_image(two):
     two[:, :60] = 400
     two[430:, :] = 900
     for region in regions(two):
-        x, y, w, h = region.part
+        x, y, w, h = region.roi
         assert x >= 0
         assert y >= 0
         assert x + w <= 640
@@ -90,13 +90,13 @@ def test_each_region_lies_inside_the_image(two):
 
 
 @pytest.mark.parametrize("every", [1, 4])
-def test_a_middle_of_a_face_is_where_a_thing_is(two, every):
+def test_a_center_of_a_face_is_where_a_thing_is(two, every):
     near, far = regions(two, every)
     side = 640 / CELLS
     for region, (left, top, right, bottom), millimetres in (
             (near, (100, 200, 220, 320), 700), (far, (400, 150, 500, 260), 1300)):
-        rows, columns = np.nonzero(region.middles)
-        inside = region.middles[round(top / side):round(bottom / side),
+        rows, columns = np.nonzero(region.centers)
+        inside = region.centers[round(top / side):round(bottom / side),
                                 round(left / side):round(right / side)]
         assert inside.mean() > 0.95
         out = 50 * FOCAL_PX / millimetres / side
@@ -118,13 +118,13 @@ def test_what_is_farther_than_asked_is_left_out(two):
 @pytest.mark.parametrize("slant", [0.0, 0.6])
 def test_a_wall_is_left_out_and_a_ball_before_it_is_not(every, slant):
     depth = 1100 + slant * (np.arange(640) - 320) + np.zeros(SIZE)
-    assert curved(depth, every) == []
+    assert bulging(depth, every) == []
     with_ball(depth, 200, 240, 700)
-    region, = (r for r in curved(depth, every) if r.near_mm <= 700 < r.far_mm)
+    region, = (r for r in bulging(depth, every) if r.near_mm <= 700 < r.far_mm)
     side = 640 / CELLS
-    assert region.middles[round(240 / side), round(200 / side)]
+    assert region.centers[round(240 / side), round(200 / side)]
     # Whole boxes, of the widest face, fit about all that is left.
-    rows, columns = np.nonzero(region.middles)
+    rows, columns = np.nonzero(region.centers)
     half = 105 * FOCAL_PX / region.near_mm
     assert covers(region, (columns.min() + 0.5) * side - half, (rows.min() + 0.5) * side - half,
                   (columns.max() + 0.5) * side + half, (rows.max() + 0.5) * side + half)
@@ -136,7 +136,7 @@ def test_a_ball_where_little_is_measured_is_not_left_out():
     with_ball(depth, 320, 240, 1500)
     depth[:, np.arange(640) % 32 > 1] = 0
     everything = regions(depth, 1)
-    assert len(curved(depth, 1)) == len(everything)
+    assert len(bulging(depth, 1)) == len(everything)
 
 
 def test_nothing_is_left_of_nothing():

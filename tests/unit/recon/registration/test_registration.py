@@ -113,7 +113,7 @@ def test_empty_depth_is_named():
         register(frame(np.zeros((120, 160), np.uint16), np.zeros((120, 160, 3), np.uint8)))
 
 
-def test_points_are_looked_up_as_if_they_had_been_measured():
+def test_points_are_sampled_as_if_they_had_been_measured():
     depth, color = two_planes()
     shot = frame(depth, color)
     registered = register(shot)
