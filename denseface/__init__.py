@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from denseface.capture import RgbdFrame, open_source
     from denseface.recon import Face, Settings, reconstruct
     from denseface.service.client import AsyncClient, Client
-    from denseface.service.export.formats import load_face, save_face
+    from denseface.service.export import load_face, save_face
 
     __version__: str
 
@@ -25,10 +25,10 @@ _HOMES = {
     "Face": "denseface.recon",
     "RgbdFrame": "denseface.capture",
     "Settings": "denseface.recon",
-    "load_face": "denseface.service.export.formats",
+    "load_face": "denseface.service.export",
     "open_source": "denseface.capture",
     "reconstruct": "denseface.recon",
-    "save_face": "denseface.service.export.formats",
+    "save_face": "denseface.service.export",
 }
 
 

@@ -1,38 +1,49 @@
-"""Everything that may be written of one face: cloud, report, picture."""
+"""All that may be written of one face: cloud or mesh, report, rendering."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from denseface.recon.face import Face
 from denseface.service.errors import StoreError, UsageError, reason_of
 from denseface.service.export.formats import check_ending, save_face
-from denseface.service.runtime.files import write_atomically
+
+if TYPE_CHECKING:
+    from denseface.recon.face import Face
 
 __all__ = ["FaceFiles"]
 
 
 class FaceFiles:
-    """Where to write; each may be None.
+    """Where to write a face; None is not written. Checked here, before the face is made.
+
+    Parameters
+    ----------
+    output : cloud or mesh, in one of `FORMATS`
+    report : `.json`
+    rendering : `.png`
 
     Raises
     ------
     FormatError
         Where an ending is not known.
     UsageError
-        Where a folder does not exist: better said before the work than after.
+        Where an ending is wrong or a folder does not exist.
     """
 
-    def __init__(self, cloud: Path | None, report: Path | None, preview: Path | None) -> None:
-        self._cloud, self._report, self._preview = cloud, report, preview
-        if cloud:
-            check_ending(cloud)
-        for path, ending in ((report, ".json"), (preview, ".png")):
+    def __init__(
+        self, output: Path | None = None, report: Path | None = None,
+        rendering: Path | None = None,
+    ) -> None:
+        self._output, self._report, self._rendering = output, report, rendering
+        if output:
+            check_ending(output)
+        for path, ending in ((report, ".json"), (rendering, ".png")):
             if path and path.suffix.lower() != ending:
                 raise UsageError(f"{path}: expected a name that ends in {ending}")
-        for path in (cloud, report, preview):
+        for path in (output, report, rendering):
             if path and not path.absolute().parent.is_dir():
                 raise UsageError(f"{path}: no such folder: {path.parent}")
 
-    def write(self, face: Face) -> None:
+    def write(self, face: "Face") -> None:
         """Write all; each file is whole or not there.
 
         Raises
@@ -40,15 +51,17 @@ class FaceFiles:
         StoreError
             Where a file cannot be written.
         """
+        from denseface.service.runtime.files import write_atomically
+
         try:
-            if self._cloud:
-                save_face(face, self._cloud)
+            if self._output:
+                save_face(face, self._output)
             if self._report:
                 text = face.report.model_dump_json(indent=2) + "\n"
                 write_atomically(self._report, [text.encode()], durable=False)
-            if self._preview:
+            if self._rendering:
                 from denseface.service.export.render import render
 
-                write_atomically(self._preview, [render(face)], durable=False)
+                write_atomically(self._rendering, [render(face)], durable=False)
         except OSError as error:
             raise StoreError(f"{error.filename or ''}: {reason_of(error)}") from error

@@ -1,6 +1,6 @@
 """Binary glTF 2.0: a coloured triangle mesh that every viewer opens.
 
-Written by hand: Open3D puts the colours in as they are, while glTF wants them linear.
+Not by Open3D: it writes sRGB colours as they are, while glTF wants them linear.
 """
 
 import json
@@ -12,18 +12,21 @@ from numpy.typing import NDArray
 
 from denseface.recon.face import DenseCloud
 
-__all__ = ["glb"]
+__all__ = ["to_glb"]
 
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
+"""Types of chunks, glTF 2.0, section 4.4.3."""
 _FLOAT, _USHORT, _UINT = 5126, 5123, 5125
+"""Component types, glTF 2.0, section 3.6.2.2."""
 _VERTICES, _INDICES = 34962, 34963
+"""Targets of buffer views: ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER."""
 _MM_PER_M = 1000.0
 _FLIP = np.array([1, -1, -1], np.float32)
 """Camera frame (y down, z forward) to glTF's (y up, z toward the viewer)."""
 
 
-def glb(cloud: DenseCloud, triangles: NDArray[np.int32]) -> bytes:
-    """Write the mesh.
+def to_glb(cloud: DenseCloud, triangles: NDArray[np.int32]) -> bytes:
+    """Give the mesh as the bytes of a `.glb` file.
 
     Parameters
     ----------
@@ -31,7 +34,7 @@ def glb(cloud: DenseCloud, triangles: NDArray[np.int32]) -> bytes:
     triangles : (t, 3) int32, rows of `cloud.points`, front side toward the camera
     """
     positions = cloud.points * (_FLIP / np.float32(_MM_PER_M))
-    # An unsigned short for each: a byte is too coarse for linear light in the shadows.
+    # 16 bits a channel: 8 are too coarse for linear light in the shadows.
     colors = np.full((len(cloud), 4), 65535, "<u2")
     colors[:, :3] = np.round(_linear(cloud.colors) * 65535)
     views: list[dict[str, Any]] = []

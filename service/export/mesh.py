@@ -8,7 +8,7 @@ from denseface.recon.face import DenseCloud
 __all__ = ["triangulate"]
 
 _MAX_STEP = 10.0
-"""Largest slope of an edge, in depth for each grid step: steeper is a gap between two surfaces."""
+"""Largest step in depth between neighbours, in grid steps: more is a gap between two surfaces."""
 
 
 def triangulate(cloud: DenseCloud) -> NDArray[np.int32]:
@@ -21,15 +21,15 @@ def triangulate(cloud: DenseCloud) -> NDArray[np.int32]:
     Returns
     -------
     (t, 3) int32, rows of `cloud.points`, counter-clockwise as the camera sees them, so that the
-    front is toward the camera. A block with three points gives one triangle; none spans a step in
-    depth of more than ten grid steps between two neighbours.
+    front is toward the camera. A block with three points gives one triangle; triangles that span
+    more than ten grid steps in depth are left out.
     """
     rows, columns = cloud.grid_shape
     index = np.full((rows, columns), -1, np.int32)
     index[cloud.cells[:, 0], cloud.cells[:, 1]] = np.arange(len(cloud), dtype=np.int32)
     a, b = index[:-1, :-1].ravel(), index[:-1, 1:].ravel()
     c, d = index[1:, :-1].ravel(), index[1:, 1:].ravel()
-    # Camera frame: y points down, so a -> c -> b turns counter-clockwise for one who looks along z.
+    # y points down: a -> c -> b is counter-clockwise seen along z.
     whole = (a >= 0) & (d >= 0)
     triangles = np.concatenate([
         np.stack([a, c, d], axis=1)[whole & (c >= 0)],

@@ -1,6 +1,6 @@
-"""A picture of a face: what was measured, what was made of it, and its shape without colour.
+"""A rendering of a face: measured points, dense points, shape without colour.
 
-Points are splatted into a z-buffer with NumPy alone: no window, no GPU.
+Points are splatted into a z-buffer by NumPy and OpenCV: no window, no GPU.
 """
 
 from dataclasses import dataclass
@@ -17,23 +17,30 @@ from denseface.service.export.mesh import triangulate
 __all__ = ["render"]
 
 _TURN_DEG = 35.0
+"""Angle of the turned view about the vertical, degrees."""
 _VIEWS = (("front", 0.0), (f"turned {_TURN_DEG:.0f} deg", _TURN_DEG))
+"""Caption and angle of each row, degrees."""
 _PANEL = 620
 """Width and height of one panel, pixels."""
 _OVERSAMPLING = 2
+"""Pixels drawn for each pixel of a panel, along each side."""
 _MARGIN, _HEADER, _FOOTER = 14, 74, 56
+"""Around each panel, above and below all, pixels."""
 _FILL = 0.90
-"""Share of a panel that the face may take."""
+"""Share of a panel's width and height that the face may take."""
 _BACKGROUND, _PANEL_COLOR = (20, 22, 24), (31, 34, 37)
+"""RGB."""
 _INK, _FAINT_INK = (236, 238, 240), (156, 162, 168)
+"""RGB, of titles and of captions."""
+_SCALE_BAR_MM = 50
 _SEED_SHARE = 0.75
-"""Side of the square drawn for a measured point, of their mean distance: the gaps show."""
+"""Side of the square of a measured point, in mean spacings: the gaps between points show."""
 _SUBDIVISIONS = 2
-"""Points drawn along each edge of a triangle of the dense surface."""
+"""Parts of each edge of a triangle; points are drawn where they meet."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Shape:
+class _Splats:
     points: NDArray[np.float32]
     side_mm: float
     """Side of the square drawn for each point."""
@@ -42,7 +49,7 @@ class _Shape:
 @dataclass(frozen=True)
 class _Column:
     title: str
-    shape: _Shape
+    splats: _Splats
     colors: NDArray[np.uint8]
 
 
@@ -59,9 +66,9 @@ def render(face: Face) -> bytes:
         A PNG file.
     """
     initial, dense = face.initial, face.dense
-    points, colors, normals = _filled(dense)
-    seeds = _Shape(initial.points, _SEED_SHARE * face.report.mean_spacing_mm)
-    surface = _Shape(points, dense.grid_step_mm)
+    points, colors, normals = _subdivided(dense)
+    seeds = _Splats(initial.points, _SEED_SHARE * face.report.mean_spacing_mm)
+    surface = _Splats(points, dense.grid_step_mm)
     columns = (
         _Column(f"measured: {len(initial):,} points", seeds, initial.colors),
         _Column(f"dense: {len(dense):,} points", surface, colors),
@@ -73,13 +80,12 @@ def render(face: Face) -> bytes:
     height = _HEADER + len(_VIEWS) * (_PANEL + _MARGIN) + _FOOTER
     canvas = np.full((height, width, 3), _BACKGROUND, np.uint8)
     for row, (_, angle) in enumerate(_VIEWS):
-        seen = {shape: _seen(shape, center, scale, angle) for shape in (seeds, surface)}
-        for column, what in enumerate(columns):
+        visible = {splats: _visible(splats, center, scale, angle) for splats in (seeds, surface)}
+        for index, column in enumerate(columns):
             top = _HEADER + row * (_PANEL + _MARGIN)
-            left = _MARGIN + column * (_PANEL + _MARGIN)
-            pixels, points_seen = seen[what.shape]
-            canvas[top:top + _PANEL, left:left + _PANEL] = _panel(
-                pixels, what.colors[points_seen])
+            left = _MARGIN + index * (_PANEL + _MARGIN)
+            pixels, rows = visible[column.splats]
+            canvas[top:top + _PANEL, left:left + _PANEL] = _panel(pixels, column.colors[rows])
     _captions(canvas, columns, scale)
     encoded, png = cv2.imencode(".png", cv2.cvtColor(canvas, cv2.COLOR_RGB2BGR))
     if not encoded:
@@ -87,12 +93,12 @@ def render(face: Face) -> bytes:
     return png.tobytes()
 
 
-def _filled(
+def _subdivided(
     dense: DenseCloud,
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.float32]]:
-    """Give the cloud's points and some on the triangles between, so that no gap is seen.
+    """Give points, colours and normals, and more on the triangles between: no gap is seen.
 
-    Points, colours and normals; linear on each triangle.
+    Linear on each triangle.
     """
     corners = triangulate(dense)
     steps = range(_SUBDIVISIONS + 1)
@@ -100,42 +106,42 @@ def _filled(
                         if i + j <= _SUBDIVISIONS and max(i, j, _SUBDIVISIONS - i - j)
                         < _SUBDIVISIONS], np.float32) / _SUBDIVISIONS
 
-    def spread(values: NDArray[Any]) -> NDArray[np.float32]:
+    def refine(values: NDArray[Any]) -> NDArray[np.float32]:
         between = np.einsum("wc,tcx->wtx", weights, values.astype(np.float32)[corners])
         return np.concatenate([values.astype(np.float32), between.reshape(-1, 3)])
 
-    normals = spread(dense.normals)
+    normals = refine(dense.normals)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return spread(dense.points), np.round(spread(dense.colors)).astype(np.uint8), normals
+    return refine(dense.points), np.round(refine(dense.colors)).astype(np.uint8), normals
 
 
-def _turned(points: NDArray[np.float32], angle_deg: float) -> NDArray[np.float32]:
+def _rotated(points: NDArray[np.float32], angle_deg: float) -> NDArray[np.float32]:
+    """Rotate about the vertical."""
     angle = np.deg2rad(angle_deg)
     c, s = np.cos(angle), np.sin(angle)
-    turned: NDArray[np.float32] = (points @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]).T).astype(
-        np.float32)
-    return turned
+    rotation = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+    return np.asarray(points @ rotation.T, np.float32)
 
 
 def _scale(points: NDArray[np.float32]) -> float:
     """Give the pixels for each millimetre at which every view fits its panel."""
-    extent = max(float(np.abs(_turned(points, angle)[:, :2]).max()) for _, angle in _VIEWS)
+    extent = max(float(np.abs(_rotated(points, angle)[:, :2]).max()) for _, angle in _VIEWS)
     return _FILL * _PANEL / 2 / max(extent, 1.0)
 
 
-def _seen(
-    shape: _Shape, center: NDArray[np.float32], scale: float, angle: float
+def _visible(
+    splats: _Splats, center: NDArray[np.float32], scale: float, angle: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Give the pixels of a panel that are covered and which point each shows."""
+    """Give the pixels of a panel that are covered, and the row of the point that each shows."""
     size = _PANEL * _OVERSAMPLING
     fine = scale * _OVERSAMPLING
-    points = _turned(shape.points - center, angle)
+    points = _rotated(splats.points - center, angle)
     order = np.argsort(-points[:, 2])  # the nearest is drawn last
     u, v = np.floor(points[order, :2] * fine + size / 2).astype(np.intp).T
     inside = np.flatnonzero((u >= 0) & (u < size) & (v >= 0) & (v < size))
     rank = np.full((size, size), -1.0)
-    rank[v[inside], u[inside]] = inside  # of equal places the last counts
-    side = max(2, round(shape.side_mm * fine))
+    rank[v[inside], u[inside]] = inside  # where several share a pixel, the last one stays
+    side = max(2, round(splats.side_mm * fine))
     # The highest rank within reach: each point a square, nearer ones over farther ones.
     rank = cv2.dilate(rank, np.ones((side, side), np.uint8))
     pixels = np.flatnonzero(rank >= 0)
@@ -151,19 +157,18 @@ def _panel(pixels: NDArray[np.intp], colors: NDArray[np.uint8]) -> NDArray[np.ui
 
 
 def _captions(canvas: NDArray[np.uint8], columns: tuple[_Column, ...], scale: float) -> None:
-    for column, what in enumerate(columns):
-        left = _MARGIN + column * (_PANEL + _MARGIN)
-        _write(canvas, what.title, (left + 2, _HEADER - 24), 0.95, _INK)
+    for index, column in enumerate(columns):
+        left = _MARGIN + index * (_PANEL + _MARGIN)
+        _write(canvas, column.title, (left + 2, _HEADER - 24), 0.95, _INK)
     for row, (name, _) in enumerate(_VIEWS):
         _write(canvas, name, (_MARGIN + 14, _HEADER + row * (_PANEL + _MARGIN) + 30), 0.6,
                _FAINT_INK)
-    bar_mm = 50
     y = canvas.shape[0] - 26
-    end = _MARGIN + round(bar_mm * scale)
+    end = _MARGIN + round(_SCALE_BAR_MM * scale)
     cv2.line(canvas, (_MARGIN, y), (end, y), _INK, 2, cv2.LINE_AA)
     for x in (_MARGIN, end):
         cv2.line(canvas, (x, y - 6), (x, y + 6), _INK, 2, cv2.LINE_AA)
-    _write(canvas, f"{bar_mm} mm", (end + 14, y + 7), 0.6, _INK)
+    _write(canvas, f"{_SCALE_BAR_MM} mm", (end + 14, y + 7), 0.6, _INK)
 
 
 def _write(canvas: NDArray[np.uint8], text: str, at: tuple[int, int], size: float,

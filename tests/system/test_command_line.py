@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from denseface.service.export.formats import load_face
+from denseface.service.export import load_face
 from tests.ports import free_port
 from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone
 from tests.waiting import until

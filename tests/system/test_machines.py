@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from denseface.service.client import Client
-from denseface.service.export.formats import load_face
+from denseface.service.export import load_face
 from denseface.service.security.allow_list import Role, allow
 from denseface.service.security.keys import new_pair, read_public
 from tests.ports import free_port

@@ -18,7 +18,7 @@ from denseface.service.errors import (
     PressRefusedError,
     UnknownCaptureError,
 )
-from denseface.service.export.formats import load_face
+from denseface.service.export import load_face
 from tests.ports import free_port
 from tests.system.running import RECORDINGS, denseface, hub_alone, service, sockets
 from tests.virtual_sensor.clip import write_clip

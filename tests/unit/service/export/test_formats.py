@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from denseface.service.errors import FormatError
-from denseface.service.export.formats import load_face, save_face
+from denseface.service.export import load_face, save_face
 from denseface.service.export.mesh import triangulate
 from tests.unit.service.faces import small_face
 
