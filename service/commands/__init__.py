@@ -1,7 +1,6 @@
-"""The subcommands, one module each.
+"""The subcommands, one module each: flags, and what is called with them.
 
-Each has `add_arguments(parser)` and `run(args) -> exit status`, and imports what is heavy in `run`:
-`denseface --help` is to be quick.
+Each is a `Command` and imports what is heavy in `run`: `denseface --help` is to be quick.
 """
 
 import argparse
@@ -24,16 +23,17 @@ COMMANDS = {
     "capture": "run a capture process alone",
     "worker": "run a reconstruction worker alone",
 }
+"""What each does, by the name of its module, in the order of `denseface --help`."""
 
 
 class Command(Protocol):
-    """What each module here is."""
+    """A subcommand's module."""
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
-        """State the command's flags."""
+        """Declare the command's flags."""
 
     def run(self, args: argparse.Namespace) -> int:
-        """Do it and give the exit status."""
+        """Run the command and give its exit status."""
 
 
 def load(name: str) -> Command:

@@ -1,33 +1,25 @@
 """`denseface capture`."""
 
 import argparse
-from pathlib import Path
 
-from denseface.service.commands import options
+from denseface.service.commands import _options
 
 __all__ = ["add_arguments", "run"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """State the flags."""
-    options.add_address(parser)
-    options.add_credentials(parser)
-    add_source(parser)
-    options.add_daemon(parser)
-
-
-def add_source(parser: argparse.ArgumentParser) -> None:
-    """Say where frames come from."""
-    parser.add_argument("--source", default="openni2:", metavar="URI",
-                        help="openni2: for the first sensor, or a .oni or .npz file "
-                             "(default: openni2:)")
-    parser.add_argument("--calibration", type=Path, metavar="FILE.json",
-                        help="calibration that wins over the source's own")
+    """Declare the flags."""
+    _options.add_address(parser)
+    _options.add_credentials(parser)
+    _options.add_source(parser)
+    _options.add_log(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it."""
-    options.start_daemon(args, "capture")
+    """Run the command and give its exit status."""
+    from denseface.service.daemons.startup import start_process
+
+    start_process("capture", args.log)
     from denseface.service.daemons import capture
 
-    return capture.run(options.service_settings(args), args.source, args.calibration)
+    return capture.run(_options.service_settings(args), args.source, args.calibration)

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from denseface.service.commands import options
+from denseface.service.commands import _options
 
 __all__ = ["add_arguments", "run"]
 
@@ -11,7 +11,7 @@ _ROLES = ("sensor", "worker", "presser", "subscriber", "operator")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """State the flags."""
+    """Declare the flags."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     new = actions.add_parser("new", help="make a pair: NAME.secret and NAME.public", description=(
         "Make a pair of keys. `hub` is the name of the hub's own."))
@@ -27,11 +27,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     revoke.add_argument("name", metavar="NAME")
     listed = actions.add_parser("list", help="say which keys are let in")
     for action in (new, allow, revoke, listed):
-        options.add_keys(action)
+        _options.add_keys(action)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it."""
+    """Run the command and give its exit status."""
     import os
 
     from denseface.service.settings import ServiceSettings

@@ -3,19 +3,19 @@
 import argparse
 import sys
 
-from denseface.service.commands import options
+from denseface.service.commands import _options
 
 __all__ = ["add_arguments", "run"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """State the flags."""
-    options.add_address(parser)
-    options.add_credentials(parser)
+    """Declare the flags."""
+    _options.add_address(parser)
+    _options.add_credentials(parser)
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--id", metavar="ID", dest="capture_id",
                       help="this capture, finished or not")
-    what.add_argument("--before", type=options.moment, metavar="TIME",
+    what.add_argument("--before", type=_options.timestamp, metavar="TIME",
                       help="what was accepted before this time, such as 2026-01-31T14:30, UTC or "
                            "with a zone, finished or not")
     what.add_argument("--all", action="store_true",
@@ -24,10 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it."""
-    from pydantic import ValidationError
-
-    from denseface.service.errors import LocalProtocolError, UsageError
+    """Run the command and give its exit status."""
+    from denseface.service.errors import UsageError
 
     chosen = (f"capture {args.capture_id}" if args.capture_id is not None
               else f"all captures accepted before {args.before:%Y-%m-%d %H:%M:%S} UTC"
@@ -38,11 +36,8 @@ def run(args: argparse.Namespace) -> int:
         if input(f"Remove {chosen}, with frame, face and report? [y/N] ").strip().lower() != "y":
             print("nothing removed")
             return 1
-    with options.operator(args) as operator:
-        try:
-            removed = operator.purge(
-                capture_id=args.capture_id, before=args.before, everything=args.all)
-        except ValidationError as error:
-            raise LocalProtocolError(f"capture id {args.capture_id!r}: malformed") from error
+    with _options.operator(args) as operator:
+        removed = operator.purge(
+            capture_id=args.capture_id, before=args.before, everything=args.all)
     print(f"{removed} {'capture' if removed == 1 else 'captures'} removed")
     return 0

@@ -1,17 +1,18 @@
 """`denseface subscribe`."""
 
 import argparse
+from itertools import islice
 from pathlib import Path
 
-from denseface.service.commands import options
+from denseface.service.commands import _options
 
 __all__ = ["add_arguments", "run"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """State the flags."""
-    options.add_address(parser)
-    options.add_credentials(parser)
+    """Declare the flags."""
+    _options.add_address(parser)
+    _options.add_credentials(parser)
     parser.add_argument("--save", type=Path, metavar="DIR",
                         help="write each face as DIR/ID.ply with its report, DIR/ID.json")
     parser.add_argument("--count", type=int, metavar="N", help="end after N captures")
@@ -21,16 +22,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                             "(default: only what comes from now on)")
     start.add_argument("--last", type=int, metavar="N",
                        help="start with the last N captures that are kept")
-    start.add_argument("--since", type=options.moment, metavar="TIME",
+    start.add_argument("--since", type=_options.timestamp, metavar="TIME",
                        help="start with what ended at this time or later, such as "
                             "2026-01-31T14:30, UTC or with a zone")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it."""
-    from denseface.service.client import PublishedFailure
+    """Run the command and give its exit status."""
     from denseface.service.errors import UsageError
-    from denseface.service.export.files import FaceFiles
+    from denseface.service.tools.follow import follow
 
     for name in ("count", "after", "last"):
         value = getattr(args, name)
@@ -38,18 +38,8 @@ def run(args: argparse.Namespace) -> int:
             raise UsageError(f"--{name} {value}: expected a number that is not negative, or zero")
     if args.save and not args.save.is_dir():
         raise UsageError(f"--save {args.save}: no such folder")
-    with options.client(args) as client:
+    with _options.client(args) as client:
         published = client.published(after=args.after, last=args.last, since=args.since)
-        for number, outcome in enumerate(published, start=1):
-            if isinstance(outcome, PublishedFailure):
-                print(f"{outcome.sequence} {outcome.capture_id} failed: {outcome.error}",
-                      flush=True)
-            else:
-                if args.save:
-                    path = args.save / f"{outcome.capture_id}.ply"
-                    FaceFiles(path, path.with_suffix(".json"), None).write(outcome.face)
-                points = len(outcome.face.dense)
-                print(f"{outcome.sequence} {outcome.capture_id} {points} points", flush=True)
-            if number == args.count:
-                break
+        for line in islice(follow(published, args.save), args.count):
+            print(line, flush=True)
     return 0

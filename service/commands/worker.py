@@ -2,22 +2,24 @@
 
 import argparse
 
-from denseface.service.commands import options
+from denseface.service.commands import _options
 
 __all__ = ["add_arguments", "run"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """State the flags."""
-    options.add_address(parser)
-    options.add_credentials(parser)
-    options.add_daemon(parser)
+    """Declare the flags."""
+    _options.add_address(parser)
+    _options.add_credentials(parser)
+    _options.add_log(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it."""
-    options.use_one_thread()
-    options.start_daemon(args, "worker")
+    """Run the command and give its exit status."""
+    from denseface.service.daemons.startup import start_process, use_one_thread
+
+    use_one_thread()
+    start_process("worker", args.log)
     from denseface.service.daemons import worker
 
-    return worker.run(options.service_settings(args))
+    return worker.run(_options.service_settings(args))

@@ -1,7 +1,7 @@
 """The capture process: the only one that touches a sensor or OpenNI2.
 
-All of the driver is called in one thread, so that this process answers while the driver does not;
-one that hangs ends the process, and the supervisor starts another.
+The driver is called in a thread of its own, so that this process answers the hub while it waits.
+A driver that hangs ends the process; the supervisor starts another.
 """
 
 import os
@@ -42,16 +42,16 @@ from denseface.service.transport.hub_connection import HubConnection
 __all__ = ["run"]
 
 _CLOSING_S = 3.0
-"""Longest wait at the end for a frame under way, seconds."""
-_LONGEST_PAUSE_S = 30.0
-"""Between two tries to have the hub take a frame, seconds."""
+"""Longest wait for the driver's last call when the process stops, seconds."""
+_MAX_RESEND_S = 30.0
+"""Longest pause before a frame that is not acknowledged is sent again, seconds."""
 
 
 def run(settings: ServiceSettings, uri: str, calibration: Path | None = None) -> int:
     """Serve frames of a source until SIGINT or SIGTERM and give the exit status.
 
-    A live sensor gives its newest frame for each press; a recording gives its frames in order,
-    one for each press, and starts over after the last.
+    A press gets the newest frame of a live sensor; of a recording the next one, which after the
+    last is the first again.
 
     Raises
     ------
@@ -62,8 +62,8 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None) ->
     sensor = SensorReader(uri, calibration)
     with StopSignal() as stop, Background[RgbdFrame | None]("sensor") as driver:
         try:
-            with HubConnection(settings, "capture") as link:
-                _Capture(settings, link, sensor, driver).serve(stop)
+            with HubConnection(settings, "capture") as connection:
+                _Capture(settings, connection, sensor, driver).serve(stop)
         finally:
             _close(driver, sensor)
         return stop.exit_status
@@ -81,137 +81,140 @@ def _close(driver: Background[RgbdFrame | None], sensor: SensorReader) -> None:
 
 
 @dataclass
-class _Unsafe:
-    """A frame that is sent until the hub says that it is safe."""
+class _UnacknowledgedFrame:
+    """A frame that is sent again and again until the hub answers."""
 
     frame: RgbdFrame
     due: float
-    """When it is to be sent again, seconds."""
+    """When to send it again, by the monotonic clock, seconds."""
     pause_s: float
+    """From the last time it was sent until `due`."""
 
 
 class _Capture:
     def __init__(
-        self, settings: ServiceSettings, link: HubConnection, sensor: SensorReader,
+        self, settings: ServiceSettings, connection: HubConnection, sensor: SensorReader,
         driver: Background[RgbdFrame | None],
     ) -> None:
         self._settings = settings
-        self._link = link
+        self._connection = connection
         self._sensor = sensor
         self._driver = driver
         self._log = structlog.get_logger("capture")
         self._open = False
-        self._asked: deque[str] = deque()
-        self._preview_asked = False
-        self._looking = False
-        """The call under way is for a preview."""
-        self._unsafe: dict[str, _Unsafe] = {}
-        """Frames that the hub has not yet said are safe."""
+        self._presses: deque[str] = deque()
+        """Captures that wait for their frame, oldest first."""
+        self._preview_due = False
+        self._peeking = False
+        """Whether the driver's call is for a preview."""
+        self._unacknowledged: dict[str, _UnacknowledgedFrame] = {}
+        """Frames sent that the hub has neither accepted nor refused, by capture."""
 
     def serve(self, stop: StopSignal) -> None:
         self._driver.start(self._sensor.open)
-        for packet in self._link.packets(stop, self._driver, lambda: None):
+        for packet in self._connection.packets(stop, self._driver, lambda: None):
             if packet is not None:
                 self._receive(packet)
             if self._driver.done():
-                self._called()
+                self._finish_call()
             elif self._driver.elapsed_s > self._settings.take_timeout_s:
                 self._log.error("the driver hangs", source=self._sensor.uri,
                                 seconds=self._driver.elapsed_s)
                 os._exit(1)
-            if self._asked and not self._driver:
+            if self._presses and not self._driver:
                 self._driver.start(self._sensor.take)
-            elif self._preview_asked and not self._driver and not self._unsafe:
-                self._looking = True
+            elif self._preview_due and not self._driver and not self._unacknowledged:
+                self._peeking = True
                 self._driver.start(self._sensor.peek)
-            self._send_again()
+            self._resend()
 
     def _receive(self, packet: Packet) -> None:
         match packet.message:
             case Announce():
                 if self._open:
-                    self._ready()
+                    self._send_ready()
             case Take(capture_id=capture_id):
                 failpoint("capture.take.received")
-                if capture_id in self._unsafe:
-                    self._send_once_more(capture_id)
-                elif capture_id not in self._asked:
-                    self._asked.append(capture_id)
+                if capture_id in self._unacknowledged:
+                    self._transmit(capture_id)
+                elif capture_id not in self._presses:
+                    self._presses.append(capture_id)
             case TakePreview():
-                self._preview_asked = True
+                self._preview_due = True
             case FrameAccepted(capture_id=capture_id):
-                self._unsafe.pop(capture_id, None)
+                self._unacknowledged.pop(capture_id, None)
             case FrameRefused(capture_id=capture_id, message=reason):
                 self._log.warning("frame refused", capture_id=capture_id, reason=reason)
-                self._unsafe.pop(capture_id, None)
+                self._unacknowledged.pop(capture_id, None)
 
-    def _ready(self) -> None:
-        self._link.send(SensorReady(
+    def _send_ready(self) -> None:
+        self._connection.send(SensorReady(
             name=f"{socket.gethostname()}/{os.getpid()}", source=self._sensor.uri))
 
-    def _called(self) -> None:
+    def _finish_call(self) -> None:
         if not self._open:
             self._driver.result()
             self._open = True
             self._log.info("source open", source=self._sensor.uri)
-            self._ready()
+            self._send_ready()
             return
-        looking, self._looking = self._looking, False
+        peeking, self._peeking = self._peeking, False
         try:
             frame = self._driver.result()
         except CaptureError as error:
-            self._no_frame(error, looking=looking)
+            self._call_failed(error, peeking=peeking)
             return
         if frame is None:
             return
-        # What a live sensor gave after a press came in is for the press, whoever wanted it.
-        if self._asked and (not looking or self._sensor.live):
-            capture_id = self._asked.popleft()
+        # A live sensor's frame that came after a press is the press's, for whatever it was taken.
+        if self._presses and (not peeking or self._sensor.live):
+            capture_id = self._presses.popleft()
             failpoint("capture.frame.taken")
             self._log.info("taken", capture_id=capture_id, skew_us=frame.skew_us)
             self._send(capture_id, frame)
-        if self._preview_asked and not self._asked and (looking or self._sensor.live):
-            self._preview_asked = False
+        if self._preview_due and not self._presses and (peeking or self._sensor.live):
+            self._preview_due = False
             self._send_preview(frame)
 
-    def _no_frame(self, error: CaptureError, *, looking: bool) -> None:
-        if looking:
-            self._preview_asked = False
+    def _call_failed(self, error: CaptureError, *, peeking: bool) -> None:
+        if peeking:
+            self._preview_due = False
             self._log.warning("no preview", reason=str(error))
         else:
-            capture_id = self._asked.popleft()
+            capture_id = self._presses.popleft()
             self._log.error("no frame", capture_id=capture_id, reason=str(error))
-            self._link.send(FrameFailed(capture_id=capture_id, message=str(error)[:4000]))
+            self._connection.send(FrameFailed(capture_id=capture_id, message=str(error)[:4000]))
         if isinstance(error, SensorError):
             raise error
 
     def _send_preview(self, frame: RgbdFrame) -> None:
         image = _preview_image(frame.color)
         height, width, _ = image.shape
-        self._link.send(PreviewFrame(preview=PreviewHeader(
+        self._connection.send(PreviewFrame(preview=PreviewHeader(
             width=width, height=height, timestamp_us=frame.color_timestamp_us)),
             {"image": image})
 
     def _send(self, capture_id: str, frame: RgbdFrame) -> None:
-        self._unsafe[capture_id] = _Unsafe(frame, 0.0, self._settings.resend_s)
-        self._send_once_more(capture_id)
+        self._unacknowledged[capture_id] = _UnacknowledgedFrame(
+            frame, due=0.0, pause_s=self._settings.resend_s)
+        self._transmit(capture_id)
 
-    def _send_once_more(self, capture_id: str) -> None:
-        unsafe = self._unsafe[capture_id]
-        unsafe.due = time.monotonic() + unsafe.pause_s
-        header, arrays = FrameHeader.of(unsafe.frame)
-        self._link.send(Frame(capture_id=capture_id, frame=header), arrays)
+    def _transmit(self, capture_id: str) -> None:
+        sent = self._unacknowledged[capture_id]
+        sent.due = time.monotonic() + sent.pause_s
+        header, arrays = FrameHeader.of(sent.frame)
+        self._connection.send(Frame(capture_id=capture_id, frame=header), arrays)
         failpoint("capture.frame.sent")
 
-    def _send_again(self) -> None:
-        """Repeat what got no answer: the hub accepts it, or says that nobody waits any more."""
+    def _resend(self) -> None:
+        """Send frames again that got no answer: the hub accepts each or says it is not wanted."""
         now = time.monotonic()
-        for capture_id, unsafe in self._unsafe.items():
-            if now >= unsafe.due:
-                unsafe.pause_s = min(2 * unsafe.pause_s, _LONGEST_PAUSE_S)
+        for capture_id, sent in self._unacknowledged.items():
+            if now >= sent.due:
+                sent.pause_s = min(2 * sent.pause_s, _MAX_RESEND_S)
                 self._log.warning("frame not acknowledged, sent again", capture_id=capture_id,
-                                  next_in_s=unsafe.pause_s)
-                self._send_once_more(capture_id)
+                                  next_in_s=sent.pause_s)
+                self._transmit(capture_id)
 
 
 def _preview_image(color: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -1,4 +1,4 @@
-"""The hub's process: the only one that binds. Sockets here, decisions in `service.hub.hub`."""
+"""The hub's process: sockets and clock; what is decided is decided in `service.hub`."""
 
 import math
 import os
@@ -32,9 +32,11 @@ from denseface.service.transport.listeners import Listeners
 __all__ = ["run"]
 
 _TICK_S = 0.25
-_SENT = {"take": "hub.take.sent", "frame_accepted": "hub.frame.acknowledged",
-         "press_accepted": "hub.press.acknowledged", "job": "hub.job.sent"}
-"""Failpoints after a kind of message was sent."""
+"""Longest time between two ticks of the hub, seconds."""
+_SENT_FAILPOINTS = {
+    "take": "hub.take.sent", "frame_accepted": "hub.frame.acknowledged",
+    "press_accepted": "hub.press.acknowledged", "job": "hub.job.sent"}
+"""Failpoint that is passed after a message of this kind was sent."""
 
 
 def run(settings: ServiceSettings, recon: Settings) -> int:
@@ -45,10 +47,10 @@ def run(settings: ServiceSettings, recon: Settings) -> int:
     AddressError, KeyFileError, HubRunningError, StoreError
         Where an address or the data folder cannot be had.
     AuthenticatorStoppedError
-        Nobody could be let in any more.
+        Where no connection can be authenticated any more.
     """
-    os.umask(0o077)  # the database's files too are for this user alone
-    keep_freed_memory()  # fetched anew for each face, it costs a third of the processor time
+    os.umask(0o077)  # SQLite's files too are for this user alone
+    keep_freed_memory()  # fetching it anew for each face costs a third of the processor time
     log = structlog.get_logger("hub")
     with StopSignal() as stop, FolderStore(settings.data) as store, WriterThreads() as writer, \
             Observer(settings.data) as observer, zmq.Context() as context:
@@ -57,9 +59,9 @@ def run(settings: ServiceSettings, recon: Settings) -> int:
         try:
             hub = Hub(store, settings, recon, observer.figures, rejections, writer,
                       time.monotonic())
-            loop = _Loop(listeners, hub, rejections, observer, writer)
+            loop = _EventLoop(listeners, hub, rejections, observer, writer)
             log.info("listening", address=" ".join(listeners.addresses), data=str(settings.data))
-            with _scrapes(settings, observer):
+            with _metrics_server(settings, observer):
                 loop.serve(stop)
         finally:
             listeners.close()
@@ -67,7 +69,9 @@ def run(settings: ServiceSettings, recon: Settings) -> int:
         return stop.exit_status
 
 
-def _scrapes(settings: ServiceSettings, observer: Observer) -> AbstractContextManager[object]:
+def _metrics_server(
+    settings: ServiceSettings, observer: Observer
+) -> AbstractContextManager[object]:
     if settings.metrics is None:
         return nullcontext()
     from prometheus_client import make_wsgi_app
@@ -83,7 +87,7 @@ def _scrapes(settings: ServiceSettings, observer: Observer) -> AbstractContextMa
     return server
 
 
-class _Loop:
+class _EventLoop:
     def __init__(
         self, listeners: Listeners, hub: Hub, rejections: Rejections, observer: Observer,
         writer: WriterThreads,
@@ -99,30 +103,34 @@ class _Loop:
         due = time.monotonic()
         while not stop:
             if (now := time.monotonic()) >= due:
-                self._hub.loop_stalled(now - due)
-                subscriptions = self._listeners.subscriptions()
-                watched = subscriptions[Topic.PREVIEW] > 0
-                due = now + (PREVIEW_PERIOD_S if watched else _TICK_S)
-                if self._listeners.tick():
-                    self._drop_revoked()
-                self._hub.show(wanted=watched)
-                outputs = self._hub.tick(now)
-                self._observer.record_tick(now, outputs, subscriptions)
-                self._give_out(outputs)
+                due = self._tick(now, due)
             for incoming in self._listeners.receive(max(0, math.ceil((due - now) * 1000))):
-                self._take_in(incoming)
+                self._receive(incoming)
             if self._writer.has_results():
-                self._give_out(self._hub.written(time.monotonic()))
+                self._send_all(self._hub.written(time.monotonic()))
             stop.drain()
-        # What is being written is kept and said; the sockets linger for it.
-        self._give_out(self._hub.written(time.monotonic(), wait=True))
+        # Writes under way are finished and acknowledged; the sockets linger for that.
+        self._send_all(self._hub.written(time.monotonic(), wait=True))
+
+    def _tick(self, now: float, due: float) -> float:
+        """Let the hub do what time demands; give when the next tick is due."""
+        self._hub.loop_stalled(now - due)
+        subscriptions = self._listeners.subscriptions()
+        watched = subscriptions[Topic.PREVIEW] > 0
+        if self._listeners.tick():
+            self._drop_revoked()
+        self._hub.show(wanted=watched)
+        outputs = self._hub.tick(now)
+        self._observer.record_tick(now, outputs, subscriptions)
+        self._send_all(outputs)
+        return now + (PREVIEW_PERIOD_S if watched else _TICK_S)
 
     def _drop_revoked(self) -> None:
         for peer in self._hub.peers():
             if not self._listeners.is_allowed(peer):
-                self._give_out(self._hub.unreachable(peer, "its key or its roles changed"))
+                self._send_all(self._hub.unreachable(peer, "its key or its roles changed"))
 
-    def _take_in(self, incoming: Incoming) -> None:
+    def _receive(self, incoming: Incoming) -> None:
         who = {"key": incoming.sender.name, "address": incoming.address}
         try:
             packet = decode_to_hub(incoming.parts)
@@ -132,15 +140,15 @@ class _Loop:
         message, sender = packet.message, incoming.sender
         own = (incoming.key != "" and isinstance(message, messages.GetFace)
                and self._hub.pressed_by(message.capture_id) == incoming.key)
-        lacks = missing_role(sender.roles, message, own=own)
-        if lacks:
-            self._rejections.note("role", **who, detail=lacks)
-            self._give_out([_denied(incoming, message, lacks)])
+        missing = missing_role(sender.roles, message, own=own)
+        if missing:
+            self._rejections.note("role", **who, detail=missing)
+            self._send_all([_denied(incoming, message, missing)])
             return
-        self._give_out(self._hub.receive(
+        self._send_all(self._hub.receive(
             time.monotonic(), incoming.peer, packet, incoming.key), packet)
 
-    def _give_out(self, outputs: list[Output], caused_by: Packet | None = None) -> None:
+    def _send_all(self, outputs: list[Output], caused_by: Packet | None = None) -> None:
         for step in steps(outputs):
             self._observer.record(time.monotonic(), caused_by, step)
             self._send(step)
@@ -150,14 +158,14 @@ class _Loop:
         for output in outputs:
             try:
                 parts = encode(output.packet)
-            except LocalProtocolError as error:  # one message less is better than no hub
+            except LocalProtocolError as error:  # the hub goes on without it
                 self._log.error("message not sent", reason=str(error))
                 continue
             if isinstance(output, Publish):
                 self._publish(output.topic, parts)
             elif not self._listeners.send(output.peer, parts):
-                self._give_out(self._hub.unreachable(output.peer))
-            elif name := _SENT.get(output.packet.message.kind):
+                self._send_all(self._hub.unreachable(output.peer))
+            elif name := _SENT_FAILPOINTS.get(output.packet.message.kind):
                 failpoint(name)
 
     def _publish(self, topic: Topic, parts: Sequence[Buffer]) -> None:
@@ -169,10 +177,10 @@ class _Loop:
             failpoint("hub.outcome.published")
 
 
-def _denied(incoming: Incoming, message: messages.Message, lacks: str) -> Output:
-    """Say it in one line to whoever has a key of another role."""
+def _denied(incoming: Incoming, message: messages.Message, missing: str) -> Output:
+    """Give the one line that tells a sender which role its key lacks."""
     has = ", ".join(sorted(incoming.sender.roles))
-    text = f"refused: {lacks}, the key {incoming.sender.name} has {has}"
+    text = f"refused: {missing}, the key {incoming.sender.name} has {has}"
     request = getattr(message, "request", None)
     if request is None:
         return send(incoming.peer, messages.Denied(message=text))

@@ -1,7 +1,4 @@
-"""Starts the processes of the service, watches them, stops them.
-
-The table of `processes` is all that runs.
-"""
+"""The processes of the service: which there are, how they are started, watched and stopped."""
 
 import os
 import select
@@ -15,20 +12,28 @@ from dataclasses import dataclass, field
 
 import structlog
 
+from denseface.service.daemons.startup import ONE_THREAD
+from denseface.service.errors import AddressError
 from denseface.service.runtime.signals import PARENT_VARIABLE, StopSignal
+from denseface.service.settings import ServiceSettings
+from denseface.service.storage.folder_lock import check_folder
+from denseface.service.transport.addresses import check_bindable, is_local
+from denseface.service.transport.listeners import server_credentials
 
-__all__ = ["ONE_THREAD", "ProcessSpec", "Supervisor", "processes"]
-
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-"""Environment of a worker: there is one for each core."""
+__all__ = ["ProcessSpec", "Supervisor", "check_settings", "process_table"]
 
 _GRACE_S = 5.0
-"""From SIGTERM to SIGKILL."""
-_BACKOFF_S, _BACKOFF_MAX_S = 0.5, 30.0
-_STORM_RESTARTS, _STORM_S = 5, 60.0
-"""More restarts than this in this time: something is wrong that a restart does not mend."""
+"""From SIGTERM to SIGKILL, seconds."""
+_BACKOFF_S = 0.5
+"""Pause before the restart that follows a first end, seconds; doubled at each further one."""
+_BACKOFF_MAX_S = 30.0
+"""Longest pause before a restart, seconds."""
+_STORM_S = 60.0
+"""Time over which restarts are counted, seconds."""
+_STORM_RESTARTS = 5
+"""More restarts than this in `_STORM_S`: something is wrong that a restart does not mend."""
 _USAGE = 2
-"""Exit status that says that another try would end the same."""
+"""Exit status of wrong usage or input: another try would end the same."""
 
 
 @dataclass(frozen=True)
@@ -39,46 +44,71 @@ class ProcessSpec:
     arguments: tuple[str, ...]
     """Of the command `denseface`."""
     environment: dict[str, str] = field(default_factory=dict)
+    """Added to the supervisor's own."""
     vital: bool = True
     """All stop where this one ends again and again; else it is tried for ever."""
 
 
-def processes(source: str, workers: int, common: Sequence[str], hub: Sequence[str],
-              capture: Sequence[str]) -> list[ProcessSpec]:
-    """Give the process table, in the order of starting; stopped in the other one.
+def process_table(workers: int, common: Sequence[str], hub: Sequence[str],
+                  capture: Sequence[str]) -> list[ProcessSpec]:
+    """Give all processes of the service, in the order of starting; the hub is stopped last.
 
     Parameters
     ----------
-    common, hub, capture : further arguments of all, of the hub, of the capture process
+    workers : how many
+    common, hub, capture : flags of all, of the hub, of the capture process
     """
     return [
         ProcessSpec("hub", ("hub", *hub, *common)),
         # A sensor may be unplugged for an hour: the hub goes on meanwhile.
-        ProcessSpec("capture", ("capture", *capture, *common, "--source", source), vital=False),
+        ProcessSpec("capture", ("capture", *capture, *common), vital=False),
         *(ProcessSpec(f"worker-{number}", ("worker", *common), ONE_THREAD)
           for number in range(1, workers + 1)),
     ]
 
 
+def check_settings(settings: ServiceSettings) -> None:
+    """Refuse at once, in one line, what the hub would refuse later, among other lines.
+
+    Raises
+    ------
+    AddressError
+        Where the address is not local to this machine, or cannot be bound.
+    KeyFileError
+        Where other machines are to be let in and a key is missing.
+    StoreError, HubRunningError
+        Where the data folder cannot be used.
+    """
+    if not is_local(settings.address):
+        raise AddressError(
+            f"{settings.address}: the processes of `denseface up` meet at a local address; "
+            f"--listen {settings.address} lets other machines in, with CURVE keys")
+    check_bindable(settings.address)
+    check_folder(settings.data)
+    if settings.listen:
+        server_credentials(settings)
+
+
 class _Process:
-    """A row of the table and what runs of it."""
+    """A row of the table and the process that runs for it."""
 
     def __init__(self, spec: ProcessSpec) -> None:
         self.spec = spec
         self.running: subprocess.Popen[bytes] | None = None
         self.due = 0.0
+        """When to start, by the monotonic clock, seconds."""
         self._restarts: deque[float] = deque()
 
     def start(self) -> None:
         environment = os.environ | self.spec.environment | {PARENT_VARIABLE: str(os.getpid())}
-        # -P: a folder `service` where the user stands is not ours. In a group of its own: Ctrl-C
-        # reaches the supervisor alone, which stops all in order.
+        # -P: a folder `denseface` in the working directory is not ours. A process group of its
+        # own: Ctrl-C reaches the supervisor alone, which stops all in order.
         self.running = subprocess.Popen(
             [sys.executable, "-P", "-m", "denseface", *self.spec.arguments],
             env=environment, stdin=subprocess.DEVNULL, process_group=0)
 
     def ended(self) -> int | None:
-        """Give the exit status of what ran, once."""
+        """Give the exit status of a process that ended, once."""
         status = self.running.poll() if self.running else None
         if status is not None:
             self.running = None
@@ -101,10 +131,10 @@ class Supervisor:
         self._log = structlog.get_logger("supervisor")
 
     def run(self) -> int:
-        """Start all, keep all running, stop all at SIGINT or SIGTERM; give the exit status.
+        """Start all, restart what ends, stop all at SIGINT or SIGTERM; give the exit status.
 
         A process that ends with status 2 was asked for the impossible: all stop, with that status.
-        A vital one that ends again and again stops all too, with status 1.
+        All stop with status 1 where a vital one ends again and again.
         """
         with StopSignal(signal.SIGCHLD) as stop:
             try:
@@ -139,7 +169,7 @@ class Supervisor:
                                   in_s=round(max(0.0, process.due - time.monotonic()), 1))
 
     def _stop_all(self) -> None:
-        """Stop the hub last, so that the others can take their leave."""
+        """Stop the hub last, so that the others can still send to it."""
         hub, *others = self._processes
         for group in (others, [hub]):
             running = [process.running for process in group if process.running]

@@ -1,4 +1,4 @@
-"""A worker's process: one job at a time, from frame to face, and the next one at hand."""
+"""The worker process: frames to faces, one job at a time, the next one waiting here already."""
 
 import os
 import socket
@@ -33,9 +33,10 @@ from denseface.service.transport.hub_connection import HubConnection
 
 __all__ = ["run", "warm"]
 
-_MOST_JOBS = 2
+_MAX_JOBS = 2
+"""The job under way and the one that follows it."""
 _FINISH_S = 3.0
-"""Time for the job under way once told to stop, seconds; the supervisor kills after 5."""
+"""Time to finish the job under way when the process stops, seconds; below the supervisor's 5."""
 
 
 def run(settings: ServiceSettings) -> int:
@@ -48,49 +49,51 @@ def run(settings: ServiceSettings) -> int:
     SettingsError
         Where the address or a key cannot be used.
     """
-    check_connectable(settings.address)  # what is wrong with these is said before it is warm
+    check_connectable(settings.address)  # errors of the settings come before seconds of warm-up
     Credentials.of(settings)
-    cv2.setNumThreads(1)  # one worker for each core; more threads would only fight
+    cv2.setNumThreads(1)
     with StopSignal() as stop:
         begun = time.monotonic()
         warm()
         structlog.get_logger("worker").info("warm", seconds=round(time.monotonic() - begun, 2))
         with Background[Face]("recon") as compute:
-            with HubConnection(settings, "worker") as link:
-                worker = _Worker(settings, link, compute)
+            with HubConnection(settings, "worker") as connection:
+                worker = _Worker(settings, connection, compute)
                 worker.serve(stop)
                 worker.finish()
             if compute:
-                os._exit(stop.exit_status)  # handed back, but its thread would go on to the end
+                os._exit(stop.exit_status)  # the job is handed back, its thread cannot be stopped
         return stop.exit_status
 
 
 def warm() -> None:
-    """Compile and load what the first frame and its face would otherwise wait for."""
+    """Compile and load all that the first job would otherwise wait for."""
     recon.warm()
     warm_packing()
 
 
 class _Worker:
     def __init__(
-        self, settings: ServiceSettings, link: HubConnection, compute: Background[Face]
+        self, settings: ServiceSettings, connection: HubConnection, compute: Background[Face]
     ) -> None:
         self._settings = settings
-        self._link = link
+        self._connection = connection
         self._compute = compute
         self._log = structlog.get_logger("worker")
         self._jobs: deque[Job] = deque()
-        """The one under way, and the one that follows."""
-        self._answer: Callable[[], bool] | None = None
+        """The one under way, then the one that follows."""
+        self._send_answer: Callable[[], bool] | None = None
+        """Sends the answer to a job that ended; False where the hub is not there."""
         self._credit = 0
+        """Jobs asked for so far."""
 
     def serve(self, stop: StopSignal) -> None:
-        for packet in self._link.packets(stop, self._compute, self._holding):
+        for packet in self._connection.packets(stop, self._compute, self._holding):
             if packet is not None:
                 self._receive(packet)
             self._deliver()
-            while self._answer is None and self._compute.done():
-                self._answer = self._computed()
+            while self._send_answer is None and self._compute.done():
+                self._send_answer = self._answer_job()
                 self._deliver()
             if not self._compute.done() and (
                     self._compute.elapsed_s > self._settings.job_timeout_s):
@@ -99,12 +102,12 @@ class _Worker:
                 os._exit(1)
 
     def _deliver(self) -> None:
-        if self._answer and self._answer():  # kept until the hub is there to take it
+        if self._send_answer and self._send_answer():  # else it is tried again
             failpoint("worker.result.sent")
-            self._answer = None
+            self._send_answer = None
 
     def finish(self) -> None:
-        """End the job under way and deliver it; where that takes too long, leave it."""
+        """Finish the job under way and deliver its answer; leave it where that takes too long."""
         self._deliver()
         if self._compute.cancel_queued():
             self._jobs.pop()
@@ -115,44 +118,44 @@ class _Worker:
                     self._log.warning("job handed back", capture_id=self._holding(),
                                       seconds=round(self._compute.elapsed_s, 1))
                     return
-                self._link.send(Heartbeat(holding=self._holding()))
-            self._answer = self._computed()
+                self._connection.send(Heartbeat(holding=self._holding()))
+            self._send_answer = self._answer_job()
             self._deliver()
 
     def _holding(self) -> str | None:
         return self._jobs[0].capture_id if self._jobs else None
 
-    def _ready(self) -> None:
-        self._link.send(WorkerReady(
+    def _send_ready(self) -> None:
+        self._connection.send(WorkerReady(
             name=f"{socket.gethostname()}/{os.getpid()}", credit=self._credit))
 
     def _receive(self, packet: Packet) -> None:
         match packet.message:
             case Announce():
-                if len(self._jobs) < _MOST_JOBS:
-                    self._ready()
+                if len(self._jobs) < _MAX_JOBS:
+                    self._send_ready()
             case Job() as job:
-                if len(self._jobs) == _MOST_JOBS:  # the hub redelivers what is not held here
+                if len(self._jobs) == _MAX_JOBS:  # the hub redelivers what no heartbeat names
                     self._log.warning("job dropped, busy", capture_id=job.capture_id)
                     return
                 failpoint("worker.job.received")
                 self._jobs.append(job)
-                self._compute.start(lambda: _face_of(job, packet.arrays))
+                self._compute.start(lambda: _reconstruct(job, packet.arrays))
                 if len(self._jobs) == 1:
-                    self._begun()
+                    self._ask_for_next()
 
-    def _begun(self) -> None:
+    def _ask_for_next(self) -> None:
         """Ask for the job that follows the one under way, if there is one."""
         if self._jobs:
             self._credit += 1
-            self._ready()
+            self._send_ready()
             job = self._jobs[0]
             self._log.info("job", capture_id=job.capture_id, attempt=job.attempt)
 
-    def _computed(self) -> Callable[[], bool]:
-        """Give what sends the answer to the job that ended; the next one is under way already."""
+    def _answer_job(self) -> Callable[[], bool]:
+        """Give what sends the answer to the job that ended; the next one has begun already."""
         job = self._jobs.popleft()
-        self._begun()
+        self._ask_for_next()
         try:
             face = self._compute.result()
             failpoint("worker.job.computed")
@@ -170,12 +173,12 @@ class _Worker:
                 capture_id=job.capture_id, settings_hash=job.settings_hash,
                 frame_sha256=job.frame_sha256, error=type(error).__name__,
                 message=str(error)[:4000], final=final)
-            return lambda: self._link.send(failure)
+            return lambda: self._connection.send(failure)
         self._log.info("face", capture_id=job.capture_id, points=report.dense_points,
                        total_ms=round(report.timings_ms.get("total", 0.0)))
-        return lambda: self._link.send(result, arrays)
+        return lambda: self._connection.send(result, arrays)
 
 
-def _face_of(job: Job, arrays: Arrays) -> Face:
+def _reconstruct(job: Job, arrays: Arrays) -> Face:
     failpoint("worker.job.computing")
     return reconstruct(job.frame.join(arrays), job.settings)

@@ -1,49 +1,62 @@
-"""Reconstruct whatever a source gives, frame after frame, and keep the times."""
+"""Reconstruct whatever a source gives, frame after frame, and show the times."""
 
 import time
-from collections import Counter, deque
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from pathlib import Path
 
-import numpy as np
+import cv2
 
-from denseface.capture import RgbdFrame, Source
+from denseface.capture import RgbdFrame, Source, open_source
 from denseface.capture.errors import UnreadableSourceError
 from denseface.recon import Face, ReconstructionError, Settings, reconstruct, warm
+from denseface.service.runtime.signals import StopSignal
+from denseface.service.tools._live_report import StatusLine, json_summary, text_summary
+from denseface.service.tools._live_statistics import Clock, LiveFrame, LiveStatistics
 
-__all__ = ["LiveFrame", "Tally", "live"]
-
-# Stage times are kept of so many frames, the newest ones: a run may last for days.
-_KEPT = 3600
-_RECENT = 30
-
-Clock = Callable[[], float]
+__all__ = ["reconstruct_frames", "run"]
 
 
-@dataclass(frozen=True, eq=False)
-class LiveFrame:
-    """What became of one frame.
+def run(
+    uri: str, calibration: Path | None, settings: Settings, *, frames: int | None = None,
+    seconds: float | None = None, as_json: bool = False,
+) -> int:
+    """Reconstruct the frames of a source, print a summary and give the exit status.
 
-    Attributes
-    ----------
-    frame : what the source gave
-    outcome : its face, or why there is none
-    timings_ms : wall time of `capture`, the wait for the frame, then of each stage, and `total`
-        without the wait; where there is no face, of `capture` and `without_face`
+    Ends after so many frames or seconds, or at SIGINT or SIGTERM.
+
+    Raises
+    ------
+    CaptureError
+        Where the source cannot be opened or fails; the summary is printed all the same.
     """
+    cv2.setNumThreads(1)
+    with open_source(uri, calibration) as source, StopSignal() as stop:
+        begun = time.perf_counter()
+        warm()
+        warm_ms = (time.perf_counter() - begun) * 1e3
+        statistics = LiveStatistics()
+        try:
+            with StatusLine() as line:
+                for done in reconstruct_frames(source, settings):
+                    statistics.add(done)
+                    line.show(done, statistics)
+                    if stop or statistics.frames == frames or (
+                            seconds is not None and statistics.seconds >= seconds):
+                        break
+        finally:
+            if statistics.frames:
+                print(json_summary(uri, settings, warm_ms, statistics) if as_json
+                      else text_summary(warm_ms, statistics))
+        return stop.exit_status
 
-    frame: RgbdFrame
-    outcome: Face | ReconstructionError
-    timings_ms: dict[str, float]
 
-
-def live(
+def reconstruct_frames(
     source: Source, settings: Settings, clock: Clock = time.perf_counter
 ) -> Iterator[LiveFrame]:
     """Reconstruct each frame of a source; recordings begin again at their end.
 
-    A frame without a face is an outcome like any other. The kernels are warm before the first
-    frame is asked for.
+    A frame without a face is an outcome like any other. The kernels are warm before a frame is
+    asked for.
 
     Parameters
     ----------
@@ -79,70 +92,3 @@ def _endless(source: Source) -> Iterator[RgbdFrame]:
             yield frame
         if empty:
             raise UnreadableSourceError(f"{source.uri}: holds no pair of depth and colour")
-
-
-class Tally:
-    """Counts and times of a live run, from when this is made.
-
-    Parameters
-    ----------
-    clock : seconds, from any start
-    """
-
-    def __init__(self, clock: Clock = time.perf_counter) -> None:
-        self._clock = clock
-        self._start = self._last = clock()
-        self._ends = deque([self._start], _RECENT + 1)
-        self._times: dict[str, deque[float]] = {}
-        self._points: deque[tuple[int, int]] = deque(maxlen=_KEPT)
-        self.failures: Counter[str] = Counter()
-        self.frames = 0
-
-    def add(self, done: LiveFrame) -> None:
-        """Count one frame that is done now."""
-        self._last = self._clock()
-        self._ends.append(self._last)
-        self.frames += 1
-        if isinstance(done.outcome, Face):
-            self._points.append((len(done.outcome.initial), len(done.outcome.dense)))
-        else:
-            self.failures[type(done.outcome).__name__] += 1
-        for stage, taken in done.timings_ms.items():
-            self._times.setdefault(stage, deque(maxlen=_KEPT)).append(taken)
-
-    @property
-    def faces(self) -> int:
-        """How many frames gave a face."""
-        return self.frames - self.failures.total()
-
-    @property
-    def seconds(self) -> float:
-        """From the start to the end of the last frame."""
-        return self._last - self._start
-
-    @property
-    def rate(self) -> float:
-        """Frames a second so far; 0 before the first."""
-        return self.frames / self.seconds if self.seconds else 0.0
-
-    @property
-    def recent_rate(self) -> float:
-        """Frames a second over the last second or so; 0 before the first."""
-        passed = self._ends[-1] - self._ends[0]
-        return (len(self._ends) - 1) / passed if passed else 0.0
-
-    def points(self) -> tuple[int, int] | None:
-        """Give the medians of initial and dense points; None before the first face."""
-        if not self._points:
-            return None
-        initial, dense = np.median(np.array(self._points), axis=0)
-        return round(float(initial)), round(float(dense))
-
-    def stages_ms(self) -> dict[str, tuple[float, float]]:
-        """Give the median and the 99th percentile of each stage's time."""
-        return {stage: _median_p99(times) for stage, times in self._times.items()}
-
-
-def _median_p99(values: deque[float]) -> tuple[float, float]:
-    median, high = np.percentile(np.array(values), (50, 99))
-    return float(median), float(high)

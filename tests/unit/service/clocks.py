@@ -3,6 +3,17 @@
 from datetime import UTC, datetime, timedelta
 
 
+class SteppingClock:
+    """Moves on by a step, seconds, whenever it is read."""
+
+    def __init__(self, step: float = 1.0) -> None:
+        self.now, self.step = 0.0, step
+
+    def __call__(self) -> float:
+        self.now += self.step
+        return self.now
+
+
 class FakeClock:
     """A machine's two clocks."""
 

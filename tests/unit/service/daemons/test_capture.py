@@ -12,7 +12,7 @@ from tests.unit.service.faces import small_frame
 
 ENDED = object()
 """The call under way ends."""
-LOOK = messages.TakePreview()
+PREVIEW = messages.TakePreview()
 
 
 def take(capture_id):
@@ -24,7 +24,7 @@ def safe(capture_id):
 
 
 class Driver:
-    """Does a call when it is told to."""
+    """Makes a call when its end is in the script."""
 
     elapsed_s = 0.0
 
@@ -47,10 +47,10 @@ class Driver:
         return call()
 
 
-class Link:
-    """Tells the process one thing after the other and notes what it says and does.
+class Connection:
+    """Gives the process the messages of a script and notes what it sends.
 
-    A number in its script is so many seconds.
+    A number in the script lets that many seconds pass.
     """
 
     now = 0.0
@@ -70,14 +70,14 @@ class Link:
                 self.driver.call_done = True
                 yield None
             elif isinstance(one, float):
-                Link.now += one
+                Connection.now += one
                 yield None
             else:
                 yield Packet(one)
 
 
-class Eye:
-    """A sensor."""
+class FakeReader:
+    """Gives a small frame, or an error."""
 
     uri = "x"
 
@@ -102,48 +102,49 @@ class Eye:
         return small_frame()
 
 
-def served(eye, *script):
+def served(reader, *script):
     """Give what was sent, and the calls of the driver."""
     driver = Driver()
-    link = Link(driver, script)
-    _Capture(ServiceSettings(address="ipc:///unused"), link, eye, driver).serve(None)
-    return [getattr(one, "capture_id", one.kind) for one in link.sent[1:]], eye.calls
+    connection = Connection(driver, script)
+    _Capture(ServiceSettings(address="ipc:///unused"), connection, reader, driver).serve(None)
+    return [getattr(one, "capture_id", one.kind) for one in connection.sent[1:]], reader.calls
 
 
 def test_a_preview_is_sent_once_when_it_is_asked_for():
-    assert served(Eye(live=True), LOOK, ENDED) == (["preview_frame"], ["peek"])
+    assert served(FakeReader(live=True), PREVIEW, ENDED) == (["preview_frame"], ["peek"])
 
 
 def test_a_press_goes_before_a_preview_that_is_asked_for_with_it():
-    assert served(Eye(live=True), take("a"), LOOK, ENDED, safe("a")) == (
+    assert served(FakeReader(live=True), take("a"), PREVIEW, ENDED, safe("a")) == (
         ["a", "preview_frame"], ["take"])
 
 
 def test_what_a_live_sensor_gives_for_a_preview_is_for_the_press_that_came_meanwhile():
-    assert served(Eye(live=True), LOOK, take("a"), ENDED) == (["a", "preview_frame"], ["peek"])
+    assert served(FakeReader(live=True), PREVIEW, take("a"), ENDED) == (
+        ["a", "preview_frame"], ["peek"])
 
 
 def test_a_second_press_goes_before_the_preview_too():
-    assert served(Eye(live=True), LOOK, take("a"), take("b"), ENDED, ENDED) == (
+    assert served(FakeReader(live=True), PREVIEW, take("a"), take("b"), ENDED, ENDED) == (
         ["a", "b", "preview_frame"], ["peek", "take"])
 
 
-def test_a_recording_s_press_takes_the_frame_that_was_looked_at():
+def test_a_recording_s_press_takes_the_frame_that_was_peeked_at():
     # `SensorReader.take` gives it at once; the preview that is owed shows the one after.
-    assert served(Eye(live=False), LOOK, take("a"), ENDED, ENDED, safe("a"), ENDED) == (
+    assert served(FakeReader(live=False), PREVIEW, take("a"), ENDED, ENDED, safe("a"), ENDED) == (
         ["a", "preview_frame"], ["peek", "take", "peek"])
 
 
 def test_no_preview_while_a_frame_is_not_safe():
-    assert served(Eye(live=False), take("a"), ENDED, LOOK) == (["a"], ["take"])
+    assert served(FakeReader(live=False), take("a"), ENDED, PREVIEW) == (["a"], ["take"])
 
 
 def test_a_frame_that_is_not_acknowledged_is_sent_again_at_growing_intervals(monkeypatch):
     def times(seconds, *then):
-        monkeypatch.setattr(Link, "now", 0.0)
-        return len(served(Eye(live=False), take("a"), ENDED, *[1.0] * seconds, *then)[0])
+        monkeypatch.setattr(Connection, "now", 0.0)
+        return len(served(FakeReader(live=False), take("a"), ENDED, *[1.0] * seconds, *then)[0])
 
-    monkeypatch.setattr("denseface.service.daemons.capture.time.monotonic", lambda: Link.now)
+    monkeypatch.setattr("denseface.service.daemons.capture.time.monotonic", lambda: Connection.now)
     sent = [times(seconds) for seconds in range(91)]
     assert [seconds for seconds in range(1, 91) if sent[seconds] > sent[seconds - 1]] == [
         2, 6, 14, 30, 60, 90]
@@ -152,14 +153,14 @@ def test_a_frame_that_is_not_acknowledged_is_sent_again_at_growing_intervals(mon
 
 def test_a_preview_that_fails_is_no_frame_that_fails():
     error = UnreadableSourceError("damaged")
-    assert served(Eye(error, live=False), LOOK, ENDED) == ([], ["peek"])
-    assert served(Eye(error, live=False), LOOK, take("a"), ENDED, ENDED) == (
+    assert served(FakeReader(error, live=False), PREVIEW, ENDED) == ([], ["peek"])
+    assert served(FakeReader(error, live=False), PREVIEW, take("a"), ENDED, ENDED) == (
         ["a"], ["peek", "take"])
 
 
 def test_a_sensor_that_went_away_ends_the_process_at_a_preview_too():
     with pytest.raises(SensorError, match="unplugged"):
-        served(Eye(SensorError("unplugged"), live=True), LOOK, ENDED)
+        served(FakeReader(SensorError("unplugged"), live=True), PREVIEW, ENDED)
 
 
 @pytest.mark.parametrize(("shape", "small"), [

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from denseface.service.daemons.supervisor import ProcessSpec, Supervisor, _Process, processes
+from denseface.service.daemons.supervisor import ProcessSpec, Supervisor, _Process, process_table
 from tests.waiting import until
 
 
 def test_the_table_names_what_runs():
-    table = processes("x.oni", 2, ["--address", "ipc:///x"], ["--data", "d"], [])
+    table = process_table(2, ["--address=ipc:///x"], hub=["--data=d"], capture=["--source=x.oni"])
     assert [row.name for row in table] == ["hub", "capture", "worker-1", "worker-2"]
-    assert table[0].arguments == ("hub", "--data", "d", "--address", "ipc:///x")
-    assert table[1].arguments[-2:] == ("--source", "x.oni")
+    assert table[0].arguments == ("hub", "--data=d", "--address=ipc:///x")
+    assert table[1].arguments == ("capture", "--source=x.oni", "--address=ipc:///x")
     assert table[2].environment["OMP_NUM_THREADS"] == "1"
 
 

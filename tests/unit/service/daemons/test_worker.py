@@ -27,8 +27,8 @@ def job(capture_id: str) -> Packet:
         frame_sha256="0" * 64, frame=FRAME), ARRAYS)
 
 
-class Link:
-    """Gives a worker what a test says and notes what it sends."""
+class Connection:
+    """Gives a worker the messages of a script and notes what it sends."""
 
     def __init__(self, compute, script, gate):
         self.compute = compute
@@ -64,74 +64,75 @@ class Link:
 
 @pytest.fixture
 def run(monkeypatch):
-    """Let a worker hear a script; give it with what it sent."""
+    """Have a worker serve a script; give it, and its connection with what it sent."""
     gate = threading.Semaphore(0)
 
-    def face_of(job, _):
+    def reconstruct(job, _):
         assert gate.acquire(timeout=20)
         if job.capture_id == "faceless":
             raise NoFaceError("none")
         return small_face()
 
-    monkeypatch.setattr(worker, "_face_of", face_of)
+    monkeypatch.setattr(worker, "_reconstruct", reconstruct)
     with Background("recon") as compute:
-        def listening(*script):
-            link = Link(compute, script, gate)
-            worker = _Worker(SETTINGS, link, compute)
+        def serve(*script):
+            connection = Connection(compute, script, gate)
+            worker = _Worker(SETTINGS, connection, compute)
             worker.serve(object())
-            return worker, link
-        yield listening
+            return worker, connection
+        yield serve
 
 
 def test_it_asks_for_the_next_job_when_it_begins_one(run):
-    _, link = run(Packet(messages.Announce()), job("a"), job("b"), DONE, DONE)
-    assert link.sent == [
+    _, connection = run(Packet(messages.Announce()), job("a"), job("b"), DONE, DONE)
+    assert connection.sent == [
         ("worker_ready", 0), ("worker_ready", 1),
         ("worker_ready", 2), ("result", "a"),  # b is under way before a is answered
         ("result", "b")]
 
 
 def test_it_goes_on_after_a_frame_without_a_face(run):
-    _, link = run(job("faceless"), job("b"), DONE, DONE)
-    assert link.sent[1:] == [("worker_ready", 2), ("job_failed", "faceless"), ("result", "b")]
+    _, connection = run(job("faceless"), job("b"), DONE, DONE)
+    assert connection.sent[1:] == [("worker_ready", 2), ("job_failed", "faceless"), ("result", "b")]
 
 
 def test_a_third_job_is_dropped(run):
-    _, link = run(job("a"), job("b"), job("c"), DONE, DONE)
-    assert [one for one in link.sent if one[0] == "result"] == [("result", "a"), ("result", "b")]
+    _, connection = run(job("a"), job("b"), job("c"), DONE, DONE)
+    assert [one for one in connection.sent if one[0] == "result"] == [
+        ("result", "a"), ("result", "b")]
 
 
 def test_answers_wait_for_the_hub_in_order(run):
-    _, link = run(job("a"), job("b"), False, DONE, DONE, True, None, None)
-    assert link.sent == [("worker_ready", 1), ("result", "a"), ("result", "b")]
+    _, connection = run(job("a"), job("b"), False, DONE, DONE, True, None, None)
+    assert connection.sent == [("worker_ready", 1), ("result", "a"), ("result", "b")]
 
 
 def test_two_that_end_before_it_looks_are_both_answered(run):
-    _, link = run(job("a"), job("b"), BOTH_DONE)
-    assert link.sent == [("worker_ready", 1), ("worker_ready", 2), ("result", "a"),
+    _, connection = run(job("a"), job("b"), BOTH_DONE)
+    assert connection.sent == [("worker_ready", 1), ("worker_ready", 2), ("result", "a"),
                          ("result", "b")]
 
 
 def test_told_to_stop_it_answers_what_it_has_begun_and_begins_nothing(run):
-    worker, link = run(job("a"), job("b"))
+    worker, connection = run(job("a"), job("b"))
     worker.finish()  # a may end at the first heartbeat
-    assert link.sent == [("worker_ready", 1), ("result", "a")]
+    assert connection.sent == [("worker_ready", 1), ("result", "a")]
     assert not worker._compute
 
 
 def test_told_to_stop_it_ends_the_job_that_began_by_itself_too(run):
-    worker, link = run(job("a"), job("b"))
-    link.gate.release()
+    worker, connection = run(job("a"), job("b"))
+    connection.gate.release()
     worker._compute._calls[0].result(20)
     while not worker._compute._calls[1].running():
         pass
     worker.finish()  # b may end at the first heartbeat
-    assert link.sent == [("worker_ready", 1), ("worker_ready", 2), ("result", "a"),
+    assert connection.sent == [("worker_ready", 1), ("worker_ready", 2), ("result", "a"),
                          ("result", "b")]
     assert not worker._compute
 
 
 def test_told_to_stop_it_sends_what_waited_for_the_hub(run):
-    worker, link = run(job("a"), False, DONE, True)
+    worker, connection = run(job("a"), False, DONE, True)
     worker.finish()
-    assert link.sent == [("worker_ready", 1), ("result", "a")]
+    assert connection.sent == [("worker_ready", 1), ("result", "a")]

@@ -1,24 +1,29 @@
-"""Flags that several commands share."""
+"""Flags that several commands share, and what is made of them."""
 
 import argparse
+import math
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from denseface.service.export import FORMATS
 
 if TYPE_CHECKING:
     from denseface.recon.settings import Settings
     from denseface.service.client import Client, Operator
     from denseface.service.settings import ServiceSettings
 
-__all__ = ["add_address", "add_credentials", "add_daemon", "add_hub", "add_keys", "add_listen",
-           "add_metrics", "add_recon", "add_retention", "client", "moment", "operator",
-           "recon_arguments", "recon_settings", "service_settings", "start_daemon",
-           "use_one_thread"]
+__all__ = ["add_address", "add_credentials", "add_hub", "add_keys", "add_listen", "add_log",
+           "add_metrics", "add_outputs", "add_recon", "add_retention", "add_source", "client",
+           "count", "operator", "recon_settings", "repeated", "seconds", "service_settings",
+           "timestamp"]
 
 
 def add_address(parser: argparse.ArgumentParser) -> None:
-    """Say where the hub is."""
+    """Where the hub is."""
     parser.add_argument(
         "--address", "--hub", metavar="ADDRESS",
         help="the hub's, ipc://PATH or tcp://HOST:PORT (default: DENSEFACE_ADDRESS, "
@@ -26,7 +31,7 @@ def add_address(parser: argparse.ArgumentParser) -> None:
 
 
 def add_credentials(parser: argparse.ArgumentParser) -> None:
-    """Say with which keys to go to a hub elsewhere."""
+    """The keys for a hub on another machine."""
     parser.add_argument("--key", type=Path, metavar="FILE",
                         help="one's own secret key, for a hub on another machine "
                              "(default: DENSEFACE_KEY)")
@@ -35,7 +40,7 @@ def add_credentials(parser: argparse.ArgumentParser) -> None:
 
 
 def add_listen(parser: argparse.ArgumentParser) -> None:
-    """Say where other machines are let in, and which."""
+    """Where other machines may connect, and which."""
     parser.add_argument("--listen", action="append", metavar="tcp://HOST:PORT",
                         help="listen here too, for those with an allowed key; may be repeated "
                              "(default: DENSEFACE_LISTEN)")
@@ -46,62 +51,63 @@ def add_listen(parser: argparse.ArgumentParser) -> None:
 
 
 def add_keys(parser: argparse.ArgumentParser) -> None:
-    """Say where keys are kept."""
+    """Where keys are kept."""
     parser.add_argument("--keys", type=Path, metavar="DIR",
                         help="folder of keys (default: DENSEFACE_KEYS, else denseface/keys in this "
                              "user's configuration)")
 
 
-def add_daemon(parser: argparse.ArgumentParser) -> None:
-    """Say how a process logs."""
+def add_log(parser: argparse.ArgumentParser) -> None:
+    """How a process logs."""
     parser.add_argument("--log", choices=("text", "json"), default="text",
                         help="form of the log on stderr (default: text)")
 
 
 def add_hub(parser: argparse.ArgumentParser) -> None:
-    """Say where things are kept."""
+    """Where frames and faces are kept."""
     parser.add_argument("--data", type=Path, metavar="DIR",
                         help="folder of frames and faces (default: DENSEFACE_DATA, else this "
                              "user's data folder)")
 
 
 def add_retention(parser: argparse.ArgumentParser) -> None:
-    """Say for how long."""
+    """For how long captures are kept."""
     parser.add_argument("--retention", metavar="TIME",
                         help="remove captures so long after their outcome: 24h, 90m, 7d, or off "
                              "(default: DENSEFACE_RETENTION, else 24h)")
 
 
 def add_metrics(parser: argparse.ArgumentParser) -> None:
-    """Say where the figures are."""
+    """Where metrics are served."""
     parser.add_argument("--metrics", metavar="PORT",
                         help="serve /metrics and /healthz on this loopback port; 0 chooses one and "
                              "logs it (default: DENSEFACE_METRICS, else off)")
 
 
-def moment(text: str) -> datetime:
-    """Read a time."""
-    from denseface.service.runtime.parsing import parse_time
+def add_source(parser: argparse.ArgumentParser) -> None:
+    """Where frames come from."""
+    parser.add_argument("--source", default="openni2:", metavar="URI",
+                        help="openni2: for the first sensor, or a .oni or .npz file "
+                             "(default: openni2:)")
+    parser.add_argument("--calibration", type=Path, metavar="FILE.json",
+                        help="calibration that wins over the source's own")
 
-    try:
-        return parse_time(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
+
+def add_outputs(parser: argparse.ArgumentParser, *flags: str) -> None:
+    """What is written of a face; `flags` are those of the cloud or mesh."""
+    *endings, last = FORMATS
+    parser.add_argument(*flags, type=Path, metavar="OUT", dest="output",
+                        help=f"write the face: {' '.join(endings)} or {last}")
+    parser.add_argument("--report", type=Path, metavar="R.json", help="write the report")
+    parser.add_argument("--preview", type=Path, metavar="P.png", dest="rendering",
+                        help="write a picture")
 
 
 def add_recon(parser: argparse.ArgumentParser) -> None:
-    """Say how faces are made."""
+    """How faces are reconstructed."""
     parser.add_argument("--preset", metavar="NAME", help="paper, faithful or best (default: best)")
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="changes",
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE",
                         help="change one setting of the reconstruction; may be repeated")
-
-
-def recon_arguments(args: argparse.Namespace) -> list[str]:
-    """Give the flags of `add_recon` again, for a child process."""
-    given = ["--preset", args.preset] if args.preset else []
-    for change in args.changes:
-        given += ["--set", change]
-    return given
 
 
 def recon_settings(args: argparse.Namespace) -> "Settings":
@@ -118,7 +124,7 @@ def recon_settings(args: argparse.Namespace) -> "Settings":
     from denseface.service.errors import UsageError, first_error
 
     given = {"preset": args.preset} if args.preset else {}
-    for change in args.changes:
+    for change in args.set:
         name, equals, value = change.partition("=")
         if not equals or name not in Settings.model_fields:
             raise UsageError(f"--set {change}: expected NAME=VALUE with NAME one of "
@@ -142,36 +148,69 @@ def service_settings(args: argparse.Namespace) -> "ServiceSettings":
 
 
 def client(args: argparse.Namespace) -> "Client":
-    """Connect as the flags of `add_address` and `add_credentials` say."""
+    """Give a client of the hub that `add_address` and `add_credentials` name."""
     from denseface.service.client import Client
 
     return Client(args.address, key=args.key, hub_key=args.hub_key)
 
 
-def operator(args: argparse.Namespace) -> "Operator":
-    """Connect as `client`, to remove too."""
-    from denseface.service.client import Operator
+@contextmanager
+def operator(args: argparse.Namespace) -> Iterator["Operator"]:
+    """Give an operator of that hub.
 
-    return Operator(args.address, key=args.key, hub_key=args.hub_key)
-
-
-def start_daemon(args: argparse.Namespace, name: str) -> None:
-    """Do what every process of the service does first."""
-    from denseface.service.runtime import failpoints
-    from denseface.service.runtime.logging import configure
-    from denseface.service.runtime.signals import die_with_parent
-
-    die_with_parent()
-    configure(args.log, name)
-    failpoints.arm(os.environ)
-
-
-def use_one_thread() -> None:
-    """Keep the libraries of this process to one thread, unless the user says otherwise.
-
-    They read it once, when NumPy is first imported: to be called before.
+    Raises
+    ------
+    LocalProtocolError
+        Where a capture id is malformed.
     """
-    from denseface.service.daemons.supervisor import ONE_THREAD
+    from pydantic import ValidationError
 
-    for name, value in ONE_THREAD.items():
-        os.environ.setdefault(name, value)
+    from denseface.service.client import Operator
+    from denseface.service.errors import LocalProtocolError
+
+    try:
+        with Operator(args.address, key=args.key, hub_key=args.hub_key) as operator:
+            yield operator
+    except ValidationError as error:
+        raise LocalProtocolError(
+            f"capture id {error.errors()[0]['input']!r}: malformed") from error
+
+
+def repeated(args: argparse.Namespace, *names: str) -> list[str]:
+    """Give the flags of these names again as they were given, for a child process."""
+    flags = []
+    for name in names:
+        value = getattr(args, name)
+        if value is True:
+            flags.append(f"--{name}")
+        elif value not in (None, False):
+            flags += [f"--{name}={one}" for one in (value if isinstance(value, list) else [value])]
+    return flags
+
+
+def seconds(text: str) -> float:
+    """Read a duration in seconds."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value <= 86400:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected seconds, more than 0")
+    return value
+
+
+def count(text: str) -> int:
+    """Read a whole number above 0."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number, at least 1")
+    return int(text)
+
+
+def timestamp(text: str) -> datetime:
+    """Read a date and time."""
+    from denseface.service.runtime.parsing import parse_time
+
+    try:
+        return parse_time(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error

@@ -1,0 +1,35 @@
+"""What a process of the service does before anything else."""
+
+import os
+from typing import Literal
+
+from denseface.service.runtime import failpoints
+from denseface.service.runtime.logging import configure
+from denseface.service.runtime.signals import die_with_parent
+
+__all__ = ["ONE_THREAD", "start_process", "use_one_thread"]
+
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Environment of a worker: there is one for each core, more threads would only fight."""
+
+
+def start_process(name: str, log_format: Literal["text", "json"]) -> None:
+    """Tie this process to its supervisor, configure its log, arm its failpoints.
+
+    Parameters
+    ----------
+    name : of the process, in each line of its log
+    log_format : `text` or `json`
+    """
+    die_with_parent()
+    configure(log_format, name)
+    failpoints.arm(os.environ)
+
+
+def use_one_thread() -> None:
+    """Keep the libraries of this process to one thread, unless the user says otherwise.
+
+    To be called before NumPy is imported: the libraries read the environment once, then.
+    """
+    for name, value in ONE_THREAD.items():
+        os.environ.setdefault(name, value)

@@ -1,0 +1,36 @@
+"""One frame out of a file."""
+
+from pathlib import Path
+
+from denseface.capture import RgbdFrame, open_source
+from denseface.service.errors import UsageError
+
+__all__ = ["read_frame"]
+
+
+def read_frame(path: str, number: int, calibration: Path | None) -> RgbdFrame:
+    """Read one frame of a `.npz` or `.oni` file.
+
+    Parameters
+    ----------
+    number : of the frame, from 0
+    calibration : a file that wins over the recording's own
+
+    Raises
+    ------
+    UsageError
+        Where the path names a sensor, or there is no frame of that number.
+    CaptureError
+        Where the file cannot be read.
+    """
+    if path.startswith("openni2:"):
+        raise UsageError(f"{path}: expected a .npz or .oni file; `denseface up` serves a sensor")
+    with open_source(path, calibration=calibration) as source:
+        count = source.frame_count
+        if count is not None and not 0 <= number < count:
+            raise UsageError(f"{path}: has {count} frames (0 to {count - 1}), --frame asks for "
+                             f"{number}")
+        for index, frame in enumerate(source):
+            if index == number:
+                return frame
+    raise UsageError(f"{path}: has fewer than {number + 1} pairs of depth and colour")

@@ -1,0 +1,72 @@
+"""The hub's status: waited for until a press would become a face, and as text or JSON."""
+
+import json
+import time
+
+from denseface.service.client import Client
+from denseface.service.errors import ClientTimeoutError
+from denseface.service.protocol.messages import Status
+
+__all__ = ["as_json", "as_text", "ready_status"]
+
+_POLL_S = 0.1
+"""Time between two requests, seconds."""
+
+
+def ready_status(client: Client, timeout: float) -> Status:
+    """Wait until hub, a sensor and a worker are ready; give the status then.
+
+    Parameters
+    ----------
+    timeout : seconds
+
+    Raises
+    ------
+    ClientTimeoutError
+        One line that says what is missing.
+    """
+    deadline = time.monotonic() + timeout
+    status = client.status(timeout=timeout)
+    while not status.ready:
+        left = deadline - time.monotonic()
+        if left <= 0:
+            missing = "no sensor" if not status.sensors else "no worker"
+            raise ClientTimeoutError(f"{missing} is ready after {timeout:g} s")
+        time.sleep(min(_POLL_S, left))
+        status = client.status()
+    return status
+
+
+def as_json(address: str, status: Status) -> str:
+    """Give the status as one JSON object."""
+    fields = status.model_dump(mode="json", exclude={"kind", "version", "request"})
+    return json.dumps({"address": address, "ready": status.ready} | fields)
+
+
+def as_text(address: str, status: Status) -> str:
+    """Give the status as lines of a name and what it says."""
+    return "\n".join(f"{name:8} {value}" for name, value in _rows(address, status).items())
+
+
+def _rows(address: str, status: Status) -> dict[str, str]:
+    rows = {
+        "hub": f"{status.hub_version} at {address}",
+        "sensors": ", ".join(status.sensors) or "none",
+        "workers": ", ".join(status.workers) or "none",
+        "now": f"{status.pressed} pressed, {status.queued} queued, {status.working} working",
+        "kept": f"{status.done} faces, {status.failed} without a face, {status.dead} given up",
+    }
+    if status.free_bytes is not None:
+        rows["disk"] = f"{status.free_bytes / 1e9:.1f} GB free"
+        if status.kept_bytes is not None:
+            rows["disk"] += f", {status.kept_bytes / 1e6:.1f} MB kept"
+    if times := status.latencies.get("press_to_published"):
+        rows["time"] = (f"{times.median_s:.2f} s from press to outcome, 99 % within "
+                        f"{times.p99_s:.2f} s (of {times.count} since the start)")
+    for name, prefix, counts in (
+            ("since", "the start: ", status.since_start),
+            ("presses", "refused: ", status.presses_refused),
+            ("refused", "", status.refused)):
+        if counts:
+            rows[name] = prefix + ", ".join(f"{one} {count}" for one, count in counts.items())
+    return rows

@@ -1,0 +1,23 @@
+"""Outcomes saved as they are published."""
+
+from denseface.service.client import PublishedFace, PublishedFailure
+from denseface.service.errors import CaptureFailedError
+from denseface.service.tools.follow import follow
+from tests.unit.service.faces import small_face
+
+FACE = small_face()
+OUTCOMES = [PublishedFace("e", 1, "a", FACE),
+            PublishedFailure("e", 2, "b", CaptureFailedError("b", "NoFaceError", "none"))]
+
+
+def test_a_face_is_saved_with_its_report_and_a_failure_is_told(tmp_path):
+    a, b = follow(OUTCOMES, tmp_path)
+    assert a == f"1 a {len(FACE.dense)} points"
+    assert b.startswith("2 b failed: ")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "a.ply"]
+
+
+def test_without_a_folder_nothing_is_saved(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert len(list(follow(OUTCOMES, None))) == 2
+    assert list(tmp_path.iterdir()) == []

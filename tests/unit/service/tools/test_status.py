@@ -1,0 +1,49 @@
+"""The hub's status as its users see it."""
+
+import json
+
+import pytest
+
+from denseface.service.errors import ClientTimeoutError
+from denseface.service.protocol.messages import Status
+from denseface.service.tools import status as module
+from denseface.service.tools.status import as_json, as_text, ready_status
+
+
+def status(*sensors, workers=()):
+    return Status(request=1, epoch="e", sequence=0, hub_version="1", sensors=sensors,
+                  workers=workers, pressed=0, queued=0, working=0, done=2, failed=1, dead=0,
+                  kept_bytes=None, free_bytes=None)
+
+
+class Client:
+    """Answers with one status after the other; the last one stays."""
+
+    def __init__(self, *answers):
+        self.answers = list(answers)
+
+    def status(self, **_):
+        return self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
+
+
+def test_it_is_waited_for_until_a_press_would_become_a_face(monkeypatch):
+    monkeypatch.setattr(module, "_POLL_S", 0.0)
+    ready = status("s", workers=("w",))
+    assert ready_status(Client(status(), status("s"), ready), 60) is ready
+
+
+@pytest.mark.parametrize(("last", "missing"), [(status(), "sensor"), (status("s"), "worker")])
+def test_what_is_missing_at_the_end_is_named(last, missing):
+    with pytest.raises(ClientTimeoutError, match=f"no {missing} is ready after 0.01 s"):
+        ready_status(Client(last), 0.01)
+
+
+def test_programs_and_people_read_the_same():
+    shown = status("s")
+    said = json.loads(as_json("ipc:///x", shown))
+    assert (said["address"], said["ready"], said["sensors"], said["done"]) == (
+        "ipc:///x", False, ["s"], 2)
+    assert as_text("ipc:///x", shown).splitlines() == [
+        "hub      1 at ipc:///x", "sensors  s", "workers  none",
+        "now      0 pressed, 0 queued, 0 working",
+        "kept     2 faces, 1 without a face, 0 given up"]
