@@ -154,7 +154,7 @@ class AuthenticatorStoppedError(ServiceError, RuntimeError):
 
 
 class KeyRefusedError(ServiceError, PermissionError):
-    """The hub does not let this key in."""
+    """The hub refuses this key."""
 
 
 class HubRunningError(ServiceError, RuntimeError):

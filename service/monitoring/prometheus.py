@@ -25,7 +25,7 @@ COUNTERS: dict[str, tuple[str, str | None, str]] = {
     "dead": ("dead", None, "Captures given up after repeated attempts."),
     "redelivered": ("redelivered", None, "Jobs given out again."),
     "removed": ("removed", "by", "Captures removed."),
-    "refused": ("refused", "reason", "Connections and messages that were not let in."),
+    "refused": ("refused", "reason", "Connections and messages refused."),
     "drops": ("publication_drops", "topic",
               "Publications at which a subscriber's queue was found full."),
     "fetched": ("fetched", None, "Outcomes that subscribers asked for instead of hearing them."),

@@ -1,4 +1,4 @@
-"""What was not let through: counted by reason, logged with who it was, but not without end."""
+"""Refused connections and messages: counted by reason, logged with who it was, within a limit."""
 
 import time
 from collections.abc import Callable
@@ -11,15 +11,16 @@ from denseface.service.monitoring.figures import Counters
 __all__ = ["Rejections"]
 
 _BURST = 5.0
+"""Lines that one reason may log at once."""
 _PER_S = 0.2
-"""Lines that one reason may log at once, and for each second after: garbage may not fill a disk."""
+"""Lines that one reason may log per second in the long run: garbage must not fill a disk."""
 
 
 @dataclass
-class _Allowance:
+class _TokenBucket:
     lines: float = _BURST
     since: float = 0.0
-    unsaid: int = 0
+    suppressed: int = 0
 
 
 class Rejections:
@@ -30,7 +31,7 @@ class Rejections:
     ) -> None:
         self._counters = counters
         self._clock = clock
-        self._allowances: dict[str, _Allowance] = {}
+        self._buckets: dict[str, _TokenBucket] = {}
         self._log = structlog.get_logger("hub")
 
     def counts(self) -> dict[str, int]:
@@ -47,13 +48,13 @@ class Rejections:
         """
         self._counters.add("refused", reason)
         now = self._clock()
-        one = self._allowances.setdefault(reason, _Allowance(since=now))
+        one = self._buckets.setdefault(reason, _TokenBucket(since=now))
         one.lines = min(_BURST, one.lines + (now - one.since) * _PER_S)
         one.since = now
         if one.lines < 1:
-            one.unsaid += 1
+            one.suppressed += 1
             return
         one.lines -= 1
-        more = {"more_unsaid": one.unsaid} if one.unsaid else {}
-        one.unsaid = 0
+        more = {"suppressed": one.suppressed} if one.suppressed else {}
+        one.suppressed = 0
         self._log.warning("refused", reason=reason, **who, **more)

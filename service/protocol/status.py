@@ -46,7 +46,7 @@ class Status(BaseAnswer):
     failed: Number
     dead: Number
     refused: _Counts
-    """Connections and messages that were not let in since the hub started, by reason."""
+    """Connections and messages refused since the hub started, by reason."""
     presses_refused: _Counts
     """Since the hub started, by reason."""
     since_start: _Counts

@@ -1,4 +1,4 @@
-"""Addresses: the hub's own, and the one for publications that follows from it."""
+"""Addresses of the hub: its own, and the one for publications that follows from it."""
 
 import socket
 from ipaddress import ip_address
@@ -11,8 +11,10 @@ from denseface.service.settings import runtime_folder
 
 __all__ = ["check_bindable", "check_connectable", "is_local", "publications_of", "socket_file"]
 
-_MAX_SOCKET_PATH = 107 - len(".publications")
 _PUBLICATIONS = ".publications"
+"""Ending of the socket file for publications."""
+_MAX_SOCKET_PATH = 107 - len(_PUBLICATIONS)
+"""Longest path of a socket file, bytes: `sun_path` of unix(7) holds 108, the last is NUL."""
 
 
 def socket_file(address: str) -> Path | None:
@@ -35,7 +37,7 @@ def socket_file(address: str) -> Path | None:
 
 
 def publications_of(address: str) -> str:
-    """Give where the hub of this address publishes: the next port, or a file beside.
+    """Give where the hub of this address publishes: the next port, or the file beside.
 
     Raises
     ------
@@ -49,7 +51,7 @@ def publications_of(address: str) -> str:
 
 
 def is_local(address: str) -> bool:
-    """Say whether an address is open to this machine alone: `ipc`, or a loopback TCP address.
+    """Say whether only this machine reaches an address: `ipc`, or a loopback TCP address.
 
     Raises
     ------
@@ -65,14 +67,14 @@ def is_local(address: str) -> bool:
 
 
 def check_bindable(address: str) -> None:
-    """Make an `ipc` address's folder, and refuse an address that another hub serves.
+    """Make the folder of an `ipc` address, and refuse an address that another hub serves.
 
     Raises
     ------
     AddressError
         As `socket_file`.
     HubRunningError
-        Where a hub answers there already: binding would silently take its place.
+        Where a hub answers there: binding would silently take its place.
     """
     path = socket_file(address)
     if path is None:
@@ -89,8 +91,8 @@ def check_bindable(address: str) -> None:
 def check_connectable(address: str) -> None:
     """Refuse a malformed address, and a default one where somebody else might be the hub.
 
-    The folder of the default address is made if it is not there: in a temporary folder anyone
-    could make it meanwhile, and be sent faces.
+    The folder of the default address is made if it is missing: in a shared temporary folder
+    anyone else could make it, and receive faces.
 
     Raises
     ------
@@ -110,7 +112,7 @@ def _host_and_port(address: str) -> tuple[str, int]:
         host, port = parts.hostname, parts.port
     except ValueError:
         host = port = None
-    # The port after it is the publications'.
+    # The next port is for publications.
     if not host or not port or port == 65535 or address.partition("://")[0] != "tcp" or parts.path:
         raise AddressError(f"{address}: expected ipc://PATH or tcp://HOST:PORT")
     return host, port

@@ -18,9 +18,9 @@ from denseface.service.transport.sockets import open_socket
 __all__ = ["ConnectionMonitor", "Credentials", "connect", "receive_packet"]
 
 _MIN_BROKEN_OFF = 3
-"""Handshakes that break off in a row until it is said why: a hub may have ended in one."""
+"""Handshakes that break off in a row until the keys are blamed: a hub may have ended in one."""
 _RECONNECT_S = 2.0
-"""Time until a daemon that was refused knocks again, seconds: it may be allowed meanwhile."""
+"""Time until a refused daemon connects again, seconds: its key may be allowed meanwhile."""
 _E = zmq.Event
 _EVENTS = (_E.HANDSHAKE_SUCCEEDED | _E.HANDSHAKE_FAILED_AUTH | _E.HANDSHAKE_FAILED_PROTOCOL
            | _E.HANDSHAKE_FAILED_NO_DETAIL)
@@ -28,7 +28,7 @@ _EVENTS = (_E.HANDSHAKE_SUCCEEDED | _E.HANDSHAKE_FAILED_AUTH | _E.HANDSHAKE_FAIL
 
 @dataclass(frozen=True)
 class Credentials:
-    """One's own pair and the hub's public key."""
+    """One's own key pair and the hub's public key."""
 
     pair: KeyPair
     hub: str
@@ -37,7 +37,7 @@ class Credentials:
     def of(cls, settings: ServiceSettings) -> Self | None:
         """Read the keys that the settings name; None where they name none.
 
-        The local door, a socket file, wants no keys: there is nothing to read for it.
+        A socket file is local and needs no keys: none are read for it.
 
         Raises
         ------
@@ -53,14 +53,14 @@ class Credentials:
         return cls(read_pair(key), read_public(hub))
 
     def apply(self, socket: "zmq.Socket[bytes]") -> None:
-        """Have a socket use them when it connects."""
+        """Set them on a socket before it connects."""
         socket.set(zmq.CURVE_SERVERKEY, self.hub.encode())
         socket.set(zmq.CURVE_PUBLICKEY, self.pair.public.encode())
         socket.set(zmq.CURVE_SECRETKEY, self.pair.secret.encode())
 
 
 class ConnectionMonitor:
-    """Listens to how a socket's connections begin and remembers why the last one did not."""
+    """Reads how a socket's handshakes end and remembers why the last one failed."""
 
     def __init__(self, socket: "zmq.Socket[bytes]", address: str, keys: Credentials | None) -> None:
         self._socket = socket
@@ -70,10 +70,10 @@ class ConnectionMonitor:
         self._broken_off = 0
         self._reconnect_at: float | None = None
         self.refused: KeyRefusedError | None = None
-        """Why the hub does not let us in; None where it did, or is not there."""
+        """Why the hub refuses this connection; None where it does not, or is not there."""
 
     def read(self) -> bool:
-        """Take note of what happened; True where it is a new refusal."""
+        """Read what happened; True where it is a new refusal."""
         before = str(self.refused)
         while self._monitor.poll(0):
             said = parse_monitor_message(self._monitor.recv_multipart())
@@ -83,7 +83,7 @@ class ConnectionMonitor:
         return self.refused is not None and str(self.refused) != before
 
     def check(self) -> None:
-        """Raise why the hub does not let us in; the next call begins anew."""
+        """Raise KeyRefusedError where the hub refuses this connection, and connect anew."""
         self.read()
         if self.refused:
             refused, self.refused = self.refused, None
@@ -91,7 +91,7 @@ class ConnectionMonitor:
             raise refused
 
     def close(self) -> None:
-        """Listen no more; to be called before the socket is closed."""
+        """Stop reading; to be called before the socket is closed."""
         if not self._socket.closed:
             self._socket.disable_monitor()
         self._monitor.close(linger=0)
@@ -102,8 +102,8 @@ class ConnectionMonitor:
             return
         if event is _E.HANDSHAKE_FAILED_AUTH:
             self.refused = KeyRefusedError(
-                f"{self._address}: the hub does not let this key in: it was not allowed there for "
-                "this, or revoked")
+                f"{self._address}: the hub refuses this key: it is not allowed there for this, or "
+                "was revoked")
         elif event is _E.HANDSHAKE_FAILED_PROTOCOL:
             self.refused = self._mismatch()
         else:
@@ -111,7 +111,7 @@ class ConnectionMonitor:
             if self._broken_off >= _MIN_BROKEN_OFF:
                 self.refused = self._mismatch()
             return
-        # libzmq takes these two for final and would not try again.
+        # libzmq takes these failures for final and would not try again.
         self._reconnect_at = time.monotonic() + _RECONNECT_S
 
     def _reconnect(self) -> None:
@@ -133,10 +133,10 @@ class ConnectionMonitor:
 def connect(
     context: "zmq.Context[zmq.Socket[bytes]]", kind: int, address: str, keys: Credentials | None
 ) -> "tuple[zmq.Socket[bytes], ConnectionMonitor]":
-    """Open a socket toward the hub, which may come later."""
+    """Connect a socket to the hub, which may be started later."""
     socket = open_socket(context, kind, address)
     if kind == zmq.DEALER:
-        # Nothing is queued for a hub that is not there: it would arrive stale.
+        # Nothing is queued while the hub is not there: it would arrive stale.
         socket.set(zmq.IMMEDIATE, 1)
     if keys:
         keys.apply(socket)

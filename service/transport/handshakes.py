@@ -1,6 +1,6 @@
-"""Connections that never became any: garbage, other mechanisms, wrong keys, silence.
+"""Handshakes that fail: garbage, other mechanisms, wrong keys, silence.
 
-libzmq ends them by itself and says so on a socket's monitor, which is read here to count them.
+libzmq closes such connections by itself and reports it on the socket's monitor.
 """
 
 import errno
@@ -11,11 +11,12 @@ from contextlib import suppress
 import zmq
 from zmq.utils.monitor import parse_monitor_message
 
-from denseface.service.monitoring.rejections import Rejections
+from denseface.service.monitoring import Rejections
 
 __all__ = ["HandshakeMonitor", "address_of"]
 
 _BURST = 64
+"""Events read at a time."""
 _E = zmq.Event
 _EVENTS = (_E.ACCEPTED | _E.DISCONNECTED | _E.HANDSHAKE_SUCCEEDED | _E.HANDSHAKE_FAILED_AUTH
            | _E.HANDSHAKE_FAILED_PROTOCOL | _E.HANDSHAKE_FAILED_NO_DETAIL)
@@ -28,20 +29,21 @@ _DETAILS = {
 
 
 class HandshakeMonitor:
-    """Listens to what libzmq says of one listening socket's connections."""
+    """Counts the failed handshakes of one bound socket."""
 
     def __init__(self, listening: "zmq.Socket[bytes]", rejections: Rejections) -> None:
         self._rejections = rejections
         self._listening = listening
         self.socket = listening.get_monitor_socket(int(_EVENTS))
         self._open: dict[int, str] = {}
-        """Descriptor and address of connections that have not said who they are."""
+        """Descriptor -> address of connections whose handshake is not over."""
         self._failed: str | None = None
-        self._unknown = 0
+        """Why the handshake of the connection that is closed next failed."""
+        self._refused = 0
         """Connections refused by the authenticator, which has counted them, and not yet closed."""
 
     def read(self) -> None:
-        """Take note of what happened."""
+        """Read and count what happened."""
         for _ in range(_BURST):
             try:
                 parts = self.socket.recv_multipart(zmq.DONTWAIT)
@@ -51,12 +53,12 @@ class HandshakeMonitor:
             self._note(zmq.Event(said["event"]), said["value"])
 
     def forget(self) -> None:
-        """Take note that all connections were cut, of which libzmq says nothing."""
+        """Forget the open handshakes: all connections were cut, which libzmq does not report."""
         self.read()
         self._open.clear()
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop reading."""
         self._listening.disable_monitor()
         self.socket.close(linger=0)
 
@@ -64,32 +66,32 @@ class HandshakeMonitor:
         if event is _E.ACCEPTED:
             self._open[value] = address_of(value)
         elif event is _E.HANDSHAKE_SUCCEEDED:
-            # It does not say whose: where several knock at once, another may be named later.
+            # Of several at once it does not say which: another address may be named later.
             if self._open:
                 self._open.popitem()
         elif event is _E.HANDSHAKE_FAILED_AUTH:
-            self._unknown += 1
+            self._refused += 1
         elif event is _E.DISCONNECTED:
             self._ended(self._open.pop(value, None))
-        elif value == errno.EFAULT:  # and libzmq goes on to keep the connection shut
+        elif value == errno.EFAULT:  # libzmq refuses the connection
             self._rejections.note("handshake", detail="no authenticator")
         else:
-            self._failed = _DETAILS.get(value, f"{value:#x}")  # DISCONNECTED follows
+            self._failed = _DETAILS.get(value, f"{value:#x}")
 
     def _ended(self, address: str | None) -> None:
         failed, self._failed = self._failed, None
         if failed:
             self._rejections.note("handshake", address=address, detail=failed)
-        elif address and self._unknown:
-            self._unknown -= 1
+        elif address and self._refused:
+            self._refused -= 1
         elif address:
             self._rejections.note("handshake", address=address, detail="not ZeroMQ, or broken off")
 
 
 def address_of(descriptor: int) -> str:
-    """Say who is at the other end of a connection, "gone" where it is closed.
+    """Give the address at the other end of a connection, "gone" where it is closed.
 
-    The number may be that of another file by now, or of a socket of another kind.
+    The descriptor may be another file's by now, or that of a socket of another kind.
     """
     try:
         copy = os.dup(descriptor)

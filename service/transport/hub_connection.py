@@ -23,11 +23,11 @@ from denseface.service.transport.sockets import send_parts
 __all__ = ["HubConnection"]
 
 _RETRY_S = 0.1
-"""Time between two tries to reach a hub that is not there, seconds."""
+"""Interval between heartbeats while the hub is not there, seconds."""
 
 
 class HubConnection:
-    """Sends heartbeats by itself while `packets` waits."""
+    """Sends heartbeats by itself while `packets` waits; says goodbye at the end."""
 
     def __init__(self, settings: ServiceSettings, name: str) -> None:
         check_connectable(settings.address)
@@ -65,15 +65,15 @@ class HubConnection:
         holding : gives the capture that this process works on
         """
         poller = zmq.Poller()
-        for one in (self._socket, stop, wake):
-            poller.register(one, zmq.POLLIN)
+        for readable in (self._socket, stop, wake):
+            poller.register(readable, zmq.POLLIN)
         due = 0.0
         while not stop:
             if (now := time.monotonic()) >= due:
                 sent = self.send(Heartbeat(holding=holding()))
                 due = now + (self._heartbeat_s if sent else min(_RETRY_S, self._heartbeat_s))
                 if self._monitor.read():
-                    self._log.error("not let in", reason=str(self._monitor.refused))
+                    self._log.error("refused by the hub", reason=str(self._monitor.refused))
                 yield None
             ready = dict(poller.poll(max(0, math.ceil((due - time.monotonic()) * 1000))))
             if stop.fileno() in ready:

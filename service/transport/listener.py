@@ -1,27 +1,24 @@
-"""One place where the hub listens: a local door without keys, or a guarded one.
+"""One address where the hub listens: local without keys, or guarded.
 
-A door is a ROUTER for messages and an XPUB for publications. A guarded one has CURVE, an
-authenticator without which nobody comes in, and an allow-list that is asked again at each message:
-a key that is revoked is cut off at once.
+A listener is a ROUTER for messages and an XPUB for publications. A guarded one has CURVE, an
+authenticator without which nobody can connect, and an allow-list that is consulted for each
+message: a key that is revoked is cut off at once.
 """
 
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 
 import zmq
 
-from denseface.service.errors import AddressError
-from denseface.service.monitoring.rejections import Rejections
+from denseface.service.monitoring import Rejections
 from denseface.service.protocol.payload import MAX_PAYLOAD_BYTES
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import MAX_HEADER_BYTES, MAX_PARTS, Buffer
-from denseface.service.security.allow_list import AllowedKey, AllowList
-from denseface.service.security.keys import KeyPair
+from denseface.service.security.allow_list import AllowedKey
 from denseface.service.security.permissions import ALL_ROLES, ROLES_BY_TOPIC
 from denseface.service.security.zap import MESSAGES_DOMAIN, PUBLICATIONS_DOMAIN
+from denseface.service.transport._bound_socket import BoundSocket, ServerCredentials
 from denseface.service.transport.addresses import publications_of, socket_file
-from denseface.service.transport.handshakes import HandshakeMonitor
 from denseface.service.transport.sockets import (
     TooLongError,
     open_socket,
@@ -30,26 +27,22 @@ from denseface.service.transport.sockets import (
     send_parts,
 )
 
-__all__ = ["Incoming", "Listener", "ServerCredentials"]
+__all__ = ["Incoming", "Listener"]
 
 _TOKEN_BYTES = 8
+"""Length of what names a key with its roles, at the start of a peer's name."""
 _LOCAL = bytes(_TOKEN_BYTES)
+"""Stands for the token where there are no keys."""
 _MAX_SUBSCRIPTION_BYTES = 1024
 """MAXMSGSIZE of an XPUB; a handshake is as long."""
-_HANDSHAKE_MS = 10_000
 _FLOOD = 100
-"""Messages of revoked keys between two ticks for which all connections are cut."""
+"""Messages of revoked keys between two ticks from which on all connections are cut."""
 _BURST = 32
-"""Messages taken from one socket between two looks at the clock."""
-
-
-@dataclass(frozen=True)
-class ServerCredentials:
-    """What a guarded door needs."""
-
-    pair: KeyPair
-    """The hub's own."""
-    allow_list: AllowList
+"""Messages taken from one socket at a time, before the loop looks at the clock again."""
+_SUBSCRIBES, _UNSUBSCRIBES = b"\1", b"\0"
+"""First byte of what an XPUB receives (ZMTP); the topic follows."""
+_LOCAL_USER = AllowedKey("", "", ALL_ROLES)
+"""Whoever uses a local listener."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +57,6 @@ class Incoming:
     key: str
     """Fingerprint of the sender's key; empty where it needed none."""
     address: str
-
-
-_ANYONE = AllowedKey("", "", ALL_ROLES)
-"""Whoever came by the local door."""
 
 
 class Listener:
@@ -90,38 +79,38 @@ class Listener:
         self.address = address
         self._credentials = credentials
         self._rejections = rejections
-        self._monitors: list[HandshakeMonitor] = []
         self._subscribed: set[bytes] = set()
         """Tokens of the keys that subscribed since the publisher was bound."""
         self._revoked = 0
-        """Messages with keys that are allowed no more, since the last tick."""
-        self._unbound: dict[zmq.Socket[bytes], str] = {}
-        """What is to be bound again, where its connections were cut."""
+        """Messages with keys that are no longer allowed, since the last tick."""
         self.subscriptions: dict[Topic, int] = dict.fromkeys(Topic, 0)
-        """How many there are of each topic."""
-        self._router = open_socket(context, zmq.ROUTER, address)
-        self._router.set(zmq.ROUTER_MANDATORY, 1)
-        self._publisher = open_socket(context, zmq.XPUB, address)
-        self._publisher.set(zmq.XPUB_MANUAL, 1)
-        self._publisher.set(zmq.MAXMSGSIZE, _MAX_SUBSCRIPTION_BYTES)
+        """Number of subscriptions to each topic."""
+        router = open_socket(context, zmq.ROUTER, address)
+        router.set(zmq.ROUTER_MANDATORY, 1)
+        publisher = open_socket(context, zmq.XPUB, address)
+        publisher.set(zmq.XPUB_MANUAL, 1)
+        publisher.set(zmq.MAXMSGSIZE, _MAX_SUBSCRIPTION_BYTES)
+        if credentials:
+            publisher.set(zmq.LINGER, 0)  # nothing more for a key that is cut off
+        self._router = BoundSocket(
+            router, address, MESSAGES_DOMAIN, credentials, rejections)
+        self._publisher = BoundSocket(
+            publisher, publications_of(address), PUBLICATIONS_DOMAIN, credentials, rejections)
         try:
-            for socket, one, domain in ((self._router, address, MESSAGES_DOMAIN),
-                                        (self._publisher, publications_of(address),
-                                         PUBLICATIONS_DOMAIN)):
-                self._bind(socket, one, domain)
+            self._router.bind()
+            self._publisher.bind()
         except BaseException:
             self.close()
             raise
 
     @property
     def sockets(self) -> "list[zmq.Socket[bytes]]":
-        """What is to be polled for reading."""
-        return [self._router, self._publisher, *(one.socket for one in self._monitors)]
+        """What is to be polled for reading: the ROUTER, then those of `read_events`."""
+        both = self._router, self._publisher
+        return [*(one.socket for one in both), *(one.monitor.socket for one in both if one.monitor)]
 
     def close(self) -> None:
         """Unbind and leave no file behind."""
-        for monitor in self._monitors:
-            monitor.close()
         self._router.close()
         self._publisher.close()
         for address in (self.address, publications_of(self.address)):
@@ -133,40 +122,41 @@ class Listener:
         for _ in range(_BURST):
             try:
                 first, parts = receive_parts(
-                    self._router, MAX_PARTS, MAX_HEADER_BYTES + MAX_PAYLOAD_BYTES)
+                    self._router.socket, MAX_PARTS, MAX_HEADER_BYTES + MAX_PAYLOAD_BYTES)
             except zmq.Again:
                 return
             except TooLongError as error:
                 user = self._user(error.first)
                 self._rejections.note("oversized", key=user.name if user else None,
-                                    address=_address(error.first), detail=str(error))
+                                      address=_address(error.first), detail=str(error))
                 continue
-            if user := self._known(first):
+            if user := self._allowed_user(first):
                 token, key = (user.token, user.fingerprint) if self._credentials else (_LOCAL, "")
                 yield Incoming(token + first.bytes, [part.buffer for part in parts], user, key,
                                _address(first))
 
     def read_events(self) -> None:
-        """Take note of who subscribes, of who leaves and of who was not let in."""
-        for monitor in self._monitors:
-            monitor.read()
+        """Take note of subscriptions, of their ends and of failed handshakes."""
+        for one in (self._router, self._publisher):
+            if one.monitor:
+                one.monitor.read()
         for _ in range(_BURST):
             try:
-                first, _ = receive_parts(self._publisher, 0, 0)
+                first, _ = receive_parts(self._publisher.socket, 0, 0)
             except zmq.Again:
                 return
             except TooLongError as error:
                 self._rejections.note("malformed", address=_address(error.first),
-                                    detail="sent to the publications")
+                                      detail="sent to the publications")
                 continue
-            self._subscription(first)
+            self._read_subscription(first)
 
     def send(self, peer: bytes, parts: Sequence[Buffer]) -> bool:
         """Send to a peer; False where it cannot be reached, or its key was revoked."""
         if not self.is_allowed(peer):
             return False
         try:
-            return send_parts(self._router, [peer[_TOKEN_BYTES:], *parts])
+            return send_parts(self._router.socket, [peer[_TOKEN_BYTES:], *parts])
         except zmq.ZMQError as error:
             if error.errno != zmq.EHOSTUNREACH:
                 raise
@@ -174,7 +164,7 @@ class Listener:
 
     def publish(self, topic: Topic, parts: Sequence[Buffer]) -> bool:
         """Send to all who subscribed to a topic; False where one at least could not take it."""
-        return publish_parts(self._publisher, [topic.encode(), *parts])
+        return publish_parts(self._publisher.socket, [topic.encode(), *parts])
 
     def is_allowed(self, peer: bytes) -> bool:
         """Say whether a peer's key is allowed still, with the roles that it had."""
@@ -184,100 +174,70 @@ class Listener:
         return self._credentials.allow_list.has_token(token)
 
     def disconnect_revoked(self) -> None:
-        """Cut off the keys that are allowed no more, if they subscribed or do not fall silent."""
+        """Cut off keys that are no longer allowed, if they subscribed or go on sending."""
         if self._revoked > _FLOOD:
-            self._unbind(self._router)
+            self._router.cut()
         self._revoked = 0
         if self._credentials and not all(
                 map(self._credentials.allow_list.has_token, self._subscribed)):
-            self._unbind(self._publisher)
+            self._cut_publisher()
 
     def rebind(self) -> None:
-        """Open what was cut."""
-        for socket, address in list(self._unbound.items()):
-            # Not free before libzmq's own thread has closed it: tried again at the next tick.
-            with suppress(zmq.ZMQError):
-                socket.bind(address)
-                del self._unbound[socket]
+        """Listen again where connections were cut."""
+        self._router.rebind()
+        self._publisher.rebind()
 
     def disconnect_all(self) -> bool:
-        """End every connection from another machine; those that may come back will.
+        """End every connection from another machine; those that are allowed come back.
 
-        False where that was done already and the door is not yet open again.
+        False where that was done already and the address is not yet bound again.
         """
-        if self._credentials is None or len(self._unbound) == 2:
+        if not self._credentials or not (self._router.bound or self._publisher.bound):
             return False
-        for socket in (self._router, self._publisher):
-            self._unbind(socket)
-        for monitor in self._monitors:
-            monitor.forget()
+        self._router.cut()
+        self._cut_publisher()
         return True
 
-    def _unbind(self, socket: "zmq.Socket[bytes]") -> None:
-        """End all connections of a socket: one alone cannot be.
-
-        The others come back by themselves in less than a second, pass the authenticator again and
-        fetch what they missed.
-        """
-        if socket not in self._unbound:
-            address = socket.get_string(zmq.LAST_ENDPOINT).rstrip("\0")
-            socket.unbind(address)
-            self._unbound[socket] = address
-        if socket is self._publisher:
-            self._subscribed.clear()
-
-    def _bind(self, socket: "zmq.Socket[bytes]", address: str, domain: bytes) -> None:
-        if self._credentials:
-            socket.set(zmq.CURVE_SERVER, 1)
-            socket.set(zmq.CURVE_SECRETKEY, self._credentials.pair.secret.encode())
-            socket.set(zmq.ZAP_ENFORCE_DOMAIN, 1)
-            socket.set(zmq.ZAP_DOMAIN, domain)
-            socket.set(zmq.HANDSHAKE_IVL, _HANDSHAKE_MS)
-            if socket is self._publisher:
-                socket.set(zmq.LINGER, 0)  # nothing more for a key that is cut off
-            self._monitors.append(HandshakeMonitor(socket, self._rejections))
-        try:
-            socket.bind(address)
-        except zmq.ZMQError as error:
-            raise AddressError(f"{address}: {zmq.strerror(error.errno or 0)}") from error
+    def _cut_publisher(self) -> None:
+        self._publisher.cut()
+        self._subscribed.clear()
 
     def _user(self, first: zmq.Frame) -> AllowedKey | None:
         if self._credentials is None:
-            return _ANYONE
+            return _LOCAL_USER
         return self._credentials.allow_list.get(_property(first, "User-Id"))
 
-    def _known(self, first: zmq.Frame) -> AllowedKey | None:
+    def _allowed_user(self, first: zmq.Frame) -> AllowedKey | None:
         user = self._user(first)
         if user is None:
             self._revoked += 1
             self._rejections.note("revoked key", address=_address(first),
-                                key=_property(first, "User-Id"))
+                                  key=_property(first, "User-Id"))
         return user
 
-    def _subscription(self, first: zmq.Frame) -> None:
-        said = first.bytes
-        name = said[1:].decode("utf-8", "replace")
+    def _read_subscription(self, first: zmq.Frame) -> None:
+        action, name = first.bytes[:1], first.bytes[1:].decode("utf-8", "replace")
         topic = Topic(name) if name in set(Topic) else None
-        if topic and said[:1] in (b"\0", b"\1"):
-            # Of those not let in too: their end is told as well, without a name.
-            self.subscriptions[topic] = max(
-                0, self.subscriptions[topic] + (1 if said[:1] == b"\1" else -1))
-        if said[:1] == b"\0":
+        if topic and action in (_SUBSCRIBES, _UNSUBSCRIBES):
+            # Refused ones are counted too: libzmq tells of their end as of any other.
+            change = 1 if action == _SUBSCRIBES else -1
+            self.subscriptions[topic] = max(0, self.subscriptions[topic] + change)
+        if action == _UNSUBSCRIBES:
             if topic:
-                self._publisher.set(zmq.UNSUBSCRIBE, topic.encode())
+                self._publisher.socket.set(zmq.UNSUBSCRIBE, topic.encode())
             return
-        user = self._known(first)
+        user = self._allowed_user(first)
         if user is None:
             return
-        if said[:1] != b"\1" or topic is None:
+        if action != _SUBSCRIBES or topic is None:
             self._rejections.note("malformed", key=user.name, address=_address(first),
-                                detail=f"no topic {name[:32]!r}")
+                                  detail=f"no topic {name[:32]!r}")
         elif not user.roles & ROLES_BY_TOPIC[topic]:
             self._rejections.note("role", key=user.name, address=_address(first),
-                                detail=f"topic {topic}")
+                                  detail=f"topic {topic}")
         else:
             self._subscribed.add(user.token)
-            self._publisher.set(zmq.SUBSCRIBE, topic.encode())
+            self._publisher.socket.set(zmq.SUBSCRIBE, topic.encode())
 
 
 def _property(frame: zmq.Frame, name: str) -> str:

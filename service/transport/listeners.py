@@ -1,4 +1,4 @@
-"""All doors of the hub, and the one authenticator before the guarded ones."""
+"""All listeners of the hub, and the one authenticator of the guarded ones."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -7,7 +7,7 @@ from typing import Protocol
 import zmq
 
 from denseface.service.errors import AddressError, AuthenticatorStoppedError
-from denseface.service.monitoring.rejections import Rejections
+from denseface.service.monitoring import Rejections
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Buffer
 from denseface.service.runtime.limits import DescriptorWatch, MemoryWatch
@@ -16,8 +16,9 @@ from denseface.service.security.keys import HUB_NAME, read_pair
 from denseface.service.security.permissions import ROLES_BY_TOPIC
 from denseface.service.security.zap import PUBLICATIONS_DOMAIN, Authenticator
 from denseface.service.settings import ServiceSettings
+from denseface.service.transport._bound_socket import ServerCredentials
 from denseface.service.transport.addresses import check_bindable, is_local, socket_file
-from denseface.service.transport.listener import Incoming, Listener, ServerCredentials
+from denseface.service.transport.listener import Incoming, Listener
 
 __all__ = ["Listeners", "guarded_addresses", "server_credentials"]
 
@@ -27,12 +28,16 @@ class _Wakes(Protocol):
 
 
 class Listeners:
-    """Opens every listener that the settings name.
+    """Listens at every address that the settings name.
+
+    Parameters
+    ----------
+    wakes : what `receive` waits for too
 
     Raises
     ------
     AddressError, KeyFileError, HubRunningError
-        Where a listener cannot be opened, or other machines could reach it and there are no keys.
+        Where an address cannot be had, or other machines could reach it and there are no keys.
     """
 
     def __init__(
@@ -74,7 +79,7 @@ class Listeners:
         return [listener.address for listener in self._listeners]
 
     def close(self) -> None:
-        """Close all doors; the authenticator last."""
+        """Close all listeners; the authenticator last."""
         for listener in self._listeners:
             listener.close()
         if self._authenticator:
@@ -82,7 +87,10 @@ class Listeners:
         self._memory.close()
 
     def tick(self) -> bool:
-        """Look at the allow-list; True where peers may have been cut off."""
+        """Apply changes of the allow-list and limits of memory and descriptors.
+
+        True where peers may have been cut off.
+        """
         if self._allow_list is None:
             return False
         self._allow_list.refresh()
@@ -110,21 +118,22 @@ class Listeners:
         Raises
         ------
         AuthenticatorStoppedError
-            Nobody could be let in any more; libzmq refuses all until the hub is started again.
+            libzmq refuses every new connection until the hub is started again.
         """
         if self._authenticator and self._authenticator.socket.closed:
-            raise AuthenticatorStoppedError("the authenticator has stopped: nobody can come in")
+            raise AuthenticatorStoppedError(
+                "the authenticator has stopped: nobody can connect any more")
         ready = dict(self._poller.poll(timeout_ms))
         if self._allow_list and ready:
-            self._allow_list.refresh()  # what was revoked a moment ago is refused already
+            self._allow_list.refresh()  # so that a key revoked a moment ago is refused
         if self._authenticator and self._authenticator.socket in ready:
             self._authenticator.answer()
         for number, listener in enumerate(self._listeners):
             router, *others = listener.sockets
             if router in ready:
-                for one in listener.receive():
-                    yield replace(one, peer=bytes([number]) + one.peer)
-            if any(one in ready for one in others):
+                for incoming in listener.receive():
+                    yield replace(incoming, peer=bytes([number]) + incoming.peer)
+            if any(socket in ready for socket in others):
                 listener.read_events()
 
     def send(self, peer: bytes, parts: Sequence[Buffer]) -> bool:
@@ -137,7 +146,7 @@ class Listeners:
         return all(taken)
 
     def subscriptions(self) -> dict[str, int]:
-        """Give how many subscriptions there are to each topic."""
+        """Give the number of subscriptions to each topic."""
         return {topic: sum(listener.subscriptions[topic] for listener in self._listeners)
                 for topic in Topic}
 
@@ -147,7 +156,7 @@ class Listeners:
 
 
 def guarded_addresses(settings: ServiceSettings) -> list[str]:
-    """Give the addresses that only allowed keys may come to.
+    """Give the addresses to which only allowed keys may connect.
 
     Raises
     ------
@@ -162,12 +171,12 @@ def guarded_addresses(settings: ServiceSettings) -> list[str]:
 
 
 def server_credentials(settings: ServiceSettings) -> ServerCredentials:
-    """Read the hub's key and its allow-list.
+    """Read the hub's key pair and its allow-list.
 
     Raises
     ------
     AddressError
-        Where there is no hub key, or no key is allowed: the doors stay shut.
+        Where there is no hub key, or no key is allowed.
     KeyFileError
         Where the hub's key cannot be used.
     """
@@ -175,14 +184,14 @@ def server_credentials(settings: ServiceSettings) -> ServerCredentials:
     path = settings.key or settings.keys / f"{HUB_NAME}.secret"
     if not path.exists():
         raise AddressError(
-            f"{address}: refused, it is not local to this machine: others are only let in with "
-            f"CURVE security, and there is no hub key {path}; `denseface keys new {HUB_NAME}` "
+            f"{address}: refused, it is not local to this machine: others connect with CURVE "
+            f"security alone, and there is no hub key {path}; `denseface keys new {HUB_NAME}` "
             "makes one")
     allow_list = AllowList(settings.keys)
     if not len(allow_list):
         raise AddressError(
             f"{address}: refused, no key is allowed in {settings.keys / 'allowed'}; "
-            "`denseface keys allow NAME KEY ROLE` lets one in")
+            "`denseface keys allow NAME KEY ROLE` allows one")
     return ServerCredentials(read_pair(path), allow_list)
 
 

@@ -14,8 +14,9 @@ _HIGH_WATER_MARK = 16
 """Messages that may wait in one direction for one peer, some of many megabytes; beyond it they
 are dropped, and asked for again."""
 _LINGER_MS = 500
-"""How long a closing socket tries to deliver its last messages."""
+"""How long a closing socket tries to deliver its last messages, milliseconds."""
 _RECONNECT_MS, _RECONNECT_MAX_MS = 50, 500
+"""Shortest and longest time until libzmq connects again, milliseconds."""
 
 
 class TooLongError(RemoteProtocolError):
@@ -23,7 +24,7 @@ class TooLongError(RemoteProtocolError):
 
     Attributes
     ----------
-    first : its first part, with what libzmq knows of the sender
+    first : its first part, which carries what libzmq knows of the sender
     """
 
     def __init__(self, message: str, first: zmq.Frame) -> None:
@@ -34,7 +35,7 @@ class TooLongError(RemoteProtocolError):
 def open_socket(
     context: "zmq.Context[zmq.Socket[bytes]]", kind: int, address: str
 ) -> "zmq.Socket[bytes]":
-    """Make a socket for an address, with high-water marks, linger and the largest part set."""
+    """Make a socket for an address, with high-water marks, linger and size limit set."""
     socket = context.socket(kind)
     if address.startswith("tcp://["):
         socket.set(zmq.IPV6, 1)
@@ -50,7 +51,7 @@ def open_socket(
 def send_parts(socket: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bool:
     """Send without waiting; False where nobody can take it now.
 
-    Large parts are not copied: nobody may change them afterwards.
+    Large parts are not copied and must not be changed afterwards.
     """
     try:
         socket.send_multipart(parts, flags=zmq.DONTWAIT, copy=False)
@@ -60,13 +61,13 @@ def send_parts(socket: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bool:
 
 
 def publish_parts(publisher: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bool:
-    """Send to all subscribers of an XPUB; False where the queue of one at least was found full.
+    """Send to all subscribers of an XPUB; False where a subscriber's queue was found full.
 
-    It went to the others all the same. Until half of a full queue is taken libzmq passes over it
-    unseen, so what is counted is how often a subscriber fell behind, not how much it missed.
+    The others get the message all the same. libzmq skips a full queue unseen until half of it was
+    read, so False says that a subscriber fell behind, not how much it missed.
     """
-    # Has libzmq take note of what was read meanwhile. It does not look at every sending: it would
-    # take a subscriber that keeps up for one that does not, and pass over one that has caught up.
+    # Makes libzmq process what subscribers have read meanwhile, which it does not at every sending:
+    # it would take those that keep up, or have caught up, for slow ones.
     publisher.get(zmq.EVENTS)
     publisher.set(zmq.XPUB_NODROP, 1)
     try:
@@ -83,7 +84,7 @@ def receive_parts(
 ) -> tuple[zmq.Frame, list[zmq.Frame]]:
     """Receive without waiting: the first part with its properties, and those that follow it.
 
-    A message is taken part by part and kept only as far as it may go.
+    What is beyond the limits is received and dropped.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A subscription's socket, and what may be heard on it without waiting."""
+"""A subscription's socket, read without waiting."""
 
 import zmq
 
@@ -12,7 +12,7 @@ from denseface.service.transport.sockets import receive_parts
 __all__ = ["CHECK_INTERVAL_S", "Subscription"]
 
 CHECK_INTERVAL_S = 1.0
-"""Time between two looks whether the hub still lets us in, seconds."""
+"""Interval at which a client asks whether the hub still accepts its key, seconds."""
 
 
 class Subscription:
@@ -27,13 +27,13 @@ class Subscription:
             self.socket.subscribe(topic)
 
     def close(self) -> None:
-        """Hear no more; harmless when repeated."""
+        """Unsubscribe; harmless when repeated."""
         if not self.socket.closed:
             self.monitor.close()
             self.socket.close(linger=0)
 
     def receive(self) -> Packet | None:
-        """Give what has come; None where it is garbled.
+        """Give what has come; None where it is malformed.
 
         Raises
         ------

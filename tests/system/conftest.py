@@ -37,7 +37,7 @@ def refused(hub):
 
 
 @pytest.fixture
-def knock(hub):
+def connect(hub):
     """Opens connections and closes them."""
     peers = []
 

@@ -1,4 +1,4 @@
-"""A hub with a guarded door as a real process, a key for each role, and peers that say anything."""
+"""A guarded hub as a real process, a key for each role, and peers that send anything."""
 
 import contextlib
 import itertools
@@ -32,7 +32,7 @@ _PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_LIVENESS": "100"}
 
 
 class Peer:
-    """A connection with any key, which says whatever a test has it say."""
+    """A connection with any key, which sends whatever a test has it send."""
 
     def __init__(
         self, address: str, pair: KeyPair | None = None, hub: str | None = None,
@@ -52,10 +52,10 @@ class Peer:
         self.monitor = self.socket.get_monitor_socket()
         self.socket.connect(address)
 
-    def say(self, message: messages.Message, arrays=None) -> None:
+    def send(self, message: messages.Message, arrays=None) -> None:
         self.socket.send_multipart(encode(Packet(message, arrays or {})))
 
-    def hears(self, kind: str) -> Packet:
+    def receive(self, kind: str) -> Packet:
         """Wait for a message of a kind."""
         while self.socket.poll(WAIT_MS):
             packet = decode_from_hub(self.socket.recv_multipart())
@@ -63,8 +63,8 @@ class Peer:
                 return packet
         raise AssertionError(f"no {kind} came")
 
-    def ask(self, message: messages.Request) -> messages.Message:
-        self.say(message)
+    def request(self, message: messages.Request) -> messages.Message:
+        self.send(message)
         while self.socket.poll(WAIT_MS):
             answer = decode_from_hub(self.socket.recv_multipart()).message
             if getattr(answer, "request", None) == message.request:
@@ -72,14 +72,14 @@ class Peer:
         raise AssertionError(f"no answer to {message.kind}")
 
     def status(self) -> messages.Status:
-        answer = self.ask(messages.GetStatus(request=99))
+        answer = self.request(messages.GetStatus(request=99))
         assert isinstance(answer, messages.Status)
         return answer
 
     def poll_status(self) -> messages.Status:
-        """Ask again and again, as a connection may have been cut meanwhile."""
+        """Request repeatedly, as the connection may have been cut meanwhile."""
         for number in range(1000, 1050):
-            self.say(messages.GetStatus(request=number))
+            self.send(messages.GetStatus(request=number))
             if self.socket.poll(500):
                 packet = decode_from_hub(self.socket.recv_multipart())
                 if isinstance(packet.message, messages.Status):
@@ -96,7 +96,7 @@ class Peer:
 
 @dataclass
 class GuardedHub:
-    """A running `denseface hub` with a local and a guarded door."""
+    """A running `denseface hub` with a local and a guarded listener."""
 
     process: "subprocess.Popen[str]"
     local: str
@@ -183,22 +183,22 @@ def press_through(hub: GuardedHub, capture_id: str) -> None:
         subscriber.socket.subscribe("faces")
         subscriber.socket.subscribe("status")
         assert subscriber.socket.poll(WAIT_MS)  # the first status
-        sensor.say(messages.SensorReady(name="s", source="x"))
-        worker.say(messages.WorkerReady(name="w", credit=0))
+        sensor.send(messages.SensorReady(name="s", source="x"))
+        worker.send(messages.WorkerReady(name="w", credit=0))
         until(lambda: hub.status().ready)
-        presser.say(messages.Press(request=1, capture_id=capture_id))
-        sensor.hears("take")
-        sensor.say(messages.Frame(capture_id=capture_id, frame=FRAME), FRAME_ARRAYS)
-        presser.hears("press_accepted")
+        presser.send(messages.Press(request=1, capture_id=capture_id))
+        sensor.receive("take")
+        sensor.send(messages.Frame(capture_id=capture_id, frame=FRAME), FRAME_ARRAYS)
+        presser.receive("press_accepted")
         for credit in itertools.count(1):
-            job = worker.hears("job").message
-            worker.say(messages.Result(
+            job = worker.receive("job").message
+            worker.send(messages.Result(
                 capture_id=job.capture_id, settings_hash=job.settings_hash,
                 frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
             if job.capture_id == capture_id:
                 break
-            worker.say(messages.WorkerReady(name="w", credit=credit))
-        assert presser.ask(messages.GetFace(
+            worker.send(messages.WorkerReady(name="w", credit=credit))
+        assert presser.request(messages.GetFace(
             request=2, capture_id=capture_id, wait_s=10)).kind == "face_done"
         until(lambda: subscriber.socket.recv_multipart()[0] == b"faces")
     finally:
@@ -208,9 +208,9 @@ def press_through(hub: GuardedHub, capture_id: str) -> None:
 
 
 def leave(hub: GuardedHub, *peers: Peer) -> None:
-    """Have all sensors and workers say goodbye, and wait until the hub has heard it."""
+    """Have all sensors and workers say goodbye, and wait until the hub knows."""
     for one in peers:
-        one.say(messages.Goodbye())
+        one.send(messages.Goodbye())
     until(lambda: not hub.status().sensors + hub.status().workers)
 
 

@@ -1,4 +1,4 @@
-"""Everyone who is not to come in: refused, counted, and the hub goes on to serve.
+"""Everyone who may not connect: refused, counted, and the hub goes on to serve.
 
 `docs/reliability.md` has the same rows as a table.
 """
@@ -37,7 +37,7 @@ from tests.waiting import until
 
 # --- no way in without a hub key, an allowed key and an authenticator
 
-def test_without_keys_the_hub_does_not_open_the_door(tmp_path):
+def test_without_keys_the_hub_does_not_listen(tmp_path):
     keys, address = tmp_path / "keys", f"tcp://127.0.0.1:{free_port()}"
     hub = ("hub", "--address", f"ipc://{tmp_path}/h"[:90], "--listen", address, "--keys", keys,
            "--data", tmp_path / "data")
@@ -74,27 +74,27 @@ Authenticator.answer = changed
 """
 
 
-def test_when_the_authenticator_ends_nobody_comes_in_and_the_hub_ends(tmp_path, knock):
+def test_when_the_authenticator_ends_nobody_connects_and_the_hub_ends(tmp_path, connect):
     flag = tmp_path / "stop"
     with guarded_hub(tmp_path, code=_STOPS.format(flag=str(flag), closed=True)) as hub:
-        assert knock(*as_role(hub, "presser")).status()
+        assert connect(*as_role(hub, "presser")).status()
         flag.touch()
-        late = knock(*as_role(hub, "presser"))
-        late.say(PRESS)
+        late = connect(*as_role(hub, "presser"))
+        late.send(PRESS)
         assert hub.process.wait(20) == 1
         assert "authenticator has stopped" in hub.log.read_text().splitlines()[-1]
         assert "pressed" not in hub.log.read_text()
         assert late.silent()
 
 
-def test_when_the_authenticator_is_silent_nobody_comes_in_and_the_rest_goes_on(tmp_path, knock):
+def test_when_the_authenticator_is_silent_nobody_connects_and_the_rest_goes_on(tmp_path, connect):
     flag = tmp_path / "stop"
     with guarded_hub(tmp_path, code=_STOPS.format(flag=str(flag), closed=False)) as hub:
-        before = knock(*as_role(hub, "presser"))
+        before = connect(*as_role(hub, "presser"))
         assert before.status()
         flag.touch()
-        late = knock(*as_role(hub, "presser"))
-        late.say(messages.GetStatus(request=1))
+        late = connect(*as_role(hub, "presser"))
+        late.send(messages.GetStatus(request=1))
         assert late.silent(2000)
         assert before.status()
         until(lambda: hub.refused("handshake") == 1)  # after 10 s it is hung up on
@@ -104,9 +104,9 @@ def test_when_the_authenticator_is_silent_nobody_comes_in_and_the_rest_goes_on(t
 
 # --- keys
 
-def test_an_unknown_key_is_refused(hub, knock, refused, tmp_path):
-    peer = knock(hub.address, KeyPair.generate(), read_public(hub.hub_key))
-    peer.say(PRESS)
+def test_an_unknown_key_is_refused(hub, connect, refused, tmp_path):
+    peer = connect(hub.address, KeyPair.generate(), read_public(hub.hub_key))
+    peer.send(PRESS)
     assert happened(peer, zmq.Event.HANDSHAKE_FAILED_AUTH)
     refused("unknown key")
     hub.new_key("stranger")
@@ -125,21 +125,21 @@ def test_a_key_revoked_before_is_unknown(hub, refused):
 
 
 @pytest.mark.parametrize("show", ["another hub's key", "no key", "a password"])
-def test_another_mechanism_or_hub_is_refused(hub, knock, refused, show):
+def test_another_mechanism_or_hub_is_refused(hub, connect, refused, show):
     if show == "another hub's key":
-        peer = knock(hub.address, read_pair(hub.secret("presser")), KeyPair.generate().public)
+        peer = connect(hub.address, read_pair(hub.secret("presser")), KeyPair.generate().public)
     elif show == "no key":
-        peer = knock(hub.address)
+        peer = connect(hub.address)
     else:
-        peer = knock(hub.address, password="guess")  # noqa: S106
-    peer.say(PRESS)
+        peer = connect(hub.address, password="guess")  # noqa: S106
+    peer.send(PRESS)
     assert happened(peer, zmq.Event.HANDSHAKE_FAILED_NO_DETAIL,
                     zmq.Event.HANDSHAKE_FAILED_PROTOCOL)
     refused("handshake")
     assert peer.silent()
 
 
-def test_a_client_says_why_it_is_not_let_in(hub):
+def test_a_client_says_why_it_is_refused(hub):
     _, other = new_pair(hub.keys, "other-hub")
     status = ("status", "--hub", hub.address)
     keyless = denseface(*status)
@@ -174,7 +174,7 @@ def test_garbage_is_hung_up_on(hub, refused):
 
 
 def test_a_slow_drip_is_hung_up_on(hub, refused):
-    """Of many connections that dribble, all are ended in 10 s, and others come in meanwhile."""
+    """Of many connections that dribble, all are ended in 10 s, and others connect meanwhile."""
     port = int(hub.address.rpartition(":")[2])
     drips = [socket.create_connection(("127.0.0.1", port), timeout=30) for _ in range(20)]
     for drip in drips:
@@ -220,7 +220,7 @@ def _read_to_the_end(raw):
         pass
 
 
-def test_fuzzed_messages_of_an_accepted_key_are_counted(hub, knock, refused):
+def test_fuzzed_messages_of_an_accepted_key_are_counted(hub, connect, refused):
     noise = random.Random(4)
     good = [encode(Packet(messages.Result(capture_id="first", settings_hash="0",
                                           frame_sha256="0" * 64, face=FACE), FACE_ARRAYS)),
@@ -228,7 +228,7 @@ def test_fuzzed_messages_of_an_accepted_key_are_counted(hub, knock, refused):
             encode(Packet(messages.JobFailed(
                 capture_id="first", settings_hash="0", frame_sha256="0" * 64, error="E",
                 message="m", final=True)))]
-    peer = knock(*as_role(hub, "worker"))
+    peer = connect(*as_role(hub, "worker"))
     before = sum(hub.status().refused.values())
     for _ in range(1000):
         parts = [bytes(part) for part in noise.choice(good)]
@@ -252,8 +252,8 @@ def test_fuzzed_messages_of_an_accepted_key_are_counted(hub, knock, refused):
     assert hub.status().workers == ()
 
 
-def test_what_is_too_much_is_dropped(hub, knock, refused):
-    peer = knock(*as_role(hub, "sensor"))
+def test_what_is_too_much_is_dropped(hub, connect, refused):
+    peer = connect(*as_role(hub, "sensor"))
     ready = encode(Packet(messages.SensorReady(name="s", source="x")))
     peer.socket.send_multipart([*ready, *[b""] * 17])
     peer.socket.send_multipart([*ready, *[b"x"] * 100_000])
@@ -271,18 +271,18 @@ def test_what_is_too_much_is_dropped(hub, knock, refused):
     assert hub.status().sensors == ()
 
 
-def test_a_part_beyond_the_limit_ends_the_connection(hub, knock):
-    peer = knock(*as_role(hub, "sensor"))
+def test_a_part_beyond_the_limit_ends_the_connection(hub, connect):
+    peer = connect(*as_role(hub, "sensor"))
     assert peer.status()
     peer.socket.send(bytes(MAX_ARRAY_BYTES + 1))
     assert happened(peer, zmq.Event.DISCONNECTED)
     assert peer.poll_status()
 
 
-def test_a_message_without_end_cannot_fill_the_memory(tmp_path, knock):
+def test_a_message_without_end_cannot_fill_the_memory(tmp_path, connect):
     with guarded_hub(tmp_path, DENSEFACE_MEMORY_MB="200") as hub:
         process, used = psutil.Process(hub.process.pid), []
-        peer = knock(*as_role(hub, "worker"))
+        peer = connect(*as_role(hub, "worker"))
         assert peer.status()
         for _ in range(1500):
             peer.socket.send(bytes(2**20), zmq.SNDMORE)

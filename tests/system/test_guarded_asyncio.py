@@ -1,4 +1,4 @@
-"""The asyncio client through a guarded door: let in, told why not, and cut off while it follows."""
+"""The asyncio client at a guarded listener: accepted, refused with a reason, cut off."""
 
 import asyncio
 from contextlib import aclosing

@@ -1,7 +1,7 @@
 """Hub and sensor on one machine, worker and presser on another.
 
-Shown across two network namespaces where they can be made, and on every machine through a loopback
-address whose door is guarded.
+Shown across two network namespaces where they can be made, and on every machine through a guarded
+loopback address.
 """
 
 import contextlib

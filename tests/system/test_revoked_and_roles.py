@@ -1,4 +1,4 @@
-"""Keys that are revoked while in use, and keys that say what is not theirs to say.
+"""Keys that are revoked while in use, and keys that send what their role does not allow.
 
 The second half of the attacks in `docs/reliability.md`.
 """
@@ -28,43 +28,43 @@ from tests.waiting import until
 
 # --- revoked while connected
 
-def test_a_revoked_worker_s_job_goes_to_another(hub, knock, refused):
+def test_a_revoked_worker_s_job_goes_to_another(hub, connect, refused):
     hub.new_key("evil", Role.WORKER)
-    sensor, presser = knock(*as_role(hub, "sensor")), knock(*as_role(hub, "presser"))
-    evil, good = knock(*as_role(hub, "evil")), knock(*as_role(hub, "worker"))
-    sensor.say(messages.SensorReady(name="s", source="x"))
-    evil.say(messages.WorkerReady(name="evil", credit=0))
+    sensor, presser = connect(*as_role(hub, "sensor")), connect(*as_role(hub, "presser"))
+    evil, good = connect(*as_role(hub, "evil")), connect(*as_role(hub, "worker"))
+    sensor.send(messages.SensorReady(name="s", source="x"))
+    evil.send(messages.WorkerReady(name="evil", credit=0))
     until(lambda: hub.status().ready)
-    presser.say(messages.Press(request=1, capture_id="kept"))
-    sensor.hears("take")
-    sensor.say(messages.Frame(capture_id="kept", frame=FRAME), FRAME_ARRAYS)
-    job = evil.hears("job").message
+    presser.send(messages.Press(request=1, capture_id="kept"))
+    sensor.receive("take")
+    sensor.send(messages.Frame(capture_id="kept", frame=FRAME), FRAME_ARRAYS)
+    job = evil.receive("job").message
     revoke(hub.keys, "evil")
     until(lambda: not hub.status().workers)
     assert hub.status().queued == 1
-    evil.say(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
+    evil.send(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
                              frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
-    evil.say(messages.WorkerReady(name="evil", credit=1))
+    evil.send(messages.WorkerReady(name="evil", credit=1))
     refused("revoked key", by=2)
     assert evil.silent()
     assert (hub.status().queued, hub.status().workers) == (1, ())
-    good.say(messages.WorkerReady(name="good", credit=0))
-    job = good.hears("job").message
+    good.send(messages.WorkerReady(name="good", credit=0))
+    job = good.receive("job").message
     assert (job.capture_id, job.attempt) == ("kept", 2)
-    good.say(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
+    good.send(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
                              frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
     until(lambda: hub.status().queued + hub.status().working == 0)
-    # Said again, it is of no use any more.
-    good.say(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
+    # Sent again, it has no effect.
+    good.send(messages.Result(capture_id="kept", settings_hash=job.settings_hash,
                              frame_sha256=job.frame_sha256, face=FACE), FACE_ARRAYS)
-    good.say(messages.WorkerReady(name="good", credit=0))
+    good.send(messages.WorkerReady(name="good", credit=0))
     refused("replayed", by=2)
     leave(hub, sensor, good)
 
 
-def test_a_revoked_key_that_floods_is_cut_off(hub, knock, refused):
+def test_a_revoked_key_that_floods_is_cut_off(hub, connect, refused):
     hub.new_key("flood", Role.WORKER)
-    flood, other = knock(*as_role(hub, "flood")), knock(*as_role(hub, "worker"))
+    flood, other = connect(*as_role(hub, "flood")), connect(*as_role(hub, "worker"))
     assert flood.status()
     assert other.status()
     revoke(hub.keys, "flood")
@@ -96,9 +96,9 @@ def _unanswered(client):
     return False
 
 
-def test_a_revoked_subscriber_hears_no_more_and_the_others_do(hub, knock, refused):
+def test_a_revoked_subscriber_receives_no_more_and_the_others_do(hub, connect, refused):
     hub.new_key("spy", Role.SUBSCRIBER)
-    spy, other = (knock(*as_role(hub, name, zmq.SUB)) for name in ("spy", "subscriber"))
+    spy, other = (connect(*as_role(hub, name, zmq.SUB)) for name in ("spy", "subscriber"))
     for one in (spy, other):
         one.socket.subscribe("status")
         assert one.socket.poll(10_000)
@@ -152,13 +152,13 @@ ROLES = [
 
 
 @pytest.mark.parametrize(("role", "message"), ROLES, ids=[f"{a}-{b.kind}" for a, b in ROLES])
-def test_the_wrong_role_is_told_so(hub, knock, refused, role, message):
+def test_the_wrong_role_is_told_so(hub, connect, refused, role, message):
     if message.kind == "get_face" and message.capture_id == "foreign":
-        _foreign(hub, knock)
-    peer = knock(*as_role(hub, role))
-    peer.say(message)
+        _foreign(hub, connect)
+    peer = connect(*as_role(hub, role))
+    peer.send(message)
     kind = "request_failed" if isinstance(message, messages.Request) else "denied"
-    said = peer.hears(kind).message.message
+    said = peer.receive(kind).message.message
     assert said.startswith(f"refused: {message.kind} needs the role ")
     assert said.endswith(f"the key {role} has {role}")
     refused("role")
@@ -176,38 +176,39 @@ def test_the_wrong_role_is_told_so(hub, knock, refused, role, message):
     ("subscriber", messages.Result(capture_id="first", settings_hash="0", frame_sha256="0" * 64,
                                    face=FACE), FACE_ARRAYS),
 ])
-def test_frames_and_faces_come_from_their_makers(hub, knock, refused, role, message, arrays):
-    peer = knock(*as_role(hub, role))
-    peer.say(message, arrays)
-    assert "needs the role" in peer.hears("denied").message.message
+def test_frames_and_faces_come_from_their_makers(hub, connect, refused, role, message, arrays):
+    peer = connect(*as_role(hub, role))
+    peer.send(message, arrays)
+    assert "needs the role" in peer.receive("denied").message.message
     refused("role")
 
 
-def _foreign(hub, knock):
+def _foreign(hub, connect):
     """Have another key press and accept that capture."""
     hub.new_key("somebody", Role.PRESSER)
-    sensor, presser = knock(*as_role(hub, "sensor")), knock(*as_role(hub, "somebody"))
-    sensor.say(messages.SensorReady(name="s", source="x"))
+    sensor, presser = connect(*as_role(hub, "sensor")), connect(*as_role(hub, "somebody"))
+    sensor.send(messages.SensorReady(name="s", source="x"))
     until(lambda: hub.status().sensors)
-    presser.say(messages.Press(request=1, capture_id="foreign"))
-    sensor.hears("take")
-    sensor.say(messages.Frame(capture_id="foreign", frame=FRAME), FRAME_ARRAYS)
-    presser.hears("press_accepted")
-    assert presser.ask(messages.GetFace(request=2, capture_id="foreign")).kind == "capture_pending"
+    presser.send(messages.Press(request=1, capture_id="foreign"))
+    sensor.receive("take")
+    sensor.send(messages.Frame(capture_id="foreign", frame=FRAME), FRAME_ARRAYS)
+    presser.receive("press_accepted")
+    pending = presser.request(messages.GetFace(request=2, capture_id="foreign"))
+    assert pending.kind == "capture_pending"
     leave(hub, sensor)
 
 
 @pytest.mark.parametrize("role", ["worker", "sensor", "presser", "operator"])
-def test_only_a_subscriber_may_come_to_the_topics(hub, knock, refused, role):
-    peer = knock(*as_role(hub, role, zmq.SUB))
+def test_only_a_subscriber_may_connect_to_the_topics(hub, connect, refused, role):
+    peer = connect(*as_role(hub, role, zmq.SUB))
     peer.socket.subscribe("")
     assert happened(peer, zmq.Event.HANDSHAKE_FAILED_AUTH)
     refused("role")
     assert peer.silent(0)
 
 
-def test_other_topics_are_nobody_s(hub, knock, refused):
-    peer = knock(*as_role(hub, "subscriber", zmq.SUB))
+def test_other_topics_are_nobody_s(hub, connect, refused):
+    peer = connect(*as_role(hub, "subscriber", zmq.SUB))
     peer.socket.subscribe("")
     peer.socket.subscribe("f")
     refused("malformed", by=2)

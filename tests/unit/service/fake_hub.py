@@ -17,14 +17,14 @@ from tests.unit.service.faces import small_face
 
 
 class FakeHub:
-    """Keeps outcomes, publishes them where it is told to; silent towards what `deaf` names."""
+    """Keeps outcomes, publishes them where it is told to; answers no `ignored` kinds."""
 
     def __init__(self, address: str) -> None:
         self.address = address
         self.outcomes: list[Packet] = []
-        self.deaf: set[str] = set()
+        self.ignored: set[str] = set()
         self.refuse: str | None = None
-        self.heard: list[str] = []
+        self.received: list[str] = []
         self.subscriptions: list[bytes] = []
         self._context = zmq.Context()
         self._router = self._context.socket(zmq.ROUTER)
@@ -45,7 +45,7 @@ class FakeHub:
 
     def wait(self, true: Callable[[], bool]) -> None:
         with self._changed:
-            assert self._changed.wait_for(true, 20), (self.heard, self.subscriptions)
+            assert self._changed.wait_for(true, 20), (self.received, self.subscriptions)
 
     def subscribers(self, topic: Topic) -> int:
         name = topic.encode()
@@ -87,8 +87,8 @@ class FakeHub:
                 if self._router in ready:
                     peer, *parts = self._router.recv_multipart()
                     message = decode_to_hub(parts).message
-                    self.heard.append(message.kind)
-                    if message.kind not in self.deaf:
+                    self.received.append(message.kind)
+                    if message.kind not in self.ignored:
                         for answer in self._answers(message):
                             self._router.send_multipart([peer, *encode(answer)])
                 self._changed.notify_all()

@@ -71,7 +71,7 @@ def test_errors_are_those_of_the_blocking_client(hub):
             with pytest.raises(PressRefusedError, match="press refused: no room") as refused:
                 await client.press()
             assert refused.value.reason == "disk"
-            hub.deaf = {"get_status"}
+            hub.ignored = {"get_status"}
             with pytest.raises(ClientTimeoutError, match=r"no answer from the hub within 0\.1 s"):
                 await client.status(timeout=0.1)
 
@@ -81,13 +81,13 @@ def test_errors_are_those_of_the_blocking_client(hub):
 def test_calls_share_a_client_and_the_last_may_be_answered_first(hub):
     async def main():
         async with AsyncClient(hub.address) as client:
-            hub.deaf = {"press"}
+            hub.ignored = {"press"}
             client._resend_s = 0.1
             slow = asyncio.ensure_future(client.press("a"))
-            await waited(hub, lambda: "press" in hub.heard)
+            await waited(hub, lambda: "press" in hub.received)
             assert (await client.status()).sequence == 0
             assert not slow.done()
-            hub.deaf = set()
+            hub.ignored = set()
             assert await slow == "a"
             assert await asyncio.gather(*(client.press(f"p{n}") for n in range(20))) == [
                 f"p{n}" for n in range(20)]
@@ -173,18 +173,18 @@ def test_the_blocking_client_s_previews_pass_over_what_is_old(hub):
 def test_a_call_that_is_cancelled_leaves_the_client_as_it_was(hub):
     async def main():
         async with AsyncClient(hub.address) as client:
-            hub.deaf = {"press"}
+            hub.ignored = {"press"}
             with pytest.raises(TimeoutError):
                 async with asyncio.timeout(0.2):
                     await client.press("a")
             call = asyncio.ensure_future(client.press("b"))
-            await waited(hub, lambda: hub.heard.count("press") >= 2)
+            await waited(hub, lambda: hub.received.count("press") >= 2)
             call.cancel()
             with pytest.raises(asyncio.CancelledError):
                 await call
             assert client._pending == {}
             assert client._loop is None
-            hub.deaf = set()
+            hub.ignored = set()
             assert await client.press("c") == "c"
 
     run(main())
@@ -208,10 +208,10 @@ def test_an_iteration_that_is_cancelled_ends_its_subscription(hub):
 def test_a_closed_client_ends_calls_and_iterations(hub):
     async def main():
         client = AsyncClient(hub.address)
-        hub.deaf = {"press"}
+        hub.ignored = {"press"}
         call = asyncio.ensure_future(client.press("a"))
         looks = asyncio.ensure_future(anext(client.previews(), "over"))
-        await waited(hub, lambda: "press" in hub.heard
+        await waited(hub, lambda: "press" in hub.received
                      and hub.subscribers(Topic.PREVIEW) == 1)
         client.close()
         client.close()

@@ -96,5 +96,5 @@ def test_refusals_are_all_counted_and_not_all_logged(capsys):
     rejections.note("role", key="a")
     logged = [line for line in capsys.readouterr().out.splitlines() if "refused" in line]
     assert len(logged) == 7
-    assert "more_unsaid=995" in logged[-1]
+    assert "suppressed=995" in logged[-1]
     assert counters.labels("refused") == {"malformed": 1, "role": 1001}

@@ -1,4 +1,4 @@
-"""Who knocked, by the number of a connection that may be closed already."""
+"""The address of a connection, by a descriptor that may be closed already."""
 
 import socket
 from pathlib import Path
@@ -14,7 +14,7 @@ def test_a_connection_is_named_by_its_other_end():
             assert address_of(accepted.fileno()) == "{}:{}".format(*client.getsockname())
 
 
-def test_a_number_that_is_something_else_by_now_names_nobody(tmp_path):
+def test_a_number_that_is_something_else_by_now_has_no_address(tmp_path):
     one, other = socket.socketpair()
     with one, other, (tmp_path / "file").open("w") as file, socket.socket() as unconnected:
         before = len(list(Path("/proc/self/fd").iterdir()))

@@ -1,4 +1,4 @@
-"""A door, its keys and who knocks, within one process."""
+"""A listener, its keys and who connects, within one process."""
 
 import socket
 import time
@@ -57,7 +57,7 @@ def _until(listeners, true):
     return received
 
 
-def test_a_door_on_the_other_loopback(context):
+def test_a_listener_on_the_other_loopback(context):
     try:
         address = _address("::1")
     except OSError:
@@ -86,8 +86,8 @@ def test_an_address_in_use_is_named(context):
     listener.close()
 
 
-def test_who_was_refused_comes_in_once_allowed(context, wakes, tmp_path, monkeypatch):
-    """After a refusal libzmq alone would never knock again."""
+def test_who_was_refused_connects_once_allowed(context, wakes, tmp_path, monkeypatch):
+    """After a refusal libzmq alone would never connect again."""
     monkeypatch.setattr("denseface.service.transport.connection._RECONNECT_S", 0.1)
     _, hub_key = new_pair(tmp_path, "hub")
     secret, public = new_pair(tmp_path, "late")
@@ -99,7 +99,7 @@ def test_who_was_refused_comes_in_once_allowed(context, wakes, tmp_path, monkeyp
     dealer, monitor = connect(context, zmq.DEALER, address, Credentials.of(settings))
     try:
         _until(listeners, lambda _: monitor.read() or monitor.refused)
-        assert "does not let this key in" in str(monitor.refused)
+        assert "the hub refuses this key" in str(monitor.refused)
         assert rejections.counts()["unknown key"] >= 1
         one = allow(tmp_path, "late", read_public(public), frozenset({Role.WORKER}))
         _until(listeners, lambda _: monitor.read() or not monitor.refused)

@@ -1,0 +1,92 @@
+"""A socket that the hub binds, with CURVE where others can reach it."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+
+import zmq
+
+from denseface.service.errors import AddressError
+from denseface.service.monitoring import Rejections
+from denseface.service.security.allow_list import AllowList
+from denseface.service.security.keys import KeyPair
+from denseface.service.transport.handshakes import HandshakeMonitor
+
+__all__ = ["BoundSocket", "ServerCredentials"]
+
+_HANDSHAKE_MS = 10_000
+"""Longest time for a handshake, milliseconds; then libzmq closes the connection."""
+
+
+@dataclass(frozen=True)
+class ServerCredentials:
+    """The hub's own key pair, and whose keys it accepts."""
+
+    pair: KeyPair
+    allow_list: AllowList
+
+
+class BoundSocket:
+    """Binds a socket, cuts all its connections and binds it again.
+
+    Parameters
+    ----------
+    domain : ZAP domain, by which the authenticator tells sockets apart
+    credentials : where None, whoever can open the address may connect
+    """
+
+    def __init__(
+        self, socket: "zmq.Socket[bytes]", address: str, domain: bytes,
+        credentials: ServerCredentials | None, rejections: Rejections,
+    ) -> None:
+        self.socket = socket
+        self.monitor: HandshakeMonitor | None = None
+        """Counts failed handshakes; None where there are no credentials."""
+        self.bound = False
+        self._address = address
+        if credentials:
+            socket.set(zmq.CURVE_SERVER, 1)
+            socket.set(zmq.CURVE_SECRETKEY, credentials.pair.secret.encode())
+            socket.set(zmq.ZAP_ENFORCE_DOMAIN, 1)
+            socket.set(zmq.ZAP_DOMAIN, domain)
+            socket.set(zmq.HANDSHAKE_IVL, _HANDSHAKE_MS)
+            self.monitor = HandshakeMonitor(socket, rejections)
+
+    def bind(self) -> None:
+        """Bind for the first time.
+
+        Raises
+        ------
+        AddressError
+            Where the address cannot be had.
+        """
+        try:
+            self.socket.bind(self._address)
+        except zmq.ZMQError as error:
+            raise AddressError(f"{self._address}: {zmq.strerror(error.errno or 0)}") from error
+        self._address = self.socket.get_string(zmq.LAST_ENDPOINT).rstrip("\0")
+        self.bound = True
+
+    def rebind(self) -> None:
+        """Bind again after `cut`, if the address is free already; else at the next call."""
+        if not self.bound:
+            with suppress(zmq.ZMQError):  # libzmq's own thread has not closed it yet
+                self.socket.bind(self._address)
+                self.bound = True
+
+    def cut(self) -> None:
+        """End all connections, as one alone cannot be.
+
+        Those that are allowed come back by themselves in less than a second after `rebind`, pass
+        the authenticator again and fetch what they missed.
+        """
+        if self.bound:
+            self.socket.unbind(self._address)
+            self.bound = False
+        if self.monitor:
+            self.monitor.forget()
+
+    def close(self) -> None:
+        """Close the socket, and its monitor before it."""
+        if self.monitor:
+            self.monitor.close()
+        self.socket.close()
