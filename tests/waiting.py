@@ -1,15 +1,35 @@
 """Waiting for what other threads and processes do."""
 
+import math
+import os
 import time
 from collections.abc import Callable
 from typing import TypeVar
 
-__all__ = ["until"]
+__all__ = ["LIMIT_S", "PATIENCE", "until"]
 
 _T = TypeVar("_T")
 
 
-def until(true: Callable[[], _T], within_s: float = 30.0) -> _T:
+def _patience() -> float:
+    text = os.environ.get("DENSEFACE_TEST_PATIENCE", "1")
+    try:
+        factor = float(text)
+    except ValueError:
+        factor = math.nan
+    if not 1 <= factor <= 100:
+        raise ValueError(f"DENSEFACE_TEST_PATIENCE={text!r}: expected a number from 1 to 100")
+    return factor
+
+
+PATIENCE = _patience()
+"""How much slower than an idle machine this one may be: DENSEFACE_TEST_PATIENCE, or 1."""
+
+LIMIT_S = 40.0 * PATIENCE
+"""Seconds to wait for what is to come about. Only a failure takes as long."""
+
+
+def until(true: Callable[[], _T], within_s: float = LIMIT_S) -> _T:
     """Look again and again until something is so, and give it."""
     deadline = time.monotonic() + within_s
     while not (found := true()):
