@@ -4,9 +4,16 @@ RUN apt-get update \
     && apt-get install -y --no-install-recommends python3-venv \
     && rm -rf /var/lib/apt/lists/*
 WORKDIR /source
+# Wheels of all dependencies, checked against the lock. What builds them is not installed.
+COPY requirements requirements
+RUN python3 -m venv /build \
+    && /build/bin/pip install --no-cache-dir --require-hashes -r requirements/build.txt \
+    && /build/bin/pip wheel --no-cache-dir --require-hashes --no-build-isolation --use-pep517 \
+        --wheel-dir /wheels -r requirements/run.txt
 COPY . .
-RUN python3 -m venv /opt/denseface \
-    && /opt/denseface/bin/pip install --no-cache-dir --use-pep517 .
+RUN /build/bin/pip wheel --no-deps --no-build-isolation --wheel-dir /wheels . \
+    && python3 -m venv /opt/denseface \
+    && /opt/denseface/bin/pip install --no-index --no-deps /wheels/*.whl
 
 FROM debian:12-slim
 # The binding loads OpenNI2 by the unversioned name, which only Debian's -dev package holds.
