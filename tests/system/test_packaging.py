@@ -1,0 +1,148 @@
+"""The wheel: made either way, installed alone, and beside a user's modules of the same names."""
+
+import importlib.metadata
+import json
+import os
+import subprocess
+import sys
+import sysconfig
+import tarfile
+import tempfile
+import venv
+import zipfile
+from pathlib import Path, PurePosixPath
+
+import psutil
+import pytest
+
+from tests.system.running import RECORDINGS, REPOSITORY
+from tests.waiting import LIMIT_S
+
+pytestmark = pytest.mark.timeout(600)
+"""Seconds. All kernels are compiled once more: they are cached beside the installed files."""
+_COMPILING_S = 10 * LIMIT_S
+_RECORDING = RECORDINGS / "frontal_700.oni"
+
+
+def _build(kind: str, checkout: Path, folder: Path) -> Path:
+    subprocess.run([sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", folder],
+                   cwd=checkout, check=True, capture_output=True, timeout=LIMIT_S)
+    built, = folder.iterdir()
+    return built
+
+
+@pytest.fixture(scope="module")
+def sdist(tmp_path_factory):
+    return _build("sdist", REPOSITORY, tmp_path_factory.mktemp("sdist"))
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    return _build("wheel", REPOSITORY, tmp_path_factory.mktemp("wheel"))
+
+
+def _contents(wheel: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+        assert len(names) == len(set(names))
+        return {name: archive.read(name) for name in names}
+
+
+def test_the_wheel_of_the_sdist_is_that_of_the_checkout(wheel, sdist, tmp_path):
+    with tarfile.open(sdist) as archive:
+        archive.extractall(tmp_path / "unpacked", filter="data")
+    unpacked, = (tmp_path / "unpacked").iterdir()
+    assert _contents(_build("wheel", unpacked, tmp_path / "wheel")) == _contents(wheel)
+
+
+def test_the_wheel_holds_the_package_alone_and_all_of_it(wheel):
+    names = _contents(wheel).keys()
+    about = "denseface-{}.dist-info".format(importlib.metadata.version("denseface"))
+    assert {PurePosixPath(name).parts[0] for name in names} == {"denseface", about}
+    assert f"{about}/licenses/LICENSE" in names
+    assert [name for name in names if name.endswith("py.typed")] == ["denseface/py.typed"]
+    sources = {str(path.relative_to(REPOSITORY)) for part in ("capture", "recon", "service")
+               for path in (REPOSITORY / part).glob("**/*.py")}
+    assert {name.removeprefix("denseface/") for name in names if name.endswith(".py")} == (
+        sources | {"__init__.py", "__main__.py"})
+
+
+class Installed:
+    """The wheel in an environment of its own, and a user's folder first on its path."""
+
+    def __init__(self, wheel: Path, folder: Path) -> None:
+        environment = folder / "environment"
+        venv.create(environment, symlinks=True)
+        self.python = environment / "bin" / "python"
+        self.command = environment / "bin" / "denseface"
+        subprocess.run(
+            [sys.executable, "-m", "pip", "--python", self.python, "install", "--quiet",
+             "--no-index", "--no-deps", wheel], check=True, timeout=LIMIT_S)
+        self.packages, = environment.glob("lib/*/site-packages")
+        # The dependencies are those of the tests. Their own .pth files, of which one leads to
+        # the checkout, are not read.
+        (self.packages / "dependencies.pth").write_text(sysconfig.get_path("purelib"))
+        self.user = folder / "user"
+        self.user.mkdir()
+        theirs = {part.removesuffix(".py") for name in _contents(wheel)
+                  for part in PurePosixPath(name).parts[1:] if "__" not in part}
+        theirs -= sys.stdlib_module_names | importlib.metadata.packages_distributions().keys()
+        assert theirs >= {"capture", "recon", "service", "client", "hub", "commands"}
+        for name in theirs | {"tests"}:
+            (self.user / f"{name}.py").write_text(f"raise RuntimeError('the user\\'s {name}')\n")
+        kept = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+        self.environment = kept | {"PYTHONPATH": str(self.user)}
+
+    def run(self, *command: object) -> str:
+        done = subprocess.run(
+            list(map(str, command)), cwd=self.user, env=self.environment, check=False,
+            capture_output=True, text=True, timeout=_COMPILING_S)
+        assert (done.returncode, done.stderr) == (0, "")
+        return done.stdout
+
+
+@pytest.fixture(scope="module")
+def installed(wheel, tmp_path_factory):
+    return Installed(wheel, tmp_path_factory.mktemp("installed"))
+
+
+def test_it_runs_under_both_names(installed):
+    version = importlib.metadata.version("denseface")
+    assert installed.run(installed.command, "--help").startswith("usage: denseface")
+    assert installed.run(installed.python, "-m", "denseface", "--version") == f"{version}\n"
+
+
+def test_its_python_face_makes_a_face(installed):
+    code = ("import json, sys, denseface\n"
+            "with denseface.open_source(sys.argv[1]) as source:\n"
+            "    face = denseface.reconstruct(next(iter(source)))\n"
+            "print(json.dumps([denseface.__file__, len(face.dense)]))")
+    file, points = json.loads(installed.run(installed.python, "-c", code, _RECORDING))
+    assert Path(file).parent == installed.packages / "denseface"
+    assert points > 1000
+
+
+def test_the_service_runs_and_its_processes_bear_its_name(installed, tmp_path):
+    with tempfile.TemporaryDirectory(prefix="df-") as short, (tmp_path / "log").open("w") as log:
+        address = f"ipc://{short}/hub"
+        up = psutil.Popen(
+            [installed.command, "up", "--source", _RECORDING, "--address", address, "--data",
+             tmp_path / "data", "--workers", "1"],
+            cwd=installed.user, env=installed.environment, stderr=log)
+        family = [up]
+        try:
+            installed.run(installed.command, "status", "--address", address, "--wait",
+                          _COMPILING_S)
+            family += up.children(recursive=True)
+            installed.run(installed.command, "press", "--address", address, "--save",
+                          tmp_path / "face.ply")
+            assert all("denseface" in " ".join(one.cmdline()[1:]) for one in family)
+            assert {"hub", "capture", "worker"} <= {
+                argument for one in family for argument in one.cmdline()}
+            up.terminate()
+            assert up.wait(LIMIT_S) == 0, (tmp_path / "log").read_text()
+        finally:
+            for one in family:
+                if one.is_running():
+                    one.kill()
+    assert (tmp_path / "face.ply").stat().st_size > 10_000
