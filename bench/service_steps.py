@@ -12,7 +12,7 @@ from denseface.recon import reconstruct
 from denseface.recon.face import Face
 from denseface.recon.settings import Settings
 from denseface.service.client.events import outcome_of
-from denseface.service.hub.hub import Hub
+from denseface.service.hub import Hub
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output
 from denseface.service.protocol.payload import FaceHeader, FrameHeader

@@ -12,8 +12,7 @@ import zmq
 from denseface.recon.numerics.malloc import keep_freed_memory
 from denseface.recon.settings import Settings
 from denseface.service.errors import LocalProtocolError, RemoteProtocolError
-from denseface.service.hub.hub import Hub
-from denseface.service.hub.previews import PREVIEW_PERIOD_S
+from denseface.service.hub import PREVIEW_PERIOD_S, Hub
 from denseface.service.monitoring.observer import Observer
 from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol import messages

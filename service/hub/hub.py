@@ -7,7 +7,6 @@ is the table in `service.protocol.states`.
 
 import math
 from collections.abc import Iterator, Sequence
-from hashlib import sha256
 from importlib.metadata import version
 from typing import Literal
 
@@ -20,6 +19,8 @@ from denseface.service.errors import (
     ServiceError,
     StoreError,
 )
+from denseface.service.hub._common import Common
+from denseface.service.hub.captures import Captures
 from denseface.service.hub.jobs import Jobs
 from denseface.service.hub.maintenance import Maintenance
 from denseface.service.hub.outcomes import Outcomes
@@ -38,14 +39,9 @@ from denseface.service.storage.folder_store import FolderStore
 from denseface.service.storage.records import FaceMetadata, FrameMetadata
 from denseface.service.storage.writer import InlineWriter, Writer, WriteResult
 
-__all__ = ["Hub", "settings_hash"]
+__all__ = ["Hub"]
 
 _VERSION = version("denseface")
-
-
-def settings_hash(settings: Settings) -> str:
-    """Name settings in 16 hexadecimal digits."""
-    return sha256(settings.model_dump_json().encode()).hexdigest()[:16]
 
 
 class Hub:
@@ -68,18 +64,17 @@ class Hub:
         writer: Writer | None = None, opened: float = -math.inf,
     ) -> None:
         self._store = store
-        self._writer = writer = writer or InlineWriter()
+        self._writer = writer or InlineWriter()
         self._figures = figures or Figures()
         self._rejections = rejections or Rejections(self._figures.counters)
         self._settings = settings
         self._peers = Peers()
+        common = Common(store, Captures(store), self._writer, self._peers, settings)
         self._outcomes = Outcomes(store, self._requeue_damaged)
-        self._jobs = Jobs(store, writer, self._peers, settings.attempts,
-                          self._outcomes.publish, self._rejections)
-        self._presses = Presses(store, writer, self._peers, settings, recon, settings_hash(recon),
-                              self._jobs.add, opened + settings.silence_s)
+        self._jobs = Jobs(common, self._outcomes.publish, self._rejections)
+        self._presses = Presses(common, recon, self._jobs.add, opened + settings.silence_s)
         self._maintenance = Maintenance(
-            store, settings, self._presses, self._jobs, self._outcomes, self._figures.counters)
+            common, self._presses, self._jobs, self._outcomes, self._figures.counters)
         self._previews = Previews(self._peers, settings.heartbeat_s)
         self._status_due = 0.0
         self._log = structlog.get_logger("hub")

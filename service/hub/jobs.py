@@ -9,17 +9,17 @@ from pydantic import ValidationError
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import CorruptFileError, ProtocolError, ServiceError, StoreError
-from denseface.service.hub.peers import Peers, WorkerPeer
+from denseface.service.hub._common import Common
+from denseface.service.hub.peers import WorkerPeer
 from denseface.service.hub.unsaved_faces import UnsavedFaces
 from denseface.service.monitoring.rejections import Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
-from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
+from denseface.service.protocol.states import CaptureEvent, CaptureState
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.storage.base import CaptureRow
-from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.writer import Writer, WriteResult
+from denseface.service.storage.writer import WriteResult
 
 __all__ = ["Jobs"]
 
@@ -32,18 +32,18 @@ class Jobs:
     """Frames that wait for a worker or are held by one."""
 
     def __init__(
-        self, store: FolderStore, writer: Writer, peers: Peers, attempts: int,
-        publish: Callable[[str], Iterator[Output]], rejections: Rejections,
+        self, common: Common, publish: Callable[[str], Iterator[Output]], rejections: Rejections
     ) -> None:
         """Take up what the store has unfinished; `publish` announces an outcome."""
-        self._store = store
-        self._peers = peers
-        self._attempts = attempts
+        self._store = common.store
+        self._captures = common.captures
+        self._peers = common.peers
+        self._attempts = common.settings.attempts
         self._publish = publish
         self._rejections = rejections
-        self._queue = deque(store.unfinished())
+        self._queue = deque(common.store.unfinished())
         self._last_errors: dict[str, tuple[str, str]] = {}
-        self._unsaved_faces = UnsavedFaces(store, writer)
+        self._unsaved_faces = UnsavedFaces(common.store, common.writer)
         self._paused_until = 0.0
         self._log = structlog.get_logger("hub")
         if self._queue:
@@ -75,7 +75,8 @@ class Jobs:
 
     def requeue_damaged(self, capture_id: str, reason: str, *, attempts_left: bool = True) -> None:
         """Take up a capture again whose face turned out to be damaged."""
-        self._store.reopen(capture_id, attempts_left=attempts_left)
+        with self._captures.transition(CaptureEvent.DAMAGED, capture_id) as state:
+            self._store.reopen(capture_id, state, attempts_left=attempts_left)
         self._last_errors[capture_id] = "CorruptFileError", reason
         self.add(capture_id)
         self._log.warning("face to be made again", capture_id=capture_id, reason=reason)
@@ -102,8 +103,7 @@ class Jobs:
         while self._queue:
             capture_id = self._queue[0]
             stored = self._store.find(capture_id)
-            if (stored is None or stored.state is not CaptureState.ACCEPTED
-                    or capture_id in self._unsaved_faces):
+            if stored is None or not self._captures.allows(capture_id, CaptureEvent.DISPATCHED):
                 self._queue.popleft()
             elif stored.attempts >= self._attempts:
                 yield from self._give_up(capture_id, *self._last_errors.get(capture_id, _LOST))
@@ -119,21 +119,27 @@ class Jobs:
         if self._take_answer(peer, message, CaptureEvent.RESULT):
             try:
                 message.face.check(packet.arrays)
-                self._unsaved_faces.keep(packet)
+                self._unsaved_faces.save(packet)
             except (ProtocolError, StoreError) as error:
-                self._retry(message.capture_id, type(error).__name__, str(error))
+                self._take_back(message.capture_id, type(error).__name__, str(error))
+            else:
+                self._captures.advance(message.capture_id, CaptureEvent.RESULT)
 
     def written(self, now: float, faces: Sequence[WriteResult]) -> Iterator[Output]:
         """Announce faces that are safe, in order; those that the disk refused wait."""
-        for capture_id, error in self._unsaved_faces.written(faces):
+        # All of them have their rows before the first is announced.
+        for one, error in list(self._captures.save(CaptureEvent.FACE_SAVED, faces)):
+            capture_id = one.pending.capture_id
             if error is None:
+                self._unsaved_faces.drop(capture_id)
                 self._log.info("done", capture_id=capture_id)
                 yield from self._announce(capture_id)
                 continue
             if isinstance(error, StoreError):
                 self._pause(now, str(error))
-            if capture_id not in self._unsaved_faces:
-                self._retry(capture_id, type(error).__name__, str(error))
+            if not self._unsaved_faces.refused(capture_id, error):
+                self._captures.advance(capture_id, CaptureEvent.FACE_DROPPED)
+                self._requeue(capture_id, type(error).__name__, str(error))
             if not isinstance(error, ServiceError):
                 raise error
 
@@ -150,12 +156,13 @@ class Jobs:
             return
         capture_id = message.capture_id
         if not message.final:
-            self._retry(capture_id, message.error, message.message)
+            self._take_back(capture_id, message.error, message.message)
             return
         try:
-            self._store.fail(capture_id, message.error, message.message, dead=False)
+            with self._captures.transition(event, capture_id) as state:
+                self._store.fail(capture_id, state, message.error, message.message)
         except StoreError as error:
-            self._retry(capture_id, type(error).__name__, str(error))
+            self._take_back(capture_id, type(error).__name__, str(error))
         else:
             self._log.info("failed", capture_id=capture_id, error=message.error)
             yield from self._publish(capture_id)
@@ -167,7 +174,7 @@ class Jobs:
         """
         self._hand_back(worker, worker.jobs[1:])
         while worker.jobs:
-            self._retry(worker.jobs.pop(), *_LOST)
+            self._take_back(worker.jobs.pop(), *_LOST)
 
     def worker_stopped(self, worker: WorkerPeer) -> None:
         """Take back what a worker held that was told to stop."""
@@ -181,7 +188,8 @@ class Jobs:
                 self._store.undo_attempt(capture_id)
             except StoreError as error:
                 self._log.warning("attempt not taken back", reason=str(error))
-            self._retry(capture_id, "HandedBack", "the worker that held it was stopped")
+            self._take_back(capture_id, "HandedBack", "the worker that held it was stopped",
+                            CaptureEvent.HANDED_BACK)
 
     def _send_job(
         self, now: float, capture_id: str, stored: CaptureRow, worker: WorkerPeer
@@ -198,6 +206,7 @@ class Jobs:
             worker.seen = now
         worker.free, worker.alone = False, attempt > 1
         worker.jobs.append(capture_id)
+        self._captures.advance(capture_id, CaptureEvent.DISPATCHED)
         self._log.info("dispatched", capture_id=capture_id, worker=worker.name, attempt=attempt)
         yield send(worker.peer, messages.Job(
             capture_id=capture_id, attempt=attempt, settings=settings,
@@ -205,19 +214,31 @@ class Jobs:
             frame=kept.message.frame), kept.arrays)
 
     def _give_up(self, capture_id: str, error: str, reason: str) -> Iterator[Output]:
-        self._store.fail(capture_id, error, reason, dead=True)
+        with self._captures.transition(CaptureEvent.EXHAUSTED, capture_id) as state:
+            self._store.fail(capture_id, state, error, reason)
         self._queue.popleft()
         self._last_errors.pop(capture_id, None)
         self._log.error("dead letter", capture_id=capture_id, error=error, reason=reason)
         yield from self._publish(capture_id)
 
-    def _retry(self, capture_id: str, error: str, reason: str) -> None:
-        """Put a capture back in the queue that waits for a face.
+    def _take_back(
+        self, capture_id: str, error: str, reason: str, event: CaptureEvent = CaptureEvent.LOST
+    ) -> None:
+        """Put a capture back in the queue that a worker holds no more, unless another does."""
+        if self._holder(capture_id) is None:
+            with suppress(StoreError):
+                if self._captures.allows(capture_id, event):
+                    self._captures.advance(capture_id, event)
+        self._requeue(capture_id, error, reason)
+
+    def _requeue(self, capture_id: str, error: str, reason: str) -> None:
+        """Put a capture back in the queue that no worker holds and that waits for a face.
 
         Where the store cannot be read it is put back, and `dispatch` looks again.
         """
         with suppress(StoreError):
-            if self._state(capture_id) is not CaptureState.ACCEPTED:
+            if (self._captures.state(capture_id) is not CaptureState.ACCEPTED
+                    or self._holder(capture_id)):
                 return
         if capture_id not in self._queue:
             self._log.warning(
@@ -239,7 +260,7 @@ class Jobs:
             for one in before if useful else [*before, capture_id]:
                 reason = ("the answer was to another job" if one == capture_id
                           else "its answer was lost")
-                self._retry(one, "RemoteProtocolError", reason)
+                self._take_back(one, "RemoteProtocolError", reason)
         if not useful:
             self._rejections.note(
                 "replayed", capture_id=capture_id, detail=f"{event}, not asked for")
@@ -251,18 +272,7 @@ class Jobs:
         stored = self._store.find(answer.capture_id)
         asked = stored and (stored.settings_hash, stored.frame_sha256)
         return (asked == (answer.settings_hash, answer.frame_sha256)
-                and advance(self._state(answer.capture_id), event) is not None)
-
-    def _state(self, capture_id: str) -> CaptureState | None:
-        stored = self._store.find(capture_id)
-        if stored is None:
-            return None
-        if stored.state is CaptureState.ACCEPTED:
-            if capture_id in self._unsaved_faces:
-                return CaptureState.CONCLUDING
-            if self._holder(capture_id):
-                return CaptureState.WORKING
-        return stored.state
+                and self._captures.allows(answer.capture_id, event))
 
     def _holder(self, capture_id: str) -> WorkerPeer | None:
         return next((worker for worker in self._peers.workers.values()

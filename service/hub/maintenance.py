@@ -5,15 +5,14 @@ from collections.abc import Iterator, Sequence
 import structlog
 
 from denseface.service.errors import StoreError
+from denseface.service.hub._common import Common
 from denseface.service.hub.jobs import Jobs
 from denseface.service.hub.outcomes import Outcomes
 from denseface.service.hub.presses import Presses
 from denseface.service.monitoring.figures import Counters
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
-from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
-from denseface.service.settings import ServiceSettings
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.protocol.states import CaptureEvent, CaptureState
 
 __all__ = ["Maintenance"]
 
@@ -30,12 +29,12 @@ class Maintenance:
     """Retention, dead letters, purges."""
 
     def __init__(
-        self, store: FolderStore, settings: ServiceSettings, presses: Presses, jobs: Jobs,
-        outcomes: Outcomes, counters: Counters,
+        self, common: Common, presses: Presses, jobs: Jobs, outcomes: Outcomes, counters: Counters
     ) -> None:
-        self._store = store
-        self._retention_s = settings.retention
-        self._sweep_s = min(_SWEEP_S, (settings.retention or _SWEEP_S) / 10)
+        self._store = common.store
+        self._captures = common.captures
+        self._retention_s = common.settings.retention
+        self._sweep_s = min(_SWEEP_S, (self._retention_s or _SWEEP_S) / 10)
         self._presses = presses
         self._jobs = jobs
         self._outcomes = outcomes
@@ -54,7 +53,9 @@ class Maintenance:
                 return
             old = self._store.expired(self._retention_s, _BATCH)
             if old:
-                self._store.remove(old)
+                with self._captures.transition(CaptureEvent.EXPIRED, *old) as state:
+                    self._store.remove(old, state)
+                self._store.erase(old)
                 self._counters.add("removed", "retention", len(old))
                 self._log.info("removed after the retention", captures=len(old))
         except StoreError as error:
@@ -83,11 +84,12 @@ class Maintenance:
             yield send(peer, messages.CaptureUnknown(request=request, capture_id=capture_id))
         elif stored.state is CaptureState.ACCEPTED:  # a repeat
             yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
-        elif advance(stored.state, CaptureEvent.RETRIED) is None:
+        elif not self._captures.allows(capture_id, CaptureEvent.RETRIED):
             yield _no_dead_letter(peer, message, stored.state)
         else:
             self._store.frame(capture_id)  # without it, the dead letter stays as it is
-            self._store.reopen(capture_id, attempts_left=True)
+            with self._captures.transition(CaptureEvent.RETRIED, capture_id) as state:
+                self._store.reopen(capture_id, state, attempts_left=True)
             self._jobs.add(capture_id)
             self._log.info("dead letter retried", capture_id=capture_id)
             yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
@@ -121,10 +123,10 @@ class Maintenance:
     def _remove(self, capture_ids: Sequence[str]) -> Iterator[Output]:
         if not capture_ids:
             return
-        try:
-            self._store.remove(capture_ids)
-        finally:  # where files resist, the captures are gone all the same
-            self._jobs.forget([one for one in capture_ids if self._store.find(one) is None])
+        with self._captures.transition(CaptureEvent.PURGED, *capture_ids) as state:
+            self._store.remove(capture_ids, state)
+        self._jobs.forget(capture_ids)
+        self._store.erase(capture_ids)
         self._counters.add("removed", "operator", len(capture_ids))
         self._log.info("removed by an operator", captures=len(capture_ids))
         yield from self._outcomes.removed(capture_ids)

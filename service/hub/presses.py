@@ -2,29 +2,33 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from hashlib import sha256
 
 import structlog
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import ServiceError, StoreError
-from denseface.service.hub.peers import Peers
+from denseface.service.hub._common import Common
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
-from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
+from denseface.service.protocol.states import CaptureEvent, CaptureState
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.bounded_dict import BoundedDict
 from denseface.service.runtime.failpoints import failpoint
-from denseface.service.settings import ServiceSettings
-from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.writer import Writer, WriteResult
+from denseface.service.storage.writer import WriteResult
 
-__all__ = ["Presses"]
+__all__ = ["Presses", "settings_hash"]
 
 _MIB = 2**20
 _MAX_REFUSALS = 1000
 _MAX_SAVING = 32
 """Frames that may wait for the disk, which are in memory meanwhile; beyond it a press is refused.
 """
+
+
+def settings_hash(settings: Settings) -> str:
+    """Name settings in 16 hexadecimal digits."""
+    return sha256(settings.model_dump_json().encode()).hexdigest()[:16]
 
 
 @dataclass
@@ -45,21 +49,21 @@ class Presses:
     """Presses that wait for their frame, or for their frame to be safe."""
 
     def __init__(
-        self, store: FolderStore, writer: Writer, peers: Peers, settings: ServiceSettings,
-        recon: Settings, recon_hash: str, accepted: Callable[[str], None], sensors_due: float,
+        self, common: Common, recon: Settings, accepted: Callable[[str], None], sensors_due: float
     ) -> None:
         """Take presses; `accepted` is told of each frame that is safe.
 
         Until the time `sensors_due`, sensors may not have had time to say that they are there.
         """
-        self._store = store
-        self._writer = writer
+        self._store = common.store
+        self._captures = common.captures
+        self._writer = common.writer
+        self._peers = common.peers
+        self._settings = common.settings
         self._accepted = accepted
         self._sensors_due = sensors_due
-        self._peers = peers
-        self._settings = settings
         self._recon = recon
-        self._recon_hash = recon_hash
+        self._recon_hash = settings_hash(recon)
         self._presses: dict[str, _Press] = {}
         self._refused: BoundedDict[
             tuple[bytes, str, int], messages.PressRefused] = BoundedDict(_MAX_REFUSALS)
@@ -78,11 +82,10 @@ class Presses:
             # A repeat that was under way when the client had its answer: it has told its user.
             yield send(peer, refused)
             return
-        state = self._state(capture_id)
-        if state in (CaptureState.PRESSED, CaptureState.KEEPING):
-            self._presses[capture_id].pressers[peer] = request
+        if press := self._presses.get(capture_id):
+            press.pressers[peer] = request
             return
-        if state is not None:
+        if not self._captures.allows(capture_id, CaptureEvent.PRESSED):
             yield send(peer, messages.PressAccepted(request=request, capture_id=capture_id))
             return
         sensor = self._peers.sensor()
@@ -95,6 +98,7 @@ class Presses:
             yield self._refusal(peer, messages.PressRefused(
                 request=request, capture_id=capture_id, reason=reason, message=why))
             return
+        self._captures.advance(capture_id, CaptureEvent.PRESSED)
         self._log.info("pressed", capture_id=capture_id, sensor=sensor.name)
         deadline = now + self._settings.take_timeout_s
         self._presses[capture_id] = _Press(sensor.peer, deadline, key, {peer: request})
@@ -116,51 +120,38 @@ class Presses:
         return None
 
     def frame(self, peer: bytes, message: messages.Frame, packet: Packet) -> Iterator[Output]:
-        """Begin to keep a frame; what comes of it is said by `written`."""
+        """Begin to save a frame; what comes of it is said by `written`."""
         failpoint("hub.frame.received")
         capture_id = message.capture_id
-        state = self._state(capture_id)
-        if state is CaptureState.KEEPING:  # a repeat; it is answered when the first is safe
+        state = self._captures.state(capture_id)
+        if state is CaptureState.SAVING_FRAME:  # a repeat; it is answered when the first is safe
             return
-        if advance(state, CaptureEvent.RECEIVED) is None:
+        if not self._captures.allows(capture_id, CaptureEvent.FRAME_RECEIVED):
             yield send(peer, messages.FrameAccepted(capture_id=capture_id) if state else
                        messages.FrameRefused(capture_id=capture_id, message="nobody waits for it"))
             return
         press = self._presses[capture_id]
         press.frame_sender = peer
+        self._captures.advance(capture_id, CaptureEvent.FRAME_RECEIVED)
         try:
             pending = self._store.prepare_frame(packet, self._recon, self._recon_hash, press.key)
         except StoreError as error:
-            yield from self._not_kept(capture_id, error)
+            yield from self._not_saved(capture_id, error)
             return
         self._writer.start(pending)
 
     def written(self, frames: Sequence[WriteResult]) -> Iterator[Output]:
         """Say that frames are safe, or not: to the sensor and to all who pressed."""
-        for one in frames:
-            if isinstance(one.error, ServiceError):
-                yield from self._not_kept(one.pending.capture_id, one.error)
-            elif one.error:
-                raise one.error
-        good = [one for one in frames if one.error is None]
-        try:
-            if len(good) > 1:  # one sync of the database for all
-                self._store.accept(good)
-                for one in good:
-                    yield from self._kept(one.pending.capture_id)
-                return
-        except StoreError as error:
-            self._log.warning("frames are kept one by one", reason=str(error))
-        for one in good:
-            try:
-                self._store.accept([one])
-            except StoreError as error:
+        for one, error in self._captures.save(CaptureEvent.FRAME_SAVED, frames):
+            if error is None:
+                yield from self._saved(one.pending.capture_id)
+            elif isinstance(error, ServiceError):
                 one.pending.discard()
-                yield from self._not_kept(one.pending.capture_id, error)
+                yield from self._not_saved(one.pending.capture_id, error)
             else:
-                yield from self._kept(one.pending.capture_id)
+                raise error
 
-    def _kept(self, capture_id: str) -> Iterator[Output]:
+    def _saved(self, capture_id: str) -> Iterator[Output]:
         self._log.info("accepted", capture_id=capture_id)
         press = self._presses.pop(capture_id)
         self._accepted(capture_id)
@@ -169,7 +160,7 @@ class Presses:
         for presser, request in press.pressers.items():
             yield send(presser, messages.PressAccepted(request=request, capture_id=capture_id))
 
-    def _not_kept(self, capture_id: str, error: Exception) -> Iterator[Output]:
+    def _not_saved(self, capture_id: str, error: Exception) -> Iterator[Output]:
         sender = self._presses[capture_id].frame_sender
         if sender is not None:
             yield send(sender, messages.FrameRefused(capture_id=capture_id, message=str(error)))
@@ -177,14 +168,16 @@ class Presses:
 
     def frame_failed(self, message: messages.FrameFailed) -> Iterator[Output]:
         """Refuse a press for which the sensor has no frame."""
-        if self._state(message.capture_id) is CaptureState.PRESSED:
+        if self._captures.state(message.capture_id) is CaptureState.PRESSED:
             yield from self._refuse(message.capture_id, "sensor", message.message)
 
     def _refuse(
-        self, capture_id: str, reason: messages.PressReason, why: str
+        self, capture_id: str, reason: messages.PressReason, why: str,
+        event: CaptureEvent = CaptureEvent.REFUSED,
     ) -> Iterator[Output]:
         """Tell all who pressed that there is no capture."""
         if press := self._presses.pop(capture_id, None):
+            self._captures.advance(capture_id, event)
             self._log.warning("press refused", capture_id=capture_id, reason=why)
             for presser, request in press.pressers.items():
                 yield self._refusal(presser, messages.PressRefused(
@@ -197,7 +190,8 @@ class Presses:
     def purge(self, capture_id: str | None) -> Iterator[Output]:
         """Refuse one press, or all where None, whose frame is no longer wanted."""
         for waiting in [capture_id] if capture_id else list(self._presses):
-            yield from self._refuse(waiting, "purged", "purged by an operator")
+            yield from self._refuse(
+                waiting, "purged", "purged by an operator", CaptureEvent.PURGED)
 
     def sensor_gone(self, peer: bytes, reason: str) -> Iterator[Output]:
         """Refuse what a sensor that went away was asked for."""
@@ -214,9 +208,3 @@ class Presses:
             limit = self._settings.take_timeout_s
             yield from self._refuse(
                 capture_id, "timeout", f"no frame from the sensor in {limit:g} s")
-
-    def _state(self, capture_id: str) -> CaptureState | None:
-        if press := self._presses.get(capture_id):
-            return CaptureState.PRESSED if press.frame_sender is None else CaptureState.KEEPING
-        stored = self._store.find(capture_id)
-        return stored.state if stored else None

@@ -1,23 +1,19 @@
 """Faces that came and are not yet safe: being written, or refused by the disk."""
 
-from collections.abc import Iterator, Sequence
-
-import structlog
-
 from denseface.service.errors import StoreError
 from denseface.service.protocol.wire import Packet
 from denseface.service.storage.folder_store import FolderStore
 from denseface.service.storage.records import PendingWrite
-from denseface.service.storage.writer import Writer, WriteResult
+from denseface.service.storage.writer import Writer
 
 __all__ = ["UnsavedFaces"]
 
 _MAX_UNSAVED = 16
-"""Faces in memory; beyond it no work is begun, and one that the disk refuses is let go."""
+"""Faces in memory, beyond which no job is sent and a face that the disk refuses is dropped."""
 
 
 class UnsavedFaces:
-    """Captures that are CONCLUDING."""
+    """Faces of captures that are SAVING_FACE."""
 
     def __init__(self, store: FolderStore, writer: Writer) -> None:
         self._store = store
@@ -29,10 +25,7 @@ class UnsavedFaces:
     def __len__(self) -> int:
         return len(self._pending)
 
-    def __contains__(self, capture_id: str) -> bool:
-        return capture_id in self._pending
-
-    def keep(self, result: Packet) -> None:
+    def save(self, result: Packet) -> None:
         """Begin to write a face; StoreError where it is of no use."""
         pending = self._store.prepare_face(result)
         self._pending[pending.capture_id] = pending
@@ -48,49 +41,19 @@ class UnsavedFaces:
         """
         for capture_id, again in self._refused.items():
             if not again:
-                self.keep(self._pending[capture_id].packet)  # its retention begins now
+                self.save(self._pending[capture_id].packet)  # its retention begins now
                 self._refused[capture_id] = True
         return not self._refused and len(self._pending) < _MAX_UNSAVED
 
-    def written(self, faces: Sequence[WriteResult]) -> list[tuple[str, Exception | None]]:
-        """Give their rows to faces that were written, in order, and say of each what came of it.
-
-        One that the disk refused stays, unless there are too many.
-        """
-        return list(self._written(faces))
-
-    def _written(self, faces: Sequence[WriteResult]) -> Iterator[tuple[str, Exception | None]]:
-        for one in faces:
-            if one.error:
-                yield one.pending.capture_id, self._not_kept(one.pending.capture_id, one.error)
-        good = [one for one in faces if one.error is None]
-        try:
-            if len(good) > 1:  # one sync of the database for all
-                self._store.finish(good)
-                for one in good:
-                    yield self._kept(one)
-                return
-        except StoreError as error:
-            structlog.get_logger("hub").warning("faces are kept one by one", reason=str(error))
-        for one in good:
-            try:
-                self._store.finish([one])
-            except StoreError as error:
-                yield one.pending.capture_id, self._not_kept(one.pending.capture_id, error)
-            else:
-                yield self._kept(one)
+    def refused(self, capture_id: str, error: Exception) -> bool:
+        """Note why a face could not be saved; True where it waits here for another try."""
+        self._refused[capture_id] = False
+        if isinstance(error, StoreError) and len(self._refused) <= _MAX_UNSAVED:
+            return True
+        self.drop(capture_id)
+        return False
 
     def drop(self, capture_id: str) -> None:
-        """Forget a capture that was removed; its face must not be under way."""
+        """Forget a face that is safe or whose capture was removed; it must not be being written."""
         self._pending.pop(capture_id, None)
         self._refused.pop(capture_id, None)
-
-    def _kept(self, written: WriteResult) -> tuple[str, None]:
-        self.drop(written.pending.capture_id)
-        return written.pending.capture_id, None
-
-    def _not_kept(self, capture_id: str, error: Exception) -> Exception:
-        self._refused[capture_id] = False
-        if not isinstance(error, StoreError) or len(self._refused) > _MAX_UNSAVED:
-            self.drop(capture_id)
-        return error

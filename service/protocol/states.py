@@ -1,8 +1,12 @@
-"""The life of a capture, as one table."""
+"""The life of a capture, as one table.
+
+Nothing else says which state follows: the hub asks `advance` for every change of a state, and so
+does the store where it makes rows again from files.
+"""
 
 from enum import StrEnum
 
-__all__ = ["TRANSITIONS", "CaptureEvent", "CaptureState", "advance"]
+__all__ = ["IN_MEMORY", "TRANSITIONS", "CaptureEvent", "CaptureState", "TransitionError", "advance"]
 
 
 class CaptureState(StrEnum):
@@ -10,16 +14,16 @@ class CaptureState(StrEnum):
 
     PRESSED = "pressed"
     """The sensor was asked for a frame."""
-    KEEPING = "keeping"
+    SAVING_FRAME = "saving frame"
     """The frame came and is being written."""
     REFUSED = "refused"
-    """No frame came or it could not be kept: forgotten, the id may be pressed again."""
+    """No frame came or it could not be saved: forgotten, the id may be pressed again."""
     ACCEPTED = "accepted"
     """Safe on disk, waits for a worker."""
     WORKING = "working"
     """A worker holds it."""
-    CONCLUDING = "concluding"
-    """The face came and is being written."""
+    SAVING_FACE = "saving face"
+    """The face came and is being written, or waits for a disk that refuses it."""
     DONE = "done"
     """A face was published."""
     FAILED = "failed"
@@ -34,29 +38,28 @@ class CaptureState(StrEnum):
 class CaptureEvent(StrEnum):
     """What may happen to a capture."""
 
-    RECEIVED = "received"
-    """The frame came."""
-    STORED = "stored"
-    """The frame is safe."""
-    NOT_TAKEN = "not taken"
+    PRESSED = "pressed"
+    """Somebody presses, and there is a sensor to ask."""
+    FRAME_RECEIVED = "frame received"
+    FRAME_SAVED = "frame saved"
+    REFUSED = "refused"
     """The sensor failed, went away or took too long, or the disk is full."""
     DISPATCHED = "dispatched"
     LOST = "lost"
-    """The worker went silent or stumbled; attempts remain."""
+    """The worker went silent, or failed otherwise than for want of a face."""
     EXHAUSTED = "exhausted"
-    """As LOST, but no attempt remains; or the stored frame cannot be read."""
+    """No attempt is left, or the frame on disk cannot be read."""
     HANDED_BACK = "handed back"
     """The worker was told to stop before it was through; counts for no attempt."""
     RESULT = "result"
     """A face came."""
-    CONCLUDED = "concluded"
-    """The face is safe."""
-    NOT_KEPT = "not kept"
-    """The face is none, or so many wait for a disk that refuses them that this one is let go."""
+    FACE_SAVED = "face saved"
+    FACE_DROPPED = "face dropped"
+    """The disk refuses so many faces that this one is let go."""
     REJECTED = "rejected"
     """A worker says that no attempt would find a face."""
     DAMAGED = "damaged"
-    """The stored face cannot be read: it is made again from its frame."""
+    """The face on disk cannot be read: it is made again from its frame."""
     RETRIED = "retried"
     """An operator wants all attempts made again."""
     EXPIRED = "expired"
@@ -67,24 +70,25 @@ class CaptureEvent(StrEnum):
 
 _S, _E = CaptureState, CaptureEvent
 
-TRANSITIONS: dict[tuple[CaptureState, CaptureEvent], CaptureState] = {
-    # What is being written cannot be stopped: a purge waits for it, a time-out does not count.
-    (_S.PRESSED, _E.RECEIVED): _S.KEEPING,
-    (_S.PRESSED, _E.NOT_TAKEN): _S.REFUSED,
-    (_S.KEEPING, _E.STORED): _S.ACCEPTED,
-    (_S.KEEPING, _E.NOT_TAKEN): _S.REFUSED,
+TRANSITIONS: dict[tuple[CaptureState | None, CaptureEvent], CaptureState] = {
+    (None, _E.PRESSED): _S.PRESSED,
+    (_S.PRESSED, _E.FRAME_RECEIVED): _S.SAVING_FRAME,
+    (_S.PRESSED, _E.REFUSED): _S.REFUSED,
+    (_S.PRESSED, _E.PURGED): _S.REFUSED,
+    # A frame that is being written cannot be stopped: a purge waits for it, no time-out counts.
+    (_S.SAVING_FRAME, _E.FRAME_SAVED): _S.ACCEPTED,
+    (_S.SAVING_FRAME, _E.REFUSED): _S.REFUSED,
     (_S.ACCEPTED, _E.DISPATCHED): _S.WORKING,
     (_S.ACCEPTED, _E.EXHAUSTED): _S.DEAD,
     # From a worker that was thought lost.
-    (_S.ACCEPTED, _E.RESULT): _S.CONCLUDING,
+    (_S.ACCEPTED, _E.RESULT): _S.SAVING_FACE,
     (_S.ACCEPTED, _E.REJECTED): _S.FAILED,
-    (_S.WORKING, _E.RESULT): _S.CONCLUDING,
+    (_S.WORKING, _E.RESULT): _S.SAVING_FACE,
     (_S.WORKING, _E.REJECTED): _S.FAILED,
     (_S.WORKING, _E.LOST): _S.ACCEPTED,
-    (_S.WORKING, _E.EXHAUSTED): _S.DEAD,
     (_S.WORKING, _E.HANDED_BACK): _S.ACCEPTED,
-    (_S.CONCLUDING, _E.CONCLUDED): _S.DONE,
-    (_S.CONCLUDING, _E.NOT_KEPT): _S.ACCEPTED,
+    (_S.SAVING_FACE, _E.FACE_SAVED): _S.DONE,
+    (_S.SAVING_FACE, _E.FACE_DROPPED): _S.ACCEPTED,
     # The outcome is withdrawn, its sequence number used up; the next one gets a new number. So
     # exactly one outcome stands for an id, the one with the highest number seen.
     (_S.DONE, _E.DAMAGED): _S.ACCEPTED,
@@ -93,16 +97,34 @@ TRANSITIONS: dict[tuple[CaptureState, CaptureEvent], CaptureState] = {
     (_S.DONE, _E.EXPIRED): _S.REMOVED,
     (_S.FAILED, _E.EXPIRED): _S.REMOVED,
     (_S.DEAD, _E.EXPIRED): _S.REMOVED,
-    (_S.PRESSED, _E.PURGED): _S.REFUSED,
     (_S.ACCEPTED, _E.PURGED): _S.REMOVED,
     (_S.WORKING, _E.PURGED): _S.REMOVED,
+    # What is being written is settled first; what the disk refused goes.
+    (_S.SAVING_FACE, _E.PURGED): _S.REMOVED,
     (_S.DONE, _E.PURGED): _S.REMOVED,
     (_S.FAILED, _E.PURGED): _S.REMOVED,
     (_S.DEAD, _E.PURGED): _S.REMOVED,
 }
-"""What is not here does not happen: the event is noted and dropped."""
+"""State, None for an id that nobody knows, and event -> state. What is not here cannot happen."""
+
+IN_MEMORY = frozenset({_S.PRESSED, _S.SAVING_FRAME, _S.WORKING, _S.SAVING_FACE})
+"""States that a restart forgets: of the former two nothing is left, the others are ACCEPTED again.
+"""
 
 
-def advance(state: CaptureState | None, event: CaptureEvent) -> CaptureState | None:
-    """Give the state after an event, or None where the event means nothing in this state."""
-    return TRANSITIONS.get((state, event)) if state else None
+class TransitionError(RuntimeError):
+    """An event came in a state in which it cannot happen: a fault of the hub."""
+
+
+def advance(state: CaptureState | None, event: CaptureEvent) -> CaptureState:
+    """Give the state after an event.
+
+    Raises
+    ------
+    TransitionError
+        Where the event cannot happen in this state.
+    """
+    try:
+        return TRANSITIONS[state, event]
+    except KeyError:
+        raise TransitionError(f"a capture that is {state or 'unknown'} cannot be {event}") from None

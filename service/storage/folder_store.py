@@ -127,14 +127,14 @@ class FolderStore(Closing):
             pressed_by=pressed_by)
         return PendingWrite(capture_id, self._layout.frame(capture_id), metadata, frame)
 
-    def accept(self, frames: Sequence[WriteResult]) -> None:
-        """Keep frames that were written, all or none."""
+    def accept(self, frames: Sequence[WriteResult], state: CaptureState) -> None:
+        """Keep frames that were written, all or none; `state` is their captures' from now on."""
         fresh = {one.pending.capture_id: _frame_record(one) for one in frames}
         with self._database.transaction() as database:
             database.executemany(
                 "INSERT INTO captures (capture_id, state, settings_hash, frame_sha256,"
                 " accepted_at, pressed_by) VALUES (?, ?, ?, ?, ?, ?)",
-                [(capture_id, CaptureState.ACCEPTED, kept.metadata.settings_hash, kept.checksum,
+                [(capture_id, state, kept.metadata.settings_hash, kept.checksum,
                   kept.metadata.accepted_at, kept.metadata.pressed_by)
                  for capture_id, kept in fresh.items()])
         self._fresh.add(fresh.values())
@@ -205,30 +205,26 @@ class FolderStore(Closing):
         return PendingWrite(message.capture_id,
                      self._layout.face(message.capture_id, message.settings_hash), metadata, result)
 
-    def finish(self, faces: Sequence[WriteResult]) -> None:
-        """Keep faces that were written as outcomes, in order, all or none.
-
-        A second outcome of a capture changes nothing.
-        """
+    def finish(self, faces: Sequence[WriteResult], state: CaptureState) -> None:
+        """Keep faces that were written as outcomes, in order, all or none; as `accept`."""
         fresh = {one.pending.capture_id: _face_record(one) for one in faces}
         with self._database.transaction() as database:
             for capture_id, kept in fresh.items():
-                self._conclude(database, capture_id, CaptureState.DONE, kept.metadata.finished_at,
+                self._conclude(database, capture_id, state, kept.metadata.finished_at,
                                face_sha256=kept.checksum)
         self._fresh_faces = fresh
         self._unread.update(fresh)
         failpoint("hub.outcome.stored")
 
-    def fail(self, capture_id: str, error: str, message: str, *, dead: bool) -> None:
-        """Keep a failure as the capture's outcome."""
+    def fail(self, capture_id: str, state: CaptureState, error: str, message: str) -> None:
+        """Keep a failure as the outcome of a capture, which is in `state` from now on."""
         with self._database.transaction() as database:
-            self._conclude(
-                database, capture_id, CaptureState.DEAD if dead else CaptureState.FAILED,
-                stamp(self._account.wall()), error=error, message=message)
+            self._conclude(database, capture_id, state, stamp(self._account.wall()),
+                           error=error, message=message)
         failpoint("hub.outcome.stored")
 
-    def reopen(self, capture_id: str, *, attempts_left: bool) -> None:
-        """Withdraw an outcome: the capture is accepted again, its number is used up."""
+    def reopen(self, capture_id: str, state: CaptureState, *, attempts_left: bool) -> None:
+        """Withdraw an outcome: the capture goes on from `state`, its number is used up."""
         # One that is damaged as soon as it is written has used up its attempt.
         attempts_left = attempts_left and capture_id not in self._unread
         self._unread.discard(capture_id)
@@ -236,9 +232,7 @@ class FolderStore(Closing):
             database.execute("DELETE FROM outcomes WHERE capture_id = ?", (capture_id,))
             database.execute(
                 "UPDATE captures SET state = ?, attempts = iif(?, 0, attempts)"
-                " WHERE capture_id = ? AND state IN (?, ?)",
-                (CaptureState.ACCEPTED, attempts_left, capture_id, CaptureState.DONE,
-                 CaptureState.DEAD))
+                " WHERE capture_id = ?", (state, attempts_left, capture_id))
 
     def outcome(self, capture_id: str) -> Packet | None:
         """Give the outcome as `FaceDone` or `CaptureFailed`."""
@@ -297,9 +291,21 @@ class FolderStore(Closing):
         """Give ids of what was accepted before a time, oldest first; all where it is None."""
         return self._removal.accepted_before(moment, most)
 
-    def remove(self, capture_ids: Sequence[str]) -> None:
-        """Remove frames, faces, reports and rows, so that nothing of them can be read again."""
-        self._removal.remove(capture_ids)
+    def remove(self, capture_ids: Sequence[str], state: CaptureState) -> None:
+        """Mark captures, whose outcomes are withdrawn, as gone; `erase` or `sweep` does the rest.
+
+        Parameters
+        ----------
+        state : REMOVED, which nothing else here sees
+        """
+        self._removal.remove(capture_ids, state)
+
+    def erase(self, capture_ids: Sequence[str]) -> None:
+        """Erase what was removed: frames, faces, reports and rows, so that nothing can be read.
+
+        Where a file resists, StoreError: `sweep` tries again.
+        """
+        self._removal.erase(capture_ids)
 
     def sweep(self, retention_s: float | None) -> None:
         """Finish what `remove` began; remove what is in quarantine for longer than that."""
@@ -319,15 +325,12 @@ class FolderStore(Closing):
         self, database: Connection, capture_id: str, state: CaptureState, now: str, *,
         face_sha256: str | None = None, error: str | None = None, message: str | None = None,
     ) -> None:
-        changed = database.execute(
-            "UPDATE captures SET state = ? WHERE capture_id = ? AND state = ?",
-            (state, capture_id, CaptureState.ACCEPTED))
-        if changed.rowcount:
-            database.execute(
-                "INSERT INTO outcomes (capture_id, face_sha256, error, message, dead,"
-                " finished_at, finished_age_s) VALUES (?, ?, ?, ?, ?, ?, ?)",
-                (capture_id, face_sha256, error, message, state is CaptureState.DEAD, now,
-                 self._account.now()))
+        database.execute("UPDATE captures SET state = ? WHERE capture_id = ?", (state, capture_id))
+        database.execute(
+            "INSERT INTO outcomes (capture_id, face_sha256, error, message, dead,"
+            " finished_at, finished_age_s) VALUES (?, ?, ?, ?, ?, ?, ?)",
+            (capture_id, face_sha256, error, message, state is CaptureState.DEAD, now,
+             self._account.now()))
 
     def _outcome(self, which: str, *values: str | int) -> Packet | None:
         row = self._database.one(

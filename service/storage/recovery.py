@@ -15,7 +15,7 @@ from typing import TypeVar
 import structlog
 
 from denseface.service.errors import CorruptFileError, DamagedDatabaseError, StoreError
-from denseface.service.protocol.states import CaptureState
+from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
 from denseface.service.storage.database import Database
 from denseface.service.storage.disk_reserve import DiskReserve
 from denseface.service.storage.folder_layout import FolderLayout
@@ -171,7 +171,7 @@ class _Adoption:
             return
         self._outcomes[capture_id] = _Outcome(
             kept.metadata.finished_at, StoreClock.seconds_of(kept.metadata.clock),
-            CaptureState.DONE, face_sha256=kept.checksum)
+            advance(CaptureState.SAVING_FACE, CaptureEvent.FACE_SAVED), face_sha256=kept.checksum)
 
     def _read(
         self, capture_id: str, path: Path, read: Callable[[Path], _KeptT]
@@ -195,17 +195,19 @@ class _Adoption:
         now = stamp(self._account.wall())
         self._captures[capture_id] = _Capture(now, _NO_SETTINGS, _NO_CHECKSUM)
         self._outcomes[capture_id] = _Outcome(
-            now, self._account.now(), CaptureState.DEAD, error="CorruptFileError", message=reason)
+            now, self._account.now(), advance(CaptureState.ACCEPTED, CaptureEvent.EXHAUSTED),
+            error="CorruptFileError", message=reason)
 
     def _write(self) -> None:
+        accepted = advance(CaptureState.SAVING_FRAME, CaptureEvent.FRAME_SAVED)
         with self._database.transaction() as database:
             for capture_id, one in sorted(
                     self._captures.items(), key=lambda item: item[1].accepted_at):
                 database.execute(
                     "INSERT INTO captures (capture_id, state, settings_hash, frame_sha256,"
                     " accepted_at, pressed_by) VALUES (?, ?, ?, ?, ?, ?)",
-                    (capture_id, CaptureState.ACCEPTED, one.settings_hash, one.frame_sha256,
-                     one.accepted_at, one.pressed_by))
+                    (capture_id, accepted, one.settings_hash, one.frame_sha256, one.accepted_at,
+                     one.pressed_by))
             for capture_id, end in sorted(
                     self._outcomes.items(), key=lambda item: item[1].finished_at):
                 database.execute(

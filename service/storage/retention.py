@@ -58,9 +58,12 @@ class Retention:
             "SELECT capture_id FROM captures WHERE state != ? AND accepted_at < ?"
             " ORDER BY position LIMIT ?", CaptureState.REMOVED, limit, most)
 
-    def remove(self, capture_ids: Sequence[str]) -> None:
-        """Remove all of captures."""
-        self._ballast.overboard(lambda: self._mark(capture_ids))
+    def remove(self, capture_ids: Sequence[str], state: CaptureState) -> None:
+        """Mark rows, which nothing but `erase` and `sweep` sees from now on."""
+        self._ballast.overboard(lambda: self._mark(capture_ids, state))
+
+    def erase(self, capture_ids: Sequence[str]) -> None:
+        """Remove the files of what was removed, then the rows."""
         self._ballast.overboard(lambda: self._finish(capture_ids))
 
     def sweep(self, retention_s: float | None) -> None:
@@ -83,12 +86,12 @@ class Retention:
         with naming(self._layout.quarantine):
             self._quarantine.clear()
 
-    def _mark(self, capture_ids: Sequence[str]) -> None:
+    def _mark(self, capture_ids: Sequence[str], state: CaptureState) -> None:
         with self._database.transaction() as database:
             for capture_id in capture_ids:
                 database.execute("DELETE FROM outcomes WHERE capture_id = ?", (capture_id,))
-                database.execute("UPDATE captures SET state = ? WHERE capture_id = ?",
-                                 (CaptureState.REMOVED, capture_id))
+                database.execute(
+                    "UPDATE captures SET state = ? WHERE capture_id = ?", (state, capture_id))
 
     def _finish(self, capture_ids: Sequence[str]) -> None:
         """Remove the files, then the rows: a row of a file that is gone says so in its state."""
@@ -111,6 +114,6 @@ class Retention:
             self._quarantine.remove(capture_ids)
         with self._database.transaction() as database:
             database.executemany(
-                "DELETE FROM captures WHERE capture_id = ? AND state = ?",
-                [(capture_id, CaptureState.REMOVED) for capture_id in capture_ids])
+                "DELETE FROM captures WHERE capture_id = ? AND state = 'removed'",
+                [(capture_id,) for capture_id in capture_ids])
         self._database.truncate_log()

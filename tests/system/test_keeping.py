@@ -15,7 +15,7 @@ import zmq
 from denseface.recon.settings import Settings
 from denseface.service.client import Client, Operator
 from denseface.service.errors import PressRefusedError, UnknownCaptureError
-from denseface.service.hub.hub import settings_hash
+from denseface.service.hub import settings_hash
 from denseface.service.protocol.messages import (
     Announce,
     Frame,

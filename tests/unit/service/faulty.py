@@ -24,21 +24,21 @@ class FaultyStore(FolderStore):
         if self.full:
             raise DiskFullError("no room on the disk")
 
-    def accept(self, frames):
+    def accept(self, *arguments):
         self.room()
-        super().accept(frames)
+        super().accept(*arguments)
 
     def start_attempt(self, capture_id):
         self.room()
         return super().start_attempt(capture_id)
 
-    def finish(self, faces):
+    def finish(self, *arguments):
         self.room()
-        super().finish(faces)
+        super().finish(*arguments)
 
-    def fail(self, *arguments, **more):
+    def fail(self, *arguments):
         self.room()
-        super().fail(*arguments, **more)
+        super().fail(*arguments)
 
 
 class StepWriter:

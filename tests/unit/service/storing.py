@@ -2,6 +2,7 @@
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import StoreError
+from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet
 from denseface.service.storage.folder_store import FolderStore
 from denseface.service.storage.writer import write
@@ -15,7 +16,7 @@ def accept(store: FolderStore, frame: Packet, settings: Settings, settings_hash:
     if written.error:
         raise written.error
     try:
-        store.accept([written])
+        store.accept([written], CaptureState.ACCEPTED)
     except StoreError:
         written.pending.discard()
         raise
@@ -26,4 +27,4 @@ def finish(store: FolderStore, result: Packet) -> None:
     (written,) = write([store.prepare_face(result)])
     if written.error:
         raise written.error
-    store.finish([written])
+    store.finish([written], CaptureState.DONE)

@@ -7,11 +7,11 @@ import pytest
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import StoreError
-from denseface.service.hub.hub import Hub, settings_hash
+from denseface.service.hub import Hub, settings_hash
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, Publish, Send
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
-from denseface.service.protocol.states import TRANSITIONS, CaptureEvent, CaptureState, advance
+from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
@@ -403,21 +403,3 @@ def test_an_answer_to_another_job_does_not_lose_the_capture(bench):
     bench.worker()
     bench.result(hashed="00")
     assert kinds(bench.worker(credit=1)) == [(WORKER, "job")]
-
-
-def test_the_table_leads_from_every_state_on_disk_to_an_end():
-    ends = {CaptureState.REMOVED, CaptureState.REFUSED}
-    assert {state for state, _ in TRANSITIONS} == set(CaptureState) - ends
-    reached = {CaptureState.ACCEPTED}
-    for _ in CaptureState:
-        reached |= {after for (before, _), after in TRANSITIONS.items() if before in reached}
-    assert reached == set(CaptureState) - {
-        CaptureState.PRESSED, CaptureState.KEEPING, CaptureState.REFUSED}
-    for outcome in (CaptureState.DONE, CaptureState.FAILED, CaptureState.DEAD):
-        assert advance(outcome, CaptureEvent.EXPIRED) is CaptureState.REMOVED
-        for event in (CaptureEvent.RESULT, CaptureEvent.REJECTED, CaptureEvent.DISPATCHED):
-            assert advance(outcome, event) is None
-    assert advance(CaptureState.ACCEPTED, CaptureEvent.EXPIRED) is None
-    for writing in (CaptureState.KEEPING, CaptureState.CONCLUDING):
-        assert advance(writing, CaptureEvent.PURGED) is None  # the hub waits for the disk first
-    assert advance(None, CaptureEvent.STORED) is None

@@ -1,7 +1,7 @@
 """A worker has its next frame at hand before it has answered."""
 
 from denseface.service.errors import StoreError
-from denseface.service.hub.hub import Hub
+from denseface.service.hub import Hub
 from denseface.service.protocol import messages
 from denseface.service.protocol.states import CaptureState
 from tests.unit.service.hub.test_hub import HASH, OTHER, SETTINGS, WORKER, Bench, bench

@@ -4,7 +4,7 @@ import pytest
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import StoreError
-from denseface.service.hub.hub import Hub
+from denseface.service.hub import Hub
 from denseface.service.protocol import messages
 from denseface.service.storage.folder_store import FolderStore
 from tests.unit.service.hub.test_hub import CLIENT, SETTINGS, WORKER, Bench, kinds
@@ -26,7 +26,7 @@ def test_a_store_that_fails_answers_the_request(bench, monkeypatch):
 
 
 def test_a_result_waits_for_room(bench, monkeypatch):
-    def full(_):
+    def full(*_):
         raise StoreError("No space left on device")
 
     bench.accepted("a", "b")
@@ -44,7 +44,7 @@ def test_a_result_waits_for_room(bench, monkeypatch):
 
 
 def test_a_failure_that_cannot_be_kept_is_told_again(bench, monkeypatch):
-    def full(*_, **__):
+    def full(*_):
         raise StoreError("No space left on device")
 
     bench.accepted("a")
@@ -78,8 +78,8 @@ def test_a_disk_that_does_not_answer_refuses_the_press(bench, monkeypatch):
 def test_a_disk_that_damages_every_face_uses_up_the_attempts(bench, monkeypatch):
     real = bench.store.finish
 
-    def damaging(packet):
-        real(packet)
+    def damaging(*arguments):
+        real(*arguments)
         for path in bench.store._layout.faces.iterdir():
             path.write_bytes(b"damaged")
 

@@ -16,7 +16,7 @@ import pytest
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import ProtocolError
-from denseface.service.hub.hub import Hub
+from denseface.service.hub import Hub
 from denseface.service.hub.peers import MAX_PEERS
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, Publish

@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from denseface.recon.settings import Settings
-from denseface.service.hub.hub import Hub, settings_hash
+from denseface.service.hub import Hub, settings_hash
+from denseface.service.hub.captures import Captures
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Publish
-from denseface.service.protocol.states import CaptureState
+from denseface.service.protocol.states import TRANSITIONS, CaptureState
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
@@ -59,6 +60,15 @@ class AnyOrder(RuleBasedStateMachine):
         self.pressed, self.taken, self.accepted = set(), set(), set()
         self.jobs: dict[bytes, list[messages.Job]] = {}
         self.published: list[messages.FaceDone | messages.CaptureFailed] = []
+        self.states: dict[str, CaptureState] = {}
+        note = Captures._note
+
+        def noted(captures, capture_id, state):
+            self.takes_a_transition(capture_id, state)
+            note(captures, capture_id, state)
+
+        self.patches.append(patch.object(Captures, "_note", noted))
+        self.patches[-1].start()
         self.restart()
 
     def teardown(self):
@@ -170,6 +180,17 @@ class AnyOrder(RuleBasedStateMachine):
         self.writer = StepWriter(self.store.room, self.writes)
         self.writer.immediate = immediate
         self.hub = Hub(self.store, SETTINGS, Settings(), writer=self.writer)
+        self.states = {capture_id: row.state for capture_id in "abcd"
+                       if (row := self.store.find(capture_id))}
+
+    def takes_a_transition(self, capture_id, state):
+        """Follow a capture's states by what the hub notes of it."""
+        before = self.states.get(capture_id)
+        assert state in [after for (known, _), after in TRANSITIONS.items() if known is before]
+        if state in (CaptureState.REFUSED, CaptureState.REMOVED):
+            del self.states[capture_id]
+        else:
+            self.states[capture_id] = state
 
     @rule(immediate=st.booleans())
     def the_disk_becomes(self, immediate):
@@ -413,6 +434,30 @@ class AnyOrder(RuleBasedStateMachine):
     def ids_are_known(self):
         """What was accepted is there; what is there was accepted."""
         assert self.rows() == self.accepted
+
+    @invariant()
+    def states_are_those_that_followed_by_the_table(self):
+        """They fit to what the hub has in its hands, and to the rows."""
+        presses, jobs = self.hub._presses, self.hub._jobs
+        held = {one for worker in self.hub._peers.workers.values() for one in worker.jobs}
+        for capture_id in "abcd":
+            state = self.states.get(capture_id)
+            assert jobs._captures.state(capture_id) is state
+            press, row = presses._presses.get(capture_id), self.store.find(capture_id)
+            assert (press is not None) == (
+                state in (CaptureState.PRESSED, CaptureState.SAVING_FRAME))
+            if press:
+                assert row is None
+                assert (press.frame_sender is not None) == (state is CaptureState.SAVING_FRAME)
+            elif row is None or row.state is not CaptureState.ACCEPTED:
+                assert state is (row.state if row else None)
+            elif capture_id in jobs._unsaved_faces._pending:
+                assert state is CaptureState.SAVING_FACE
+            elif state is CaptureState.WORKING:
+                assert capture_id in held
+            else:
+                assert state is CaptureState.ACCEPTED
+                assert capture_id in held or capture_id in jobs._queue
 
     @invariant()
     def numbers_only_rise(self):

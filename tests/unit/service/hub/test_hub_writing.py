@@ -4,7 +4,7 @@ import pytest
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import DiskFullError, StoreError
-from denseface.service.hub.hub import Hub
+from denseface.service.hub import Hub
 from denseface.service.hub.presses import _MAX_SAVING
 from denseface.service.hub.unsaved_faces import _MAX_UNSAVED
 from denseface.service.protocol import messages
@@ -103,9 +103,9 @@ def test_frames_that_wait_together_get_their_rows_together(bench, monkeypatch):
         bench.frame(capture_id)
     rows, real = [], bench.store.accept
 
-    def accept(frames):
+    def accept(frames, state):
         rows.append([one.pending.capture_id for one in frames])
-        real(frames)
+        real(frames, state)
 
     monkeypatch.setattr(bench.store, "accept", accept)
     assert kinds(bench.written()).count((CLIENT, "press_accepted")) == 3
@@ -115,10 +115,10 @@ def test_frames_that_wait_together_get_their_rows_together(bench, monkeypatch):
 
 @pytest.mark.parametrize("kind", ["accept", "finish"])
 def test_rows_that_cannot_be_written_together_are_written_one_by_one(bench, monkeypatch, kind):
-    def fails_for_b(written):
+    def fails_for_b(written, state):
         if any(one.pending.capture_id == "b" for one in written):
             raise StoreError("the disk fails")
-        real(written)
+        real(written, state)
 
     real = getattr(bench.store, kind)
     bench.now = 5.0

@@ -5,7 +5,7 @@ import itertools
 import pytest
 
 from denseface.recon.settings import Settings
-from denseface.service.hub.hub import Hub
+from denseface.service.hub import Hub
 from denseface.service.protocol import messages
 from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet

@@ -5,7 +5,7 @@ import pytest
 from pydantic import ValidationError
 
 from denseface.recon.settings import Settings
-from denseface.service.hub.hub import Hub
+from denseface.service.hub import Hub
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Publish
 from denseface.service.protocol.payload import MAX_PREVIEW_SIDE, PreviewHeader

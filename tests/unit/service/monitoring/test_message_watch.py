@@ -3,7 +3,7 @@
 import pytest
 
 from denseface.recon.settings import Settings
-from denseface.service.hub.hub import Hub
+from denseface.service.hub import Hub
 from denseface.service.monitoring.figures import Figures
 from denseface.service.monitoring.message_watch import MessageWatch
 from denseface.service.protocol import messages

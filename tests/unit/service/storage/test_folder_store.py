@@ -79,7 +79,7 @@ def test_a_row_comes_after_its_file_is_safe(store, monkeypatch):
     monkeypatch.setattr(Path, "replace", renamed)
     pending = store.prepare_frame(frame("a"), Settings(), "0f")
     monkeypatch.setattr(store._database, "transaction", begun)
-    store.accept(write([pending]))
+    store.accept(write([pending]), CaptureState.ACCEPTED)
     assert steps == ["file", "a.frame", "folder", "row"]
     assert store._database.one("PRAGMA synchronous")[0] == 2
     assert store._database.one("PRAGMA journal_mode")[0] == "wal"
@@ -89,8 +89,8 @@ def test_outcomes_are_numbered_in_order(store):
     for name in "abc":
         accept(store, frame(name), Settings(), "0f")
     finish(store, result("b", store))
-    store.fail("a", "NoFaceError", "no face", dead=False)
-    store.fail("c", "WorkerLost", "gone", dead=True)
+    store.fail("a", CaptureState.FAILED, "NoFaceError", "no face")
+    store.fail("c", CaptureState.DEAD, "WorkerLost", "gone")
     assert store.unfinished() == []
     assert store.last_sequence() == 3
     assert store.counts() == {CaptureState.DONE: 1, CaptureState.FAILED: 1, CaptureState.DEAD: 1}
@@ -107,7 +107,8 @@ def test_outcomes_are_numbered_in_order(store):
 def test_a_second_outcome_changes_nothing(store):
     accept(store, frame("a"), Settings(), "0f")
     finish(store, result("a", store))
-    store.fail("a", "WorkerLost", "late", dead=True)
+    with pytest.raises(StoreError, match="UNIQUE"):
+        store.fail("a", CaptureState.DEAD, "WorkerLost", "late")
     assert store.last_sequence() == 1
     assert store.find("a").state is CaptureState.DONE
 

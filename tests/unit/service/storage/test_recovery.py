@@ -30,8 +30,8 @@ def data(tmp_path):
         for name in ("done", "failed", "dead", "waits"):
             accept(store, frame(name), Settings(), "0f")
         finish(store, result("done", store))
-        store.fail("failed", "NoFaceError", "no face", dead=False)
-        store.fail("dead", "WorkerLost", "gone", dead=True)
+        store.fail("failed", CaptureState.FAILED, "NoFaceError", "no face")
+        store.fail("dead", CaptureState.DEAD, "WorkerLost", "gone")
     return tmp_path / "data"
 
 
@@ -176,7 +176,7 @@ def test_a_damaged_face_names_its_capture(data):
             store.outcome_after(0)
         assert caught.value.capture_id == "done"
         assert not face.exists()
-        store.reopen("done", attempts_left=True)
+        store.reopen("done", CaptureState.ACCEPTED, attempts_left=True)
         assert store.outcome_after(0).message.capture_id == "failed"
         assert store.find("done").state is CaptureState.ACCEPTED
 
@@ -220,9 +220,11 @@ def test_quarantine_goes_with_its_capture(data):
     with FolderStore(data, FakeClock()) as store:
         with pytest.raises(StoreError):
             store.frame("waits")
-        store.remove(["dead"])
+        store.remove(["dead"], CaptureState.REMOVED)
+        store.erase(["dead"])
         assert len(reports(data)) == 1
-        store.remove(["waits"])
+        store.remove(["waits"], CaptureState.REMOVED)
+        store.erase(["waits"])
         assert list((data / "quarantine").iterdir()) == []
 
 
@@ -232,8 +234,9 @@ def test_a_removal_that_was_cut_short_is_finished(data, monkeypatch):
 
     with FolderStore(data, FakeClock()) as store:
         monkeypatch.setattr(store._removal, "_finish", killed)
+        store.remove(["done", "waits"], CaptureState.REMOVED)
         with pytest.raises(StoreError):
-            store.remove(["done", "waits"])
+            store.erase(["done", "waits"])
     monkeypatch.undo()
     with FolderStore(data, FakeClock()) as store:
         assert store.find("done") is None
@@ -300,14 +303,15 @@ def test_a_purge_makes_room_on_a_full_disk(data, monkeypatch):
     with FolderStore(data, FakeClock()) as store:
         real = store._removal._mark
 
-        def full(capture_ids):
+        def full(*arguments):
             if (data / "ballast").exists():
                 raise DiskFullError("no room on the disk")
-            real(capture_ids)
+            real(*arguments)
 
         monkeypatch.setattr(store._removal, "_mark", full)
         assert (data / "ballast").stat().st_size == 2**20
-        store.remove(["waits"])
+        store.remove(["waits"], CaptureState.REMOVED)
+        store.erase(["waits"])
         assert store.find("waits") is None
         assert (data / "ballast").stat().st_size == 2**20
 

@@ -1,0 +1,99 @@
+"""Where each capture stands, and the only way to change it."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import structlog
+
+from denseface.service.errors import StoreError
+from denseface.service.protocol.states import (
+    IN_MEMORY,
+    TRANSITIONS,
+    CaptureEvent,
+    CaptureState,
+    advance,
+)
+from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage.writer import WriteResult
+
+__all__ = ["Captures"]
+
+
+class Captures:
+    """States of captures: those that a restart forgets are here, the others in the store's rows."""
+
+    def __init__(self, store: FolderStore) -> None:
+        self._store = store
+        self._in_memory: dict[str, CaptureState] = {}
+
+    def state(self, capture_id: str) -> CaptureState | None:
+        """Give a capture's state, None where it is unknown; StoreError where that is unreadable."""
+        if state := self._in_memory.get(capture_id):
+            return state
+        row = self._store.find(capture_id)
+        return row.state if row else None
+
+    def allows(self, capture_id: str, event: CaptureEvent) -> bool:
+        """Say whether an event can happen to a capture now; raises as `state`."""
+        return (self.state(capture_id), event) in TRANSITIONS
+
+    def advance(self, capture_id: str, event: CaptureEvent) -> None:
+        """Note an event that changes no row.
+
+        Raises
+        ------
+        TransitionError
+            Where it cannot happen in the capture's state.
+        """
+        self._note(capture_id, advance(self.state(capture_id), event))
+
+    @contextmanager
+    def transition(self, event: CaptureEvent, *capture_ids: str) -> Iterator[CaptureState]:
+        """Give the state that the store is to write of captures, which have it from the end on.
+
+        Where what is done within raises, they stay as they were. Raises as `advance`.
+        """
+        (after,) = {advance(self.state(capture_id), event) for capture_id in capture_ids}
+        yield after
+        for capture_id in capture_ids:
+            self._note(capture_id, after)
+
+    def save(
+        self, event: CaptureEvent, written: Sequence[WriteResult]
+    ) -> Iterator[tuple[WriteResult, Exception | None]]:
+        """Give files that were written their rows and say of each in order what came of it.
+
+        Parameters
+        ----------
+        event : FRAME_SAVED or FACE_SAVED
+        written : what a writer gave back; what failed comes first
+        """
+        yield from ((one, one.error) for one in written if one.error)
+        good = [one for one in written if one.error is None]
+        if len(good) > 1:  # one sync of the database for all
+            try:
+                self._write_rows(event, good)
+            except StoreError as error:
+                structlog.get_logger("hub").warning(
+                    "rows are written one by one", reason=str(error))
+            else:
+                yield from ((one, None) for one in good)
+                return
+        for one in good:
+            try:
+                self._write_rows(event, [one])
+            except StoreError as error:
+                yield one, error
+            else:
+                yield one, None
+
+    def _write_rows(self, event: CaptureEvent, written: Sequence[WriteResult]) -> None:
+        write = (self._store.accept if event is CaptureEvent.FRAME_SAVED else self._store.finish)
+        with self.transition(event, *(one.pending.capture_id for one in written)) as state:
+            write(written, state)
+
+    def _note(self, capture_id: str, state: CaptureState) -> None:
+        if state in IN_MEMORY:
+            self._in_memory[capture_id] = state
+        else:
+            self._in_memory.pop(capture_id, None)
