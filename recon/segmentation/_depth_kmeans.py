@@ -10,11 +10,12 @@ from denseface.recon.numerics.jit import compiled
 
 __all__ = ["Cluster", "split_depths"]
 
-# The best cuts are sought among so many places, then moved to the millimetre.
-_PLACES = 64
+_STARTS = 64
+"""Depths among which the best cuts are sought, before they are moved to the millimetre."""
 _ROUNDS = 50
-# What lies outside these percentiles may be stray readings.
-_MOST = (0.02, 0.98)
+"""Most rounds of Lloyd's algorithm."""
+_TAILS = (0.02, 0.98)
+"""Readings outside of these quantiles may be stray."""
 
 
 class Cluster(NamedTuple):
@@ -40,25 +41,25 @@ def split_depths(z: NDArray[np.floating]) -> list[Cluster]:
     The clusters that are not empty, nearest first.
     """
     start, sums = _summed(np.ascontiguousarray(z, np.float32))
-    places = np.arange(_PLACES) * (sums.shape[1] - 1) // (_PLACES - 1)
-    cuts = _refined(*_best_cuts(sums, places), sums)
+    starts = np.arange(_STARTS) * (sums.shape[1] - 1) // (_STARTS - 1)
+    cuts = _refined(*_best_cuts(sums, starts), sums)
     clusters = []
     for first, end in zip((0, *cuts), (*cuts, sums.shape[1] - 1), strict=True):
         before, up_to = sums[0][first], sums[0][end]
         if up_to > before:
-            most = [before + share * (up_to - before) for share in _MOST]
-            # The bins with the first, the last, and the readings at those shares.
-            at = start + np.searchsorted(sums[0][1:], [before + 0.5, up_to - 0.5, *most])
+            tails = [before + quantile * (up_to - before) for quantile in _TAILS]
+            # The bins with the first, the last, and the readings at those quantiles.
+            at = start + np.searchsorted(sums[0][1:], [before + 0.5, up_to - 0.5, *tails])
             clusters.append(Cluster(*at.tolist()))
     return clusters
 
 
 @compiled
 def _summed(z: NDArray[np.float32]) -> tuple[int, NDArray[np.float64]]:
-    """Give the least depth, whole mm, and sums over the bins before each, (3, bins + 1).
+    """Give the least depth, whole mm, and running moments of the histogram, (3, bins + 1).
 
-    One bin for each millimetre from the least to the largest: of how many depths are in it, and of
-    that times its number, and times its number squared.
+    One bin k for each millimetre from the least to the largest depth; over the bins before each,
+    sums of their counts n, of n k and of n k^2.
     """
     half = np.float32(0.5)
     nearest = farthest = z[0]
@@ -80,7 +81,7 @@ def _summed(z: NDArray[np.float32]) -> tuple[int, NDArray[np.float64]]:
 
 @compiled
 def _best_cuts(sums: NDArray[np.float64], at: NDArray[np.int64]) -> tuple[int, int]:
-    """Try every pair of some places, (first of the second cluster, first of the third)."""
+    """Try every pair of some bins: (first of the second cluster, first of the third)."""
     least, best = 1e300, (at[0], at[0])
     for first in at:
         for second in at:
@@ -102,7 +103,7 @@ def _spread(sums: NDArray[np.float64], first: int, end: int) -> float:
 
 @compiled
 def _refined(second: int, third: int, sums: NDArray[np.float64]) -> tuple[int, int]:
-    """Lloyd's rounds: each cut goes to the middle between the means on its sides."""
+    """Lloyd's algorithm: each cut goes to the middle between the means on its sides."""
     end = sums.shape[1] - 1
     for _ in range(_ROUNDS):
         means = np.empty(3)

@@ -1,28 +1,58 @@
-"""The loops over the colours along a face's outline, compiled."""
+"""The background's part in the colours along a face's outline, compiled."""
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["box_sums", "remove_background"]
+__all__ = ["ColorSums", "MixtureLimits", "box_sums", "remove_background"]
+
+
+class ColorSums(NamedTuple):
+    """Sums of the colours around each pixel of an edge, and their number: (n, 4) int32 each."""
+
+    face: NDArray[np.int32]
+    """Of the face beside it."""
+    background: NDArray[np.int32]
+    """Of what is behind it."""
+    distant: NDArray[np.int32]
+    """Of what is behind it or farther aside."""
+
+
+class MixtureLimits(NamedTuple):
+    """What counts as a mixture of two colours; distances are in RGB, of 255."""
+
+    alike: float
+    """Two colours nearer than this are not told apart."""
+    part: float
+    """With this part of the background in it, nothing of the face's own is left in a colour."""
+    distant_part: float
+    """The same for a background that is known from farther aside alone."""
+    aside: float
+    """How far a mixture may be off the line between its colours, as a part of their distance."""
+    aside_least: float
+    """How far it may be off where they are alike."""
+    contrast: float
+    """A background less different than this would not be noticed within the rim."""
 
 
 @compiled
 def box_sums(
-    colors: NDArray[np.uint8], among: NDArray[np.bool_], wanted: NDArray[np.bool_], reach: int
+    colors: NDArray[np.uint8], mask: NDArray[np.bool_], wanted: NDArray[np.bool_], reach: int
 ) -> NDArray[np.int32]:
-    """Sum the colours `among` those at most `reach` rows and columns from each wanted pixel.
+    """Sum the masked colours at most `reach` rows and columns from each wanted pixel.
 
-    Gives (n, 4), the fourth is their number; n wanted pixels, row by row.
+    Returns (n, 4), the number of colours last, for n wanted pixels, row by row.
     """
-    rows, columns = among.shape
-    # Sums of all that is above and left: any box is then four of them.
+    rows, columns = mask.shape
+    # Summed-area table: any box is a combination of four entries.
     total = np.zeros((rows + 1, columns + 1, 4), np.int32)
     for row in range(rows):
         line = np.zeros(4, np.int32)
         for column in range(columns):
-            if among[row, column]:
+            if mask[row, column]:
                 for c in range(3):
                     line[c] += colors[row, column, c]
                 line[3] += 1
@@ -44,26 +74,22 @@ def box_sums(
 
 @compiled
 def remove_background(
-    colors: NDArray[np.uint8], own: NDArray[np.bool_], edge: NDArray[np.bool_],
-    near: NDArray[np.int32], far: NDArray[np.int32], farther: NDArray[np.int32], alike: float,
-    share: float, aside: float, aside_least: float, contrast: float, much: float,
+    colors: NDArray[np.uint8], own: NDArray[np.bool_], edge: NDArray[np.bool_], sums: ColorSums,
+    limits: MixtureLimits,
 ) -> None:
-    """Take what of the colour behind is in the edge's colours out of them.
+    """Remove the background's part from the edge's colours, and say which are the face's own.
 
-    A colour c is taken for near + s (far - near), unless it lies aside of that line, by more than
-    `aside` of the line and than `aside_least`: then s is 0. With s below `share` it becomes the
-    face's own, and s (far - near) is taken out of it. One that was its own already keeps its
-    colour, and with a larger s it stays its own only where near and far differ by less than
-    `contrast`. Where nothing is near, or nothing far, a pixel stays as it is.
+    A colour c is taken for face + s (background - face); s is 0 where it lies off that line. With
+    s below `limits.part` it becomes the face's own, and s (background - face) is taken off it. One
+    that was its own already keeps its colour, and with a larger s it stays its own only where the
+    contrast is low. Where face or background is unknown, a pixel stays as it is.
 
-    What lies aside of that line, or has none, is not the face's own either where it lies on the
-    line to `farther`, at `much` or more.
+    A colour off that line, or without one, is not the face's own either where it lies on the line
+    to the distant background, with s of `limits.distant_part` or more.
 
-    colors : (H, W, 3); own, edge : (H, W)
-    near, far, farther : (n, 4), for each pixel of the edge the sums of the colours beside it on the
-        face, behind it, and behind and farther aside, and their number: `box_sums`
-    alike : two colours nearer than this are not told apart
+    colors : (H, W, 3), changed; own : (H, W), changed; edge : (H, W)
     """
+    low = np.float32(limits.contrast * limits.contrast)
     i = -1
     for row in range(edge.shape[0]):
         for column in range(edge.shape[1]):
@@ -71,47 +97,47 @@ def remove_background(
                 continue
             i += 1
             color, inner = colors[row, column], own[row, column]
-            part, length, mixed = _mixture(color, near[i], far[i], alike, aside, aside_least)
+            face, behind = sums.face[i], sums.background[i]
+            part, length, mixed = _unmixed(color, face, behind, limits)
             if length > 0:
-                own[row, column] = part < np.float32(share) or (
-                    inner and length < np.float32(contrast * contrast))
+                own[row, column] = part < np.float32(limits.part) or (inner and length < low)
                 if own[row, column] and not inner:
                     for c in range(3):
-                        mean = np.float32(near[i, c]) / np.float32(near[i, 3])
-                        way = np.float32(far[i, c]) / np.float32(far[i, 3]) - mean
+                        mean = np.float32(face[c]) / np.float32(face[3])
+                        way = np.float32(behind[c]) / np.float32(behind[3]) - mean
                         cleared = np.float32(color[c]) - part * way
                         color[c] = np.uint8(
                             min(max(cleared, np.float32(0)), np.float32(255)) + np.float32(0.5))
             if own[row, column] and not mixed:
-                part, length, _ = _mixture(color, near[i], farther[i], alike, aside, aside_least)
-                own[row, column] = (
-                    part < np.float32(much) or length < np.float32(contrast * contrast))
+                part, length, _ = _unmixed(color, face, sums.distant[i], limits)
+                own[row, column] = part < np.float32(limits.distant_part) or length < low
 
 
 @compiled
-def _mixture(
-    color: NDArray[np.uint8], near: NDArray[np.int32], far: NDArray[np.int32], alike: float,
-    aside: float, aside_least: float,
+def _unmixed(
+    color: NDArray[np.uint8], face: NDArray[np.int32], behind: NDArray[np.int32],
+    limits: MixtureLimits,
 ) -> tuple[np.float32, np.float32, bool]:
-    """Give the share of far's mean in a colour, how far that is from near's, and whether it fits.
+    """Give s of a colour, the squared distance of both means, and whether it lies on their line.
 
-    The distance is squared. All are zero where one of the two is not known, the share where the
-    colour lies aside of the way from one to the other.
+    All are zero where one of the means is unknown, s where the colour lies off the line.
     """
-    if near[3] == 0 or far[3] == 0:
+    if face[3] == 0 or behind[3] == 0:
         return np.float32(0), np.float32(0), False
-    # Sums alone: room for three numbers each would take longer than all of this.
+    # Sums alone: arrays of three numbers would take longer than all of this.
     length = along = squared = np.float32(0)
-    per_near, per_far = np.float32(1) / np.float32(near[3]), np.float32(1) / np.float32(far[3])
+    per_face, per_behind = np.float32(1) / np.float32(face[3]), np.float32(1) / np.float32(
+        behind[3])
     for c in range(3):
-        mean = np.float32(near[c]) * per_near
-        way, off = np.float32(far[c]) * per_far - mean, np.float32(color[c]) - mean
+        mean = np.float32(face[c]) * per_face
+        way, off = np.float32(behind[c]) * per_behind - mean, np.float32(color[c]) - mean
         length += way * way
         along += way * off
         squared += off * off
-    apart, length = length, max(length, np.float32(alike * alike))
+    apart, length = length, max(length, np.float32(limits.alike * limits.alike))
     part = max(along / length, np.float32(0))
     away = squared - part * (2 * along - part * apart)
-    if away > max(np.float32(aside * aside) * length, np.float32(aside_least**2)):
+    if away > max(np.float32(limits.aside * limits.aside) * length,
+                  np.float32(limits.aside_least**2)):
         return np.float32(0), length, False
     return part, length, True

@@ -7,37 +7,35 @@ from numpy.typing import NDArray
 from denseface.recon.intermediate import Registration
 from denseface.recon.numerics.morphology import select_pixels
 from denseface.recon.numerics.push_pull import inpaint_colors
-from denseface.recon.segmentation._edge_color_kernels import box_sums, remove_background
+from denseface.recon.segmentation._edge_color_kernels import (
+    ColorSums,
+    MixtureLimits,
+    box_sums,
+    remove_background,
+)
 
 __all__ = ["seed_colors"]
 
-# How far inside the outline the background may still mix into a depth pixel's colour, and how far
-# inside it a pixel may lie that shows nothing else: the sensor's edge is frayed.
 _RIM = np.ones((5, 5), np.uint8)
+"""How far inside the outline the background may mix into a depth pixel's colour, pixels."""
 _FRAYED = np.ones((7, 7), np.uint8)
-# Around the face, where its background is looked for.
+"""How far inside it a pixel may show nothing but background: the sensor's edge is frayed."""
 _AROUND = np.ones((9, 9), np.uint8)
-# How many pixels wide the windows are in which the face's own colour, and its background's, are
-# looked for. Background farther aside may have another colour: it is never taken out, but where
-# none is known nearby, as in the projector's shadow, what shows it is not the face's own.
-_INSIDE = 7
-_BESIDE = 25
-_FARTHER = 81
+"""Window whose deepest pixel of the face tells what lies behind it, pixels."""
+_INSIDE, _BESIDE, _DISTANT = 7, 25, 81
+"""Sides of the windows in which the face, the background and the distant background are averaged,
+pixels.
+
+Distant background may have another colour: it is never taken off, but where none is known nearby,
+as in the projector's shadow, what shows it is not the face's own.
+"""
 _MARGIN_PX = 16
-# What lies so far behind the face is background, not hair, neck or a hand.
+"""Pixels around the face in which background is looked for."""
 _BEHIND_MM = 25.0
-# Two colours nearer than this, of 255, are not told apart.
-_ALIKE = 10.0
-# With this share of the background, nothing of the face's own is left in a colour.
-_SHARE = 0.35
-# And with this share of a background that is known from farther aside alone.
-_MUCH = 0.5
-# A mixture lies on the way from the face's colour to the background's, within this share of it
-# and so many of 255: hair before a wall does not.
-_ASIDE = 0.5
-_ASIDE_LEAST = 10.0
-# Within the rim's inner border, a background less different (of 255) would not be noticed.
-_CONTRAST = 60.0
+"""What lies so far behind the face is background, not hair, neck or a hand."""
+_LIMITS = MixtureLimits(alike=10.0, part=0.35, distant_part=0.5, aside=0.5, aside_least=10.0,
+                        contrast=60.0)
+"""Hair before a wall is no mixture of the face's colour and the wall's."""
 
 
 def seed_colors(
@@ -45,15 +43,15 @@ def seed_colors(
 ) -> NDArray[np.uint8]:
     """Give the colour of each pixel of the face, (n, 3) uint8, RGB, in the order of its rows.
 
-    Where the colour camera does not see it, its neighbours' mean. Along the outline, what of the
-    colour behind is in it is taken out, and where that is much, the neighbours' mean again. Where
+    Where the colour camera does not see a pixel, its neighbours' mean. Along the outline the
+    background's part is taken off, and where that is large, the neighbours' mean again. Where
     nothing is measured behind and beside it, no outline is trusted.
 
     Parameters
     ----------
     registered : the depth tied to the colour image
     face : (H, W) bool
-    solid : (H, W) uint8, 0 or 1, the same with its holes filled: holes have no outline
+    solid : (H, W) uint8, 0 or 1, the same with its holes filled, which have no outline
     """
     if not face.any():
         return select_pixels(registered.colors, face)
@@ -70,11 +68,10 @@ def seed_colors(
     behind = _behind(registered, window, face, solid)
     own = inner.copy()
     edge = seen & ~deep
-    remove_background(colors, own, edge, box_sums(colors, deep, edge, _INSIDE // 2),
-             box_sums(colors, behind, edge, _BESIDE // 2),
-             box_sums(colors, behind, edge, _FARTHER // 2), _ALIKE, _SHARE, _ASIDE, _ASIDE_LEAST,
-             _CONTRAST, _MUCH)
-    # What is missing is found in the face alone.
+    sums = ColorSums(box_sums(colors, deep, edge, _INSIDE // 2),
+                     box_sums(colors, behind, edge, _BESIDE // 2),
+                     box_sums(colors, behind, edge, _DISTANT // 2))
+    remove_background(colors, own, edge, sums, _LIMITS)
     close = _window(face, 0)
     colors, own, face = colors[close].copy(), own[close].copy(), face[close].copy()
     inpaint_colors(colors, own, face & ~own)

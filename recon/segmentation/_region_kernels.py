@@ -1,47 +1,58 @@
-"""The loops over the depth image around a face, compiled."""
+"""The region of a face in the depth image: masks, its growth from a seed pixel, its limits.
+
+Everything here is compiled. z : (H, W) float32, mm, 0 where nothing was measured; pixels :
+(H, W, 2) float32, (u, v) of each depth pixel in the colour image.
+"""
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = [
-    "nearest_pixel",
-    "principal_axis",
-    "priority_flood",
-    "row_medians",
-    "square_mask",
-    "superellipse_mask",
-    "trim_below_drop",
-    "trim_beside_rise",
-    "trim_to_profile",
-]
+__all__ = ["FloodLimits", "nearest_pixel", "principal_axis", "priority_flood", "row_medians",
+           "square_mask", "superellipse_mask", "trim_below_drop", "trim_beside_rise",
+           "trim_to_profile"]
 
-_EMPTY, _HIDDEN, _WANTED, _FOUND, _BLOCKED = 0, 1, 2, 3, 4
+# States of a pixel; those below _CANDIDATE are stepped over, those above it end a step.
+_UNMEASURED, _OCCLUDED, _CANDIDATE, _VISITED, _BLOCKED = 0, 1, 2, 3, 4
+
+
+class FloodLimits(NamedTuple):
+    """How far a region grows from a pixel to its neighbour."""
+
+    step: float
+    """Largest difference of depth, mm."""
+    rise: float
+    """How much nearer the neighbour may be than the deepest pixel of the way to it, mm."""
+    gap: int
+    """Largest distance over unmeasured pixels, pixels."""
+    occluded_gap: int
+    """Largest distance over occluded pixels, pixels."""
 
 
 @compiled
 def superellipse_mask(
-    valid: NDArray[np.bool_], pixels: NDArray[np.float32], middle: tuple[float, float],
-    reach: NDArray[np.float32],
+    valid: NDArray[np.bool_], pixels: NDArray[np.float32], center: tuple[float, float],
+    semi_axes: NDArray[np.float32],
 ) -> NDArray[np.bool_]:
-    """Say which valid pixels are seen in a superellipse of power 2.5 about a place.
+    """Mark the valid pixels seen in a superellipse of power 2.5, (H, W).
 
-    That is between an ellipse (2) and the box itself: a head is round, and the corners of its box
-    hold shoulders.
+    That is between an ellipse (2) and a box: a head is round, and the corners of its box hold
+    shoulders.
 
-    pixels : (H, W, 2), where each is seen; middle : that place, (u, v)
-    reach : (3,), sideward, upward, downward, pixels
+    center : (u, v), pixels; semi_axes : (3,), sideward, upward, downward, pixels
     """
     rows, columns = valid.shape
-    u, v = np.float32(middle[0]), np.float32(middle[1])
+    u, v = np.float32(center[0]), np.float32(center[1])
     inside = np.zeros((rows, columns), np.bool_)
     for row in range(rows):
         for column in range(columns):
             if valid[row, column]:
-                a = abs(pixels[row, column, 0] - u) / reach[0]
+                a = abs(pixels[row, column, 0] - u) / semi_axes[0]
                 d = pixels[row, column, 1] - v
-                b = -d / reach[1] if d < 0 else d / reach[2]
+                b = -d / semi_axes[1] if d < 0 else d / semi_axes[2]
                 if a >= 1 or b >= 1:
                     continue
                 inside[row, column] = a * a * np.sqrt(a) + b * b * np.sqrt(b) < 1
@@ -50,16 +61,16 @@ def superellipse_mask(
 
 @compiled
 def square_mask(
-    among: NDArray[np.bool_], pixels: NDArray[np.float32], middle: tuple[float, float],
+    mask: NDArray[np.bool_], pixels: NDArray[np.float32], center: tuple[float, float],
     reach: float,
 ) -> NDArray[np.bool_]:
-    """Say which pixels of some are seen in a square about a place, to `reach` pixels each way."""
-    rows, columns = among.shape
-    u, v, most = np.float32(middle[0]), np.float32(middle[1]), np.float32(reach)
+    """Keep the pixels of a mask seen at most `reach` from (u, v), each way, (H, W)."""
+    rows, columns = mask.shape
+    u, v, most = np.float32(center[0]), np.float32(center[1]), np.float32(reach)
     inside = np.zeros((rows, columns), np.bool_)
     for row in range(rows):
         for column in range(columns):
-            if among[row, column]:
+            if mask[row, column]:
                 inside[row, column] = (abs(pixels[row, column, 0] - u) < most
                                        and abs(pixels[row, column, 1] - v) < most)
     return inside
@@ -67,35 +78,38 @@ def square_mask(
 
 @compiled
 def nearest_pixel(
-    among: NDArray[np.bool_], visible: NDArray[np.bool_], pixels: NDArray[np.float32],
-    middle: tuple[float, float],
+    mask: NDArray[np.bool_], visible: NDArray[np.bool_], pixels: NDArray[np.float32],
+    center: tuple[float, float],
 ) -> tuple[int, int]:
-    """Find the visible pixel of some that is seen nearest to a place; (-1, -1) where none is."""
-    u, v = np.float32(middle[0]), np.float32(middle[1])
+    """Find the visible pixel of a mask that is seen nearest to (u, v); (-1, -1) where none is."""
+    u, v = np.float32(center[0]), np.float32(center[1])
     least, found = np.float32(1e30), (-1, -1)
-    for row in range(among.shape[0]):
-        for column in range(among.shape[1]):
-            if among[row, column] and visible[row, column]:
+    for row in range(mask.shape[0]):
+        for column in range(mask.shape[1]):
+            if mask[row, column] and visible[row, column]:
                 a, b = pixels[row, column, 0] - u, pixels[row, column, 1] - v
-                away = a * a + b * b
-                if away < least:
-                    least, found = away, (row, column)
+                squared = a * a + b * b
+                if squared < least:
+                    least, found = squared, (row, column)
     return found
 
 
 @compiled
 def row_medians(
-    z: NDArray[np.float32], among: NDArray[np.bool_], every: int
+    z: NDArray[np.float32], mask: NDArray[np.bool_], every: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Give every so many of the rows that hold some, and the median of their z there."""
-    rows, columns = among.shape
+    """Take every k-th of the rows that the mask is not empty in.
+
+    Returns their indices, and the median of their masked z.
+    """
+    rows, columns = mask.shape
     at, medians = np.empty(rows, np.int64), np.empty(rows, np.float64)
     held = np.empty(columns, np.float32)
     seen = taken = 0
     for row in range(rows):
         count = 0
         for column in range(columns):
-            if among[row, column]:
+            if mask[row, column]:
                 held[count] = z[row, column]
                 count += 1
         if count:
@@ -108,104 +122,110 @@ def row_medians(
 
 @compiled
 def priority_flood(
-    z: NDArray[np.float32],
-    wanted: NDArray[np.bool_],
-    hidden: NDArray[np.bool_],
-    start_row: int,
-    start_column: int,
-    step: float,
-    rise: float,
-    reach: int,
-    hidden_reach: int,
+    z: NDArray[np.float32], candidates: NDArray[np.bool_], occluded: NDArray[np.bool_],
+    start: tuple[int, int], limits: FloodLimits,
 ) -> NDArray[np.bool_]:
-    """Follow a surface from one pixel to all that small steps connect with it.
+    """Grow a region from a pixel over a surface, across small gaps and behind occluders.
 
-    From each pixel it goes along the eight directions of the grid to the first that was measured
-    (z > 0) and is not `hidden`, over at most `reach` - 1 others, `hidden_reach` - 1 where all are
-    hidden: there, if it is wanted, if its depth differs by less than `step`, and if some way to it
-    never went deeper than it by `rise`. Ways are followed in the order of their deepest point
-    (priority flood, Barnes, Lehman, Mulla, 2014, doi:10.1016/j.cageo.2013.04.024).
+    Neighbours are the next measured, not occluded pixels in the eight directions. Those among
+    the candidates are taken in the order of the deepest pixel on the way to them, which makes
+    that way the shallowest there is (priority flood, Barnes, Lehman and Mulla, 2014,
+    doi:10.1016/j.cageo.2013.04.024).
+
+    candidates, occluded : (H, W); start : (row, column)
+
+    Returns the region, (H, W).
     """
+    wide = z.shape[1] + 2
+    step, rise, gap, occluded_gap = limits
+    state, depth, nearest, farthest = _flood_states(z, candidates, occluded, z[start])
+    # A bucket queue: one linked list of pixels for each millimetre of depth.
+    low = int(nearest)
+    heads = np.full(int(farthest) - low + 1, -1, np.int32)
+    following = np.full(len(state), -1, np.int32)
+    level = int(z[start]) - low
+    at = (start[0] + 1) * wide + start[1] + 1
+    state[at] = _VISITED
+    heads[level] = at
+    while level < len(heads):
+        at = heads[level]
+        if at < 0:
+            level += 1
+            continue
+        heads[level] = following[at]
+        here = depth[at]
+        for down in (-wide, 0, wide):
+            for way in range(down - 1, down + 2):
+                place = at + way
+                if state[place] >= _VISITED:
+                    continue
+                unmeasured, steps = 1, 1
+                while state[place] <= _OCCLUDED and steps < occluded_gap:
+                    if state[place] == _UNMEASURED:
+                        unmeasured += 1
+                        if unmeasured > gap:
+                            break
+                    place += way
+                    steps += 1
+                if state[place] != _CANDIDATE:
+                    continue
+                there = depth[place]
+                if abs(there - here) < step and there > level + low - rise:
+                    state[place] = _VISITED
+                    bucket = max(level, int(there) - low)
+                    following[place] = heads[bucket]
+                    heads[bucket] = place
+    region = np.empty(z.shape, np.bool_)
+    for row in range(z.shape[0]):
+        for column in range(z.shape[1]):
+            region[row, column] = state[(row + 1) * wide + column + 1] == _VISITED
+    return region
+
+
+@compiled
+def _flood_states(
+    z: NDArray[np.float32], candidates: NDArray[np.bool_], occluded: NDArray[np.bool_],
+    start_z: np.float32,
+) -> tuple[NDArray[np.uint8], NDArray[np.float32], np.float32, np.float32]:
+    """Give each pixel's state and candidate depth, flat with a blocked border, and their range."""
     rows, columns = z.shape
-    nearest = farthest = z[start_row, start_column]
-    # What a pixel is, with a border around, so that no step leaves the image.
     wide = columns + 2
-    kind = np.full((rows + 2) * wide, _BLOCKED, np.uint8)
+    nearest = farthest = start_z
+    state = np.full((rows + 2) * wide, _BLOCKED, np.uint8)
     depth = np.zeros((rows + 2) * wide, np.float32)
     for row in range(rows):
         for column in range(columns):
             here = z[row, column]
             at = (row + 1) * wide + column + 1
-            if hidden[row, column]:
-                kind[at] = _HIDDEN
+            if occluded[row, column]:
+                state[at] = _OCCLUDED
             elif here <= 0:
-                kind[at] = _EMPTY
-            elif wanted[row, column]:
-                kind[at] = _WANTED
+                state[at] = _UNMEASURED
+            elif candidates[row, column]:
+                state[at] = _CANDIDATE
                 depth[at] = here
                 nearest = min(nearest, here)
                 farthest = max(farthest, here)
-    # Pixels wait in lists, one for each millimetre of depth.
-    low = int(nearest)
-    size = int(farthest) - low + 1
-    first = np.full(size, -1, np.int32)
-    following = np.full(len(kind), -1, np.int32)
-    level = int(z[start_row, start_column]) - low
-    at = (start_row + 1) * wide + start_column + 1
-    kind[at] = _FOUND
-    first[level] = at
-    while level < size:
-        at = first[level]
-        if at < 0:
-            level += 1
-            continue
-        first[level] = following[at]
-        here = depth[at]
-        for down in (-wide, 0, wide):
-            for way in range(down - 1, down + 2):
-                place = at + way
-                if kind[place] >= _FOUND:
-                    continue
-                gap, steps = 1, 1
-                while kind[place] <= _HIDDEN and steps < hidden_reach:
-                    if kind[place] == _EMPTY:
-                        gap += 1
-                        if gap > reach:
-                            break
-                    place += way
-                    steps += 1
-                if kind[place] != _WANTED:
-                    continue
-                there = depth[place]
-                if abs(there - here) < step and there > level + low - rise:
-                    kind[place] = _FOUND
-                    bucket = max(level, int(there) - low)
-                    following[place] = first[bucket]
-                    first[bucket] = place
-    found = np.empty((rows, columns), np.bool_)
-    for row in range(rows):
-        for column in range(columns):
-            found[row, column] = kind[(row + 1) * wide + column + 1] == _FOUND
-    return found
+    return state, depth, nearest, farthest
 
 
 @compiled
-def principal_axis(among: NDArray[np.bool_]) -> tuple[float, float]:
-    """Give the direction, (down, right), in which some pixels reach farthest, by second moments.
+def principal_axis(mask: NDArray[np.bool_]) -> tuple[float, float]:
+    """Give the direction of a mask's largest second moment, (down, right).
 
-    A unit vector that never points up; straight down where they reach alike in all directions.
+    A unit vector that never points up; straight down where no direction is longer.
     """
     count = rows_sum = columns_sum = 0
-    for row in range(among.shape[0]):
-        for column in range(among.shape[1]):
-            if among[row, column]:
+    for row in range(mask.shape[0]):
+        for column in range(mask.shape[1]):
+            if mask[row, column]:
                 count += 1
                 rows_sum += row
                 columns_sum += column
     down = right = both = 0.0
-    for row in range(among.shape[0]):
-        for column in range(among.shape[1]):
-            if among[row, column]:
+    for row in range(mask.shape[0]):
+        for column in range(mask.shape[1]):
+            if mask[row, column]:
                 a, b = row - rows_sum / count, column - columns_sum / count
                 down += a * a
                 right += b * b
@@ -216,25 +236,22 @@ def principal_axis(among: NDArray[np.bool_]) -> tuple[float, float]:
 
 @compiled
 def trim_to_profile(
-    face: NDArray[np.bool_],
-    z: NDArray[np.float32],
-    pixels: NDArray[np.float32],
-    front: float,
-    middle: tuple[float, float],
-    axis: tuple[float, float],
-    below: NDArray[np.float64],
-    behind: NDArray[np.float64],
+    face: NDArray[np.bool_], z: NDArray[np.float32], pixels: NDArray[np.float32], front: float,
+    center: tuple[float, float], axis: tuple[float, float],
+    profile: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> None:
-    """Drop from `face` what lies deeper than front + a line through (below, behind).
+    """Drop from `face` what lies deeper than `front` by more than a profile allows.
 
-    below : how far from the middle, (u, v), downward or along the axis, (down, right), a unit
-        vector, whichever is more; pixels
+    center : (u, v), pixels; axis : (down, right), unit vector
+    profile : (n,) distances below the center, downward or along the axis, whichever is more,
+        pixels, rising; (n,) depths allowed there, mm; linear between, constant outside
     """
+    below, behind = profile
     for row in range(face.shape[0]):
         for column in range(face.shape[1]):
             if face[row, column]:
-                v = pixels[row, column, 1] - middle[1]
-                v = max(v, axis[0] * v + axis[1] * (pixels[row, column, 0] - middle[0]))
+                v = pixels[row, column, 1] - center[1]
+                v = max(v, axis[0] * v + axis[1] * (pixels[row, column, 0] - center[0]))
                 k = 0
                 while k < len(below) and v >= below[k]:
                     k += 1
@@ -243,64 +260,64 @@ def trim_to_profile(
                 elif k == len(below):
                     most = behind[-1]
                 else:
-                    share = (v - below[k - 1]) / (below[k] - below[k - 1])
-                    most = behind[k - 1] + share * (behind[k] - behind[k - 1])
+                    weight = (v - below[k - 1]) / (below[k] - below[k - 1])
+                    most = behind[k - 1] + weight * (behind[k] - behind[k - 1])
                 face[row, column] = z[row, column] < front + most
 
 
 @compiled
 def trim_below_drop(
-    face: NDArray[np.bool_], z: NDArray[np.float32], start_row: int, start_column: int,
-    beyond: int, drop: float, reach: int,
+    face: NDArray[np.bool_], z: NDArray[np.float32], start: tuple[int, int], least_rows: int,
+    drop: float, gap: int,
 ) -> None:
-    """Drop from `face` what lies behind a step down, on straight ways from a place.
+    """Drop from `face` what straight rays downward meet behind a step in depth: neck, chest.
 
-    Ways lead down, at most as far aside; a step counts more than `beyond` rows below the place,
-    where the depth grows by more than `drop` from one pixel of the face to the next on the way,
-    at most `reach` pixels farther.
+    Rays start at (row, column) and lead down, at most 45 degrees aside. A step is a growth of
+    depth by more than `drop`, mm, between pixels of the face on a ray at most `gap` rows apart; it
+    counts more than `least_rows` below the start.
     """
     rows, columns = face.shape
-    # Of the pixel before, on the way to each of a row: the last depth, how far back, and whether a
-    # step was passed.
-    last, gap = z[start_row].copy(), np.zeros(columns, np.int32)
+    # Of the ray through each pixel of the row before: its last depth, how many rows ago that was,
+    # and whether it has passed a step.
+    last, age = z[start[0]].copy(), np.zeros(columns, np.int32)
     passed = np.zeros(columns, np.bool_)
-    for row in range(start_row + 1, rows):
-        down = row - start_row
-        last_before, gap_before, passed_before = last.copy(), gap.copy(), passed.copy()
-        for column in range(max(start_column - down, 0), min(start_column + down + 1, columns)):
-            before = column - int(np.rint((column - start_column) / down))
+    for row in range(start[0] + 1, rows):
+        down = row - start[0]
+        last_before, age_before, passed_before = last.copy(), age.copy(), passed.copy()
+        for column in range(max(start[1] - down, 0), min(start[1] + down + 1, columns)):
+            before = column - int(np.rint((column - start[1]) / down))
             behind = passed_before[before]
-            depth, away = last_before[before], gap_before[before] + 1
+            depth, away = last_before[before], age_before[before] + 1
             if face[row, column]:
                 here = z[row, column]
-                if down > beyond and depth > 0 and away <= reach and here - depth > drop:
+                if down > least_rows and depth > 0 and away <= gap and here - depth > drop:
                     behind = True
                 if behind:
                     face[row, column] = False
                 depth, away = here, 0
-            last[column], gap[column], passed[column] = depth, away, behind
+            last[column], age[column], passed[column] = depth, away, behind
 
 
 @compiled
 def trim_beside_rise(
-    face: NDArray[np.bool_], z: NDArray[np.float32], start_row: int, start_column: int,
-    beyond: int, rise: float,
+    face: NDArray[np.bool_], z: NDArray[np.float32], start: tuple[int, int], least_columns: int,
+    rise: float,
 ) -> None:
-    """Drop from `face` what comes nearer again, on straight ways to the sides of a place.
+    """Drop from `face` what comes nearer again on straight rays sideways: another head.
 
-    Ways lead to the left and right, at most as far up or down; farther aside than `beyond` columns
-    a way ends where it has been deeper by more than `rise`.
+    Rays start at (row, column) and lead left and right, at most 45 degrees up or down. Farther
+    aside than `least_columns` a ray ends where it has been deeper by more than `rise`, mm.
     """
     rows, columns = face.shape
     for side in (-1, 1):
         deepest, passed = np.zeros(rows, np.float32), np.zeros(rows, np.bool_)
-        column, away = start_column + side, 1
+        column, away = start[1] + side, 1
         while 0 <= column < columns:
             deepest_before, passed_before = deepest.copy(), passed.copy()
-            for row in range(max(start_row - away, 0), min(start_row + away + 1, rows)):
-                before = row - int(np.rint((row - start_row) / away))
+            for row in range(max(start[0] - away, 0), min(start[0] + away + 1, rows)):
+                before = row - int(np.rint((row - start[0]) / away))
                 depth, behind = deepest_before[before], passed_before[before]
-                if face[row, column] and away > beyond:
+                if face[row, column] and away > least_columns:
                     behind = behind or z[row, column] < depth - rise
                     if behind:
                         face[row, column] = False

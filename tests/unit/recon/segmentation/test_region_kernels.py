@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from denseface.recon.segmentation._region_kernels import (
+    FloodLimits,
     nearest_pixel,
     principal_axis,
     priority_flood,
@@ -13,16 +14,15 @@ from denseface.recon.segmentation._region_kernels import (
     trim_to_profile,
 )
 
-STEP, RISE, GAP, COVERED = 12.0, 25.0, 5, 12
+LIMITS = FloodLimits(step=12.0, rise=25.0, gap=5, occluded_gap=12)
 
 
-def followed(z, hidden=(), wanted=None):
-    """A row of depths, followed from its first pixel; as a string of what is found."""
+def flooded(z, occluded=()):
+    """A row of depths, flooded from its first pixel: the region as a string."""
     z = np.array([z], np.float32)
-    cover = np.zeros(z.shape, bool)
-    cover[0, list(hidden)] = True
-    found = priority_flood(z, z > 0 if wanted is None else wanted, cover, 0, 0, STEP, RISE, GAP,
-                           COVERED)
+    mask = np.zeros(z.shape, bool)
+    mask[0, list(occluded)] = True
+    found = priority_flood(z, z > 0, mask, (0, 0), LIMITS)
     return "".join(".x"[int(one)] for one in found[0])
 
 
@@ -35,21 +35,21 @@ def followed(z, hidden=(), wanted=None):
     ([700, 0, 0, 0, 0, 0, 703], "x......"),
     ([700, 0, 0, 730, 0, 0, 700], "x......"),     # something measured is no gap
 ])
-def test_a_surface_is_followed_by_small_steps_outward(z, found):
-    assert followed(z) == found
+def test_a_region_grows_by_small_steps_outward(z, found):
+    assert flooded(z) == found
 
 
-def test_a_surface_goes_on_behind_what_covers_it():
+def test_a_region_goes_on_behind_what_occludes_it():
     row = [700, *[640] * 8, 705]
-    assert followed(row) == "x........."
-    assert followed(row, range(1, 9)) == "x........x"
-    assert followed([700, *[640] * 12, 705], range(1, 13)) == "x............."
+    assert flooded(row) == "x........."
+    assert flooded(row, range(1, 9)) == "x........x"
+    assert flooded([700, *[640] * 12, 705], range(1, 13)) == "x............."
 
 
-def test_what_is_not_wanted_is_not_followed():
+def test_what_is_no_candidate_is_not_of_the_region():
     z = np.full((1, 5), 700, np.float32)
-    wanted = np.array([[True, True, False, True, True]])
-    found = priority_flood(z, wanted, np.zeros(z.shape, bool), 0, 0, STEP, RISE, GAP, COVERED)
+    candidates = np.array([[True, True, False, True, True]])
+    found = priority_flood(z, candidates, np.zeros(z.shape, bool), (0, 0), LIMITS)
     assert found.tolist() == [[True, True, False, False, False]]
 
 
@@ -118,19 +118,19 @@ def test_depth_is_cut_downward_or_along_the_axis_whichever_is_farther():
     middle, axis = (80.0, 130.0), (np.cos(0.5), np.sin(0.5))
     face = np.ones(z.shape, bool)
     # 50 mm behind the front are allowed up to 10 below.
-    trim_to_profile(face, z, pixels, 700.0, middle, axis, np.array((0.0, 20.0)),
-                    np.array((100.0, 0.0)))
+    trim_to_profile(face, z, pixels, 700.0, middle, axis,
+                    (np.array((0.0, 20.0)), np.array((100.0, 0.0))))
     u, v = (pixels - middle).transpose(2, 0, 1)
     np.testing.assert_array_equal(face, np.maximum(v, axis[0] * v + axis[1] * u) < 10)
 
 
 def stepped(drop_mm, *, gap=0, at=12):
-    """A chin before a neck, as wide as the image; followed from row 2 on, in column 10."""
+    """A chin before a neck, as wide as the image, seen from row 2, column 10."""
     z = np.full((24, 21), 700, np.float32)
     z[at:] += drop_mm
     face = np.ones(z.shape, bool)
     face[at:at + gap] = False
-    trim_below_drop(face, z, 2, 10, 5, 30.0, 4)
+    trim_below_drop(face, z, (2, 10), 5, 30.0, 4)
     return face
 
 
@@ -151,7 +151,7 @@ def test_beyond_a_step_nothing_comes_back():
     z = np.full((24, 1), 700, np.float32)
     z[12:15] = 750
     face = np.ones(z.shape, bool)
-    trim_below_drop(face, z, 0, 0, 5, 30.0, 4)
+    trim_below_drop(face, z, (0, 0), 5, 30.0, 4)
     assert face[:12].all()
     assert not face[12:].any()
 
@@ -164,7 +164,7 @@ def test_what_comes_nearer_again_beside_a_face_is_cut_on_straight_ways_alone(mir
     face = np.ones(z.shape, bool)
     start = 40 - 10 if mirrored else 10
     z, face = (np.ascontiguousarray(one[:, ::-1]) if mirrored else one for one in (z, face))
-    trim_beside_rise(face, z, 10, start, 8, 12.0)
+    trim_beside_rise(face, z, (10, start), 8, 12.0)
     cut = ~(face[:, ::-1] if mirrored else face)
     np.testing.assert_array_equal(cut, (aside > 17) & (np.abs(row - 10) <= aside))
 
@@ -174,5 +174,5 @@ def test_nearer_than_that_a_face_may_rise_again_and_elsewhere_it_may_a_little():
     z[0, 3:6] = 740                                    # beside a nose
     z[0, 20:] = 690
     face = np.ones(z.shape, bool)
-    trim_beside_rise(face, z, 0, 0, 8, 12.0)
+    trim_beside_rise(face, z, (0, 0), 8, 12.0)
     assert face.all()

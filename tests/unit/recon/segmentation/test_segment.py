@@ -8,7 +8,7 @@ from denseface.recon.errors import FaceWithoutDepthError
 from denseface.recon.segmentation._segment import (
     cluster_depths,
     crop_to_box,
-    keep_face,
+    grow_face,
     segment_face,
 )
 from tests.unit.recon.shapes import FOCAL, NEAR, box, ellipsoid, grid, registration
@@ -91,7 +91,7 @@ def test_the_flood_stops_at_a_step(step_mm, crosses):
     registered, right = two_halves(step_mm)
     crop = crop_to_box(registered, BOX)
     assert cluster_depths(registered, crop, BOX)[:, right].any()
-    face = keep_face(registered, crop, BOX, FOCAL)
+    face = grow_face(registered, crop, BOX, FOCAL)
     assert face[:, ~right].any()
     assert face[:, right].any() == crosses
 
@@ -99,7 +99,7 @@ def test_the_flood_stops_at_a_step(step_mm, crosses):
 @pytest.mark.parametrize(("gap_px", "crosses"), [(1, True), (3, True), (4, True), (9, False)])
 def test_the_flood_bridges_narrow_gaps_only(gap_px, crosses):
     registered, right = two_halves(0, gap_px)
-    face = keep_face(registered, crop_to_box(registered, BOX), BOX, FOCAL)
+    face = grow_face(registered, crop_to_box(registered, BOX), BOX, FOCAL)
     assert face[:, ~right].any()
     assert face[:, right].any() == crosses
 
