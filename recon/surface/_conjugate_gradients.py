@@ -1,24 +1,49 @@
-"""The solution of the RBF fit, compiled.
+"""The linear system of the RBF fit, solved by preconditioned conjugate gradients, compiled.
 
-Grids are flat: row after row, each followed by `pad` unused places, so that a step to any
-neighbour within `pad` is one number, and one long loop serves the whole grid.
+Grids are flat: row after row, each followed by unused places, so that a step to any neighbour
+within reach is one number, and one long loop serves the whole grid.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["conjugate_gradients"]
+__all__ = ["NodeSystem", "conjugate_gradients"]
+
+Floats = NDArray[np.float32]
+
+
+class NodeSystem(NamedTuple):
+    """The matrix H + lambda I - G^T G over the nodes, with H[t, t'] = decay[t - t'] D((t + t')/2).
+
+    n counts the places of the padded grid.
+    """
+
+    density: Floats
+    """(2, 2, n), D on the half-step grid: [a, b] holds the points (2 row + a, 2 column + b)."""
+    decay: Floats
+    """(2 reach + 1, 2 reach + 1), by steps down and right."""
+    smoothing: float
+    """lambda."""
+    G: Floats
+    """(6, n)."""
+    used: Floats
+    """(n,), 1 on the grid, 0 on unused places."""
+    width: int
+    """Places from row to row."""
+    first: int
+    """Where the grid begins."""
+    size: int
+    """Its places, from the first to the last."""
 
 
 @compiled
-def _apply(
-    density: NDArray[np.float32], decay: NDArray[np.float32], smoothing: float,
-    G: NDArray[np.float32], used: NDArray[np.float32], width: int, first: int, size: int,
-    alpha: NDArray[np.float32], out: NDArray[np.float32],
-) -> None:
-    """Compute out = (H + lambda I - G^T G) alpha, with H[t, t'] = decay[t - t'] D((t + t')/2)."""
+def _apply(system: NodeSystem, alpha: Floats, out: Floats) -> None:
+    """Compute out = (H + lambda I - G^T G) alpha."""
+    density, decay, smoothing, G, used, width, first, size = system
     # Slices, since an index that might be negative keeps a loop from being vectorised.
     reach = (len(decay) - 1) // 2
     here, own = out[first:first + size], alpha[first:first + size]
@@ -52,7 +77,8 @@ def _apply(
 
 
 @compiled
-def _dot(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:
+def _dot(a: Floats, b: Floats) -> float:
+    """Sum in single precision over 64 products each, beyond that in double."""
     total = 0.0
     for start in range(0, len(a), 64):
         part = np.float32(0)
@@ -64,32 +90,26 @@ def _dot(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:
 
 @compiled
 def conjugate_gradients(
-    density: NDArray[np.float32], decay: NDArray[np.float32], smoothing: float,
-    G: NDArray[np.float32], used: NDArray[np.float32], width: int, first: int, size: int,
-    right: NDArray[np.float32], tolerance: float, most: int,
-) -> tuple[NDArray[np.float32], int]:
-    """Solve (H + lambda I - G^T G) alpha = right, preconditioned by the diagonal.
+    system: NodeSystem, right: Floats, tolerance: float, max_iterations: int
+) -> tuple[Floats, int]:
+    """Solve a system for its right side, preconditioned by the diagonal.
 
-    density : (2, 2, n), D on the half-step grid: plane [a, b] holds, flat, the points
-        (2 row + a, 2 column + b)
-    decay : (2 reach + 1, 2 reach + 1)
-    G : (p, n); used : (n,), 1 on the grid, 0 on unused places; right : (n,), 0 on unused places
-    width : places from row to row; first, size : where the grid begins, and its places
+    right : (n,), 0 on unused places; tolerance : of the preconditioned residual's norm, relative
 
-    Gives alpha, (n,), and the number of iterations.
+    Returns alpha, (n,), and the number of iterations.
     """
-    middle = decay[(len(decay) - 1) // 2, (len(decay) - 1) // 2]
-    inverse = used.copy()
+    middle = system.decay[(len(system.decay) - 1) // 2, (len(system.decay) - 1) // 2]
+    inverse = system.used.copy()
     for i in range(len(inverse)):
-        inverse[i] /= middle * density[0, 0, i] + np.float32(smoothing)
+        inverse[i] /= middle * system.density[0, 0, i] + np.float32(system.smoothing)
     alpha, product = np.zeros_like(right), np.zeros_like(right)
     r = right.copy()
     d = r * inverse
     start = before = _dot(r, d)
     taken = 0
-    while taken < most and before > tolerance * tolerance * start:
+    while taken < max_iterations and before > tolerance * tolerance * start:
         taken += 1
-        _apply(density, decay, smoothing, G, used, width, first, size, d, product)
+        _apply(system, d, product)
         step = np.float32(before / _dot(d, product))
         now = 0.0
         for i in range(len(d)):

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from denseface.recon.errors import TooLittleDepthError
 from denseface.recon.intermediate import SurfaceGrid
 from denseface.recon.support import Support
-from denseface.recon.surface._conjugate_gradients import conjugate_gradients
+from denseface.recon.surface._conjugate_gradients import NodeSystem, conjugate_gradients
 from denseface.recon.surface._fast_gauss import FastGaussTransform
 from denseface.recon.surface._trend import Trend, polynomial
 
@@ -37,19 +37,19 @@ __all__ = ["MIN_SEEDS", "Surface", "fit_surface"]
 MIN_SEEDS = 50
 """Fewer seeds than this are no face, and leave the polynomial without support."""
 
-# The sharpness, over R0^2, of a node's Gaussian and of its square, which the matrix is made of.
 _NODE = 2.0
+"""Sharpness of g, a node's Gaussian, in units of 1 / R0^2."""
 _DENSITY = 4.0
-# Distance of the nodes, in R0: the less smoothing there is for the largest weight, the closer they
-# are; (smoothing over weight from which on, step).
+"""Sharpness of its square, of which the matrix is made."""
 _NODE_STEPS = ((8.0, 0.50), (0.3, 0.45), (0.0, 0.40))
+"""(smoothing over the largest weight, from which on; q): the less smoothing, the closer nodes."""
 _NEGLIGIBLE = 3e-5
-# Of the preconditioned residual.
+"""Gaussians below this are left out."""
 _TOLERANCE = 3e-5
-_MOST_ITERATIONS = 1000
-# Below this ratio of the principal extents, the seeds lie on a line.
+"""Relative norm of the preconditioned residual at which the iteration ends."""
+_MAX_ITERATIONS = 1000
 _COLLINEAR = 1e-3
-
+"""Least ratio of the principal extents of seeds that do not lie on a line."""
 
 _Float = TypeVar("_Float", np.float32, np.float64)
 
@@ -89,15 +89,15 @@ class Surface:
         -------
         (m, k) float64, mm
         """
-        across, down = self._factors(xs, 0, np.float64), self._factors(ys, 1, np.float64)
-        heights: NDArray[np.float64] = (down @ self._weights()) @ across.T
+        factors_x, factors_y = self._factors(xs, 0, np.float64), self._factors(ys, 1, np.float64)
+        heights: NDArray[np.float64] = (factors_y @ self._weights()) @ factors_x.T
         return heights
 
     def heights(self, xs: NDArray[np.float64], ys: NDArray[np.float64]) -> NDArray[np.float32]:
         """Evaluate as `on_grid` does, in single precision: (k,), (m,) mm -> (m, k) mm."""
-        across, down = (self._factors(values, axis, np.float32)
-                        for axis, values in enumerate((xs, ys)))
-        heights: NDArray[np.float32] = (down @ self._weights().astype(np.float32)) @ across.T
+        factors_x, factors_y = self._factors(xs, 0, np.float32), self._factors(ys, 1, np.float32)
+        heights: NDArray[np.float32] = (
+            factors_y @ self._weights().astype(np.float32)) @ factors_x.T
         return heights
 
     def sampled(
@@ -111,17 +111,16 @@ class Surface:
 
         Returns
         -------
-        heights, slopes_x, slopes_y : (m, k) float32, mm and unitless
+        heights, dz_dx, dz_dy : (m, k) float32, mm and unitless
         """
-        across, down = self._factors(xs, 0, np.float32), self._factors(ys, 1, np.float32)
-        slope_x, slope_y = self._slopes(xs, 0, across), self._slopes(ys, 1, down)
+        factors_x, factors_y = self._factors(xs, 0, np.float32), self._factors(ys, 1, np.float32)
         weights: NDArray[np.float32] = self._weights().astype(np.float32)
-        lines: NDArray[np.float32] = down @ weights
-        heights: NDArray[np.float32] = lines @ across.T
-        slopes_x: NDArray[np.float32] = lines @ slope_x.T
-        lines = slope_y @ weights
-        slopes_y: NDArray[np.float32] = lines @ across.T
-        return heights, slopes_x, slopes_y
+        lines: NDArray[np.float32] = factors_y @ weights
+        heights: NDArray[np.float32] = lines @ factors_x.T
+        dz_dx: NDArray[np.float32] = lines @ self._derivatives(xs, 0, factors_x).T
+        lines = self._derivatives(ys, 1, factors_y) @ weights
+        dz_dy: NDArray[np.float32] = lines @ factors_x.T
+        return heights, dz_dx, dz_dy
 
     def on_support(self, support: Support) -> SurfaceGrid:
         """Sample on the grid of a support."""
@@ -140,18 +139,18 @@ class Surface:
         factors[:, count], factors[:, count + 1], factors[:, count + 2] = 1, t, t * t
         return factors
 
-    def _slopes(
+    def _derivatives(
         self, values: NDArray[np.float64], axis: int, factors: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """The slopes of the factors."""
+        """The derivatives of the factors."""
         gap = self._gaps(values, axis, np.float32)
         count = gap.shape[1]
-        slopes = np.empty_like(factors)
+        derivatives = np.empty_like(factors)
         np.multiply(np.float32(-2 * _NODE / self.r0) * gap, factors[:, :count],
-                    out=slopes[:, :count])
-        slopes[:, count], slopes[:, count + 1] = 0, 1 / self.scale
-        slopes[:, count + 2] = 2 / self.scale * factors[:, count + 1]
-        return slopes
+                    out=derivatives[:, :count])
+        derivatives[:, count], derivatives[:, count + 1] = 0, 1 / self.scale
+        derivatives[:, count + 2] = 2 / self.scale * factors[:, count + 1]
+        return derivatives
 
     def _gaps(
         self, values: NDArray[np.float64], axis: int, kind: type[_Float]
@@ -199,89 +198,74 @@ def fit_surface(
         Where an argument is out of its range, or a coordinate is not finite.
     """
     x, y, z, W = _checked(points, r0, smoothing, weights)
-    # The polynomial is eliminated: what it explains by itself is taken off first, and the node
-    # weights are sought beside it. In single precision, which the small rest allows.
+    # The polynomial is eliminated: its own fit is taken off, and the node weights are sought in
+    # what it does not explain. In single precision, which the small residuals allow.
     trend = Trend.of(x, y, z, W)
-    charges = FastGaussTransform.of(x, y, (W, trend.rest), _DENSITY / r0**2)
-    extent = (float(x.min()), float(x.max())), (float(y.min()), float(y.max()))
-    return _fit(trend, charges, extent, float(W.sum()), r0, smoothing,
-                relative=smoothing / float(W.max()))
-
-
-def _fit(
-    trend: Trend, charges: FastGaussTransform,
-    extent: tuple[tuple[float, float], tuple[float, float]],
-    total: float, r0: float, smoothing: float, *, relative: float,
-) -> Surface:
-    """Fit what the trend leaves of the seeds.
-
-    charges : two kinds, W_i and W_i rest_i
-    extent : the least and the largest x, and y, mm
-    total : the sum of W_i
-    relative : smoothing over the largest W_i
-    """
+    transform = FastGaussTransform.of(x, y, (W, trend.residuals), _DENSITY / r0**2)
+    relative = smoothing / float(W.max())
     q = next(step for least, step in _NODE_STEPS if relative >= least)
     # How many steps exp(-4 q^2 r^2), of two seeds' Gaussians at a node, and its fourth root are not
     # negligible; nodes begin half a step farther.
-    near, far = (int(np.ceil(np.sqrt(-np.log(_NEGLIGIBLE) / k) / q - begin))
-                 for k, begin in ((4, 0.5), (1, 0)))
-    nodes_x, nodes_y = (_nodes(low, high, q * r0, near) for low, high in extent)
+    margin, reach = (int(np.ceil(np.sqrt(-np.log(_NEGLIGIBLE) / k) / q - begin))
+                     for k, begin in ((4, 0.5), (1, 0)))
+    nodes_x, nodes_y = (_nodes(float(values.min()), float(values.max()), q * r0, margin)
+                        for values in (x, y))
     root = float(2 * q / np.sqrt(np.pi))  # sqrt(c0)
-    sums, right = _node_sums(trend, charges, nodes_x, nodes_y, r0)
+    sums, right = _node_sums(trend, transform, nodes_x, nodes_y, r0)
     sums *= np.float32(root)
     right *= np.float32(root)
-    flat = _Flat(len(nodes_y), len(nodes_x), far)
     terms = sums.reshape(6, -1).astype(np.float64)
     G = (np.linalg.inv(np.linalg.cholesky(trend.normal)) @ terms).reshape(sums.shape)
-    alpha, _ = conjugate_gradients(
-        _density(charges, nodes_x, nodes_y, flat, r0), _decay(q, far), smoothing, flat.pad(G),
-        flat.pad(np.ones((1, *right.shape)))[0], flat.width, flat.first, flat.size,
-        flat.pad(right[None])[0], _TOLERANCE, _MOST_ITERATIONS)
-    found = flat.unpad(alpha)
-    beta = trend.beta - np.linalg.solve(trend.normal, terms @ found.ravel())
+    grid = _PaddedGrid(len(nodes_y), len(nodes_x), reach)
+    system = NodeSystem(
+        _density(transform, nodes_x, nodes_y, grid, r0), _decay(q, reach), smoothing, grid.pad(G),
+        grid.pad(np.ones((1, *right.shape)))[0], grid.width, grid.first, grid.size)
+    flat, _ = conjugate_gradients(system, grid.pad(right[None])[0], _TOLERANCE, _MAX_ITERATIONS)
+    alpha = grid.unpad(flat)
+    beta = trend.beta - np.linalg.solve(trend.normal, terms @ alpha.ravel())
 
     # At the solution the squared residuals follow from the sums at hand.
-    squares = trend.squares - (found * right).sum() - smoothing * (found * found).sum()
-    return Surface(nodes_x, nodes_y, root * found, beta, trend.center, trend.scale, r0,
-                   noise=float(np.sqrt(max(squares, 0.0) / total)))
+    squares = trend.squares - (alpha * right).sum() - smoothing * (alpha * alpha).sum()
+    return Surface(nodes_x, nodes_y, root * alpha, beta, trend.center, trend.scale, r0,
+                   noise=float(np.sqrt(max(squares, 0.0) / float(W.sum()))))
 
 
 def _node_sums(
-    trend: Trend, charges: FastGaussTransform, nodes_x: NDArray[np.float64],
+    trend: Trend, transform: FastGaussTransform, nodes_x: NDArray[np.float64],
     nodes_y: NDArray[np.float64], r0: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Sum g(x_i - t) W_i times each term of the polynomial, (6, rows, columns), and W_i rest_i."""
-    across, down = (
-        charges.moments(places, nodes, _NODE / r0**2, center, trend.scale)
-        for places, nodes, center in ((charges.x, nodes_x, trend.center[0]),
-                                      (charges.y, nodes_y, trend.center[1])))
-    by_v = down @ charges.kind(0)
-    terms = [by_v[j] @ across[i].T for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))]
-    return np.stack(terms), (down[0] @ charges.kind(1)) @ across[0].T
+    """Sum g(x_i - t) W_i times each polynomial term, (6, rows, columns), and W_i residual_i."""
+    factors_x, factors_y = (
+        transform.moment_factors(points, nodes, _NODE / r0**2, center, trend.scale)
+        for points, nodes, center in ((transform.x, nodes_x, trend.center[0]),
+                                      (transform.y, nodes_y, trend.center[1])))
+    by_v = factors_y @ transform.weights(0)
+    terms = [by_v[j] @ factors_x[i].T for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))]
+    return np.stack(terms), (factors_y[0] @ transform.weights(1)) @ factors_x[0].T
 
 
 def _density(
-    charges: FastGaussTransform, nodes_x: NDArray[np.float64], nodes_y: NDArray[np.float64],
-    flat: "_Flat", r0: float,
+    transform: FastGaussTransform, nodes_x: NDArray[np.float64], nodes_y: NDArray[np.float64],
+    grid: "_PaddedGrid", r0: float,
 ) -> NDArray[np.float32]:
     """Sum W_i exp(-4 |x_i - s|^2 / R0^2) for s on a grid of half steps.
 
     As four planes of every second point, (2, 2, rows width).
     """
     half_x, half_y = (
-        nodes[0] + (nodes[1] - nodes[0]) * (np.arange(2 * n) / 2 - flat.reach)
-        for nodes, n in ((nodes_x, flat.width), (nodes_y, flat.rows)))
-    down, across = (charges.factor(places, at, _DENSITY / r0**2)
-                    for places, at in ((charges.y, half_y), (charges.x, half_x)))
-    lines: NDArray[np.float32] = down @ charges.kind(0)
-    halves: NDArray[np.float32] = lines @ across.T
-    planes = halves.reshape(flat.rows, 2, flat.width, 2).transpose(1, 3, 0, 2)
+        nodes[0] + (nodes[1] - nodes[0]) * (np.arange(2 * n) / 2 - grid.reach)
+        for nodes, n in ((nodes_x, grid.width), (nodes_y, grid.rows)))
+    factors_y = transform.factors(transform.y, half_y, _DENSITY / r0**2)
+    factors_x = transform.factors(transform.x, half_x, _DENSITY / r0**2)
+    lines: NDArray[np.float32] = factors_y @ transform.weights(0)
+    halves: NDArray[np.float32] = lines @ factors_x.T
+    planes = halves.reshape(grid.rows, 2, grid.width, 2).transpose(1, 3, 0, 2)
     return np.ascontiguousarray(planes).reshape(2, 2, -1)
 
 
 @dataclass(frozen=True)
-class _Flat:
-    """The kernels' flat layout of a (height, breadth) grid: unused places all around it."""
+class _PaddedGrid:
+    """The kernels' flat layout of a (height, breadth) grid: `reach` unused places around it."""
 
     height: int
     breadth: int

@@ -13,11 +13,12 @@ __all__ = ["exact_spacing", "lattice_spacing", "mean_spacing", "randomized_neigh
 
 _FLANN_INDEX_KDTREE = 1
 _TREES = 4
-# 8 checks overestimate the spacing by up to a tenth, 32 are right.
 _CHECKS = 32
+"""Leaves visited for each query: 8 overestimate the spacing by up to a tenth, 32 are right."""
 _NOWHERE = np.float32(1e9)
-# Square millimetres: no two seeds are as far apart, and each is farther from nowhere.
+"""x and y of a pixel without a seed, mm."""
 _FAR = np.float32(1e12)
+"""mm^2: any two seeds are nearer to each other, and farther from `_NOWHERE`."""
 
 
 def mean_spacing(
@@ -97,13 +98,13 @@ def lattice_spacing(points: NDArray[np.float32], pixels: NDArray[np.int32]) -> f
 def _nearest_around(
     points: NDArray[np.float32], pixels: NDArray[np.int32]
 ) -> tuple[float, int]:
-    """Sum the distances of the seeds to the nearest among the 24 pixels around; of how many."""
+    """Sum the seeds' distances to the nearest among the 24 pixels around, and count them."""
     top, left = pixels[0]
     bottom, right = top, left
     for i in range(len(pixels)):
         top, bottom = min(top, pixels[i, 0]), max(bottom, pixels[i, 0])
         left, right = min(left, pixels[i, 1]), max(right, pixels[i, 1])
-    # Where there is no seed, the plane is far away; so it is on two pixels all around.
+    # Two pixels without a seed all around, so that no step leaves the image.
     rows, columns = bottom - top + 5, right - left + 5
     x, y = np.full((rows, columns), _NOWHERE), np.full((rows, columns), _NOWHERE)
     for i in range(len(pixels)):
@@ -112,8 +113,8 @@ def _nearest_around(
     nearest = np.full((rows, columns), _FAR)
     for row in range(2, rows - 2):
         for down in range(3):
-            for across in range(-2 if down else 1, 3):
-                here, there = slice(2, columns - 2), slice(2 + across, columns - 2 + across)
+            for shift in range(-2 if down else 1, 3):
+                here, there = slice(2, columns - 2), slice(2 + shift, columns - 2 + shift)
                 x1, x2 = x[row, here], x[row + down, there]
                 y1, y2 = y[row, here], y[row + down, there]
                 least, other = nearest[row, here], nearest[row + down, there]

@@ -1,4 +1,4 @@
-"""The quadratic polynomial beside the Gaussians: its least-squares fit, and what it leaves."""
+"""The quadratic polynomial beside the Gaussians: its least-squares fit, and the residuals."""
 
 from dataclasses import dataclass
 
@@ -9,10 +9,10 @@ from denseface.recon.numerics.jit import compiled
 
 __all__ = ["Trend", "polynomial"]
 
-# Powers of u and v in each term: 1, u, v, u^2, uv, v^2.
 _POWERS = np.array([[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]])
-# And in the product of any two.
-_SUMS = _POWERS[:, None] + _POWERS
+"""Powers of u and v in each term: 1, u, v, u^2, uv, v^2."""
+_PRODUCT_POWERS = _POWERS[:, None] + _POWERS
+"""Powers of u and v in the product of any two terms, (6, 6, 2)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,15 +25,15 @@ class Trend:
     scale : mm
     normal : (6, 6) float64, the matrix of the normal equations, P^T W P
     beta : (6,) float64, mm, before 1, u, v, u^2, uv, v^2
-    rest : (n,) float32, W_i times what is left of z_i, mm
-    squares : the sum of W_i times the square of what is left
+    residuals : (n,) float32, W_i times the residual of z_i, mm
+    squares : the sum of W_i times the squared residuals, mm^2
     """
 
     center: tuple[float, float]
     scale: float
     normal: NDArray[np.float64]
     beta: NDArray[np.float64]
-    rest: NDArray[np.float32]
+    residuals: NDArray[np.float32]
     squares: float
 
     @classmethod
@@ -45,10 +45,10 @@ class Trend:
         cx, cy = float(x.mean()), float(y.mean())
         scale = float(max(x.max() - cx, cx - x.min(), y.max() - cy, cy - y.min()))
         sums, right = _sums(x, y, z, weights, cx, cy, 1 / scale)
-        normal = sums[_SUMS[..., 0], _SUMS[..., 1]]
+        normal = sums[_PRODUCT_POWERS[..., 0], _PRODUCT_POWERS[..., 1]]
         beta: NDArray[np.float64] = np.linalg.solve(normal, right)
-        rest, squares = _rest(x, y, z, weights, cx, cy, 1 / scale, beta)
-        return cls((cx, cy), scale, normal, beta, rest, squares)
+        residuals, squares = _residuals(x, y, z, weights, cx, cy, 1 / scale, beta)
+        return cls((cx, cy), scale, normal, beta, residuals, squares)
 
 
 def polynomial(
@@ -64,9 +64,9 @@ def _sums(
     x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64],
     weights: NDArray[np.float64], cx: float, cy: float, per_scale: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sum W u^i v^j, (5, 5), zero where i + j > 4, and W z times each term, (6,)."""
+    """Sum W u^i v^j, (5, 5), 0 where i + j > 4, and W z times each term, (6,)."""
     sums, right = np.zeros((5, 5)), np.zeros(6)
-    # One loop for each power of u: more sums at once than the processor has places for are slower.
+    # One loop for each power of u: more sums at once than the processor has registers are slower.
     for i in range(5):
         s0 = s1 = s2 = s3 = s4 = z0 = z1 = z2 = 0.0
         for k in range(len(x)):
@@ -101,18 +101,18 @@ def _sums(
 
 
 @compiled
-def _rest(
+def _residuals(
     x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64],
     weights: NDArray[np.float64], cx: float, cy: float, per_scale: float,
     beta: NDArray[np.float64],
 ) -> tuple[NDArray[np.float32], float]:
-    """Give W times what the polynomial leaves of z, and the sum of W times its square."""
+    """Give W times the residuals of z, and the sum of W times their squares."""
     b0, b1, b2, b3, b4, b5 = beta[0], beta[1], beta[2], beta[3], beta[4], beta[5]
-    rest = np.empty(len(x), np.float32)
+    residuals = np.empty(len(x), np.float32)
     squares = 0.0
     for k in range(len(x)):
         u, v = (x[k] - cx) * per_scale, (y[k] - cy) * per_scale
         left = z[k] - (b0 + u * (b1 + b3 * u + b4 * v) + v * (b2 + b5 * v))
-        rest[k] = weights[k] * left
+        residuals[k] = weights[k] * left
         squares += weights[k] * left * left
-    return rest, squares
+    return residuals, squares

@@ -20,26 +20,28 @@ def test_equals_the_sum_over_all_points(n, seed, width, height, sharpest, part, 
     rng = np.random.default_rng(seed)
     x, y = low + width * rng.random(n), height * rng.random(n)
     weights = rng.normal(size=(2, n))
-    charges = FastGaussTransform.of(x, y, (weights[0], weights[1]), sharpest)
+    transform = FastGaussTransform.of(x, y, (weights[0], weights[1]), sharpest)
     columns, rows = low + np.linspace(-3, width + 3, 17), np.linspace(-3, height + 3, 13)
     b = part * sharpest
-    down, across = charges.factor(charges.y, rows, b), charges.factor(charges.x, columns, b)
+    factors_y = transform.factors(transform.y, rows, b)
+    factors_x = transform.factors(transform.x, columns, b)
     for kind in range(2):
         np.testing.assert_allclose(
-            down @ charges.kind(kind) @ across.T, direct(rows, columns, x, y, weights[kind], b),
+            factors_y @ transform.weights(kind) @ factors_x.T,
+            direct(rows, columns, x, y, weights[kind], b),
             atol=5e-6 * np.abs(weights[kind]).sum())
 
 
-def test_moments_weigh_by_powers_of_the_place():
+def test_moments_weigh_by_powers_of_the_coordinate():
     rng = np.random.default_rng(0)
     x, y = rng.uniform(20, 60, 500), rng.uniform(-30, 30, 500)
     u, v = (x - 40) / 30, (y - 2) / 30
-    charges = FastGaussTransform.of(x, y, (np.ones(500), u), 0.2)
+    transform = FastGaussTransform.of(x, y, (np.ones(500), u), 0.2)
     columns, rows, b = np.linspace(15, 65, 11), np.linspace(-35, 35, 12), 0.07
-    across = charges.moments(charges.x, columns, b, 40, 30)
-    down = charges.moments(charges.y, rows, b, 2, 30)
+    factors_x = transform.moment_factors(transform.x, columns, b, 40, 30)
+    factors_y = transform.moment_factors(transform.y, rows, b, 2, 30)
     for i in range(3):
         for j in range(3):
             np.testing.assert_allclose(
-                down[j] @ charges.kind(0) @ across[i].T,
+                factors_y[j] @ transform.weights(0) @ factors_x[i].T,
                 direct(rows, columns, x, y, u**i * v**j, b), atol=1e-4)
