@@ -13,8 +13,7 @@ from denseface.recon.numerics.malloc import keep_freed_memory
 from denseface.recon.settings import Settings
 from denseface.service.errors import LocalProtocolError, RemoteProtocolError
 from denseface.service.hub import PREVIEW_PERIOD_S, Hub
-from denseface.service.monitoring.observer import Observer
-from denseface.service.monitoring.rejections import Rejections
+from denseface.service.monitoring import Observer, Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, Publish, send, steps
 from denseface.service.protocol.topics import Topic
@@ -75,11 +74,11 @@ def _metrics_server(
         return nullcontext()
     from prometheus_client import make_wsgi_app
 
-    from denseface.service.monitoring.health import Health, unwritable
+    from denseface.service.monitoring.health import Health, write_error
     from denseface.service.monitoring.http_server import MetricsServer
     from denseface.service.monitoring.prometheus import Metrics
 
-    health = Health(observer.latest, settings, lambda: unwritable(settings.data))
+    health = Health(observer.latest, settings, lambda: write_error(settings.data))
     server = MetricsServer(settings.metrics, make_wsgi_app(Metrics(observer.latest).registry),
                            health.report)
     structlog.get_logger("hub").info("metrics", url=f"{server.url}/metrics")

@@ -27,8 +27,7 @@ from denseface.service.hub.outcomes import Outcomes
 from denseface.service.hub.peers import MAX_PEERS, Peers
 from denseface.service.hub.presses import Presses
 from denseface.service.hub.previews import Previews
-from denseface.service.monitoring.figures import Figures
-from denseface.service.monitoring.rejections import Rejections
+from denseface.service.monitoring import Figures, Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, Publish, send
 from denseface.service.protocol.states import CaptureState
@@ -281,7 +280,7 @@ class Hub:
             done=counts.get(CaptureState.DONE, 0), failed=counts.get(CaptureState.FAILED, 0),
             dead=counts.get(CaptureState.DEAD, 0),
             refused=self._rejections.counts(),
-            presses_refused=counters.labels("press_refused"),
+            presses_refused=counters.by_label("press_refused"),
             since_start={name: count for name, label, count in counters.items() if not label},
             latencies={stage: messages.Latency(
                 count=one.count, median_s=one.quantile_s(0.5), p99_s=one.quantile_s(0.99))

@@ -12,7 +12,7 @@ from denseface.service.errors import CorruptFileError, ProtocolError, ServiceErr
 from denseface.service.hub._common import Common
 from denseface.service.hub.peers import WorkerPeer
 from denseface.service.hub.unsaved_faces import UnsavedFaces
-from denseface.service.monitoring.rejections import Rejections
+from denseface.service.monitoring import Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState

@@ -9,7 +9,7 @@ from denseface.service.hub._common import Common
 from denseface.service.hub.jobs import Jobs
 from denseface.service.hub.outcomes import Outcomes
 from denseface.service.hub.presses import Presses
-from denseface.service.monitoring.figures import Counters
+from denseface.service.monitoring import Counters
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState

@@ -1,4 +1,4 @@
-"""Whether the service would make a face of a press now."""
+"""Whether a press now would become a face."""
 
 import os
 import tempfile
@@ -11,9 +11,10 @@ from denseface.service.errors import reason_of
 from denseface.service.monitoring.observer import Snapshot
 from denseface.service.settings import ServiceSettings
 
-__all__ = ["Health", "unwritable"]
+__all__ = ["Health", "write_error"]
 
 _STALL_S = 5.0
+"""Age of a snapshot beyond which the hub is not healthy, seconds; or its time-out for peers."""
 _MIB = 2**20
 
 
@@ -23,22 +24,22 @@ class Health:
     Parameters
     ----------
     latest : gives the last snapshot, None before there is one
-    unwritable : says why nothing can be written, None where it can
+    write_error : says why nothing can be written, None where it can
     clock : seconds, the snapshots'
     """
 
     def __init__(
         self, latest: Callable[[], Snapshot | None], settings: ServiceSettings,
-        unwritable: Callable[[], str | None], clock: Callable[[], float] = time.monotonic,
+        write_error: Callable[[], str | None], clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._latest = latest
         self._settings = settings
-        self._unwritable = unwritable
+        self._write_error = write_error
         self._clock = clock
         self._stall_s = max(_STALL_S, settings.silence_s)
 
     def report(self) -> tuple[bool, dict[str, Any]]:
-        """Say whether all is well, and what is missing."""
+        """Say whether all is well, with what `/healthz` shows as JSON."""
         snapshot = self._latest()
         status = snapshot.status if snapshot else None
         missing = self._missing(snapshot)
@@ -54,7 +55,7 @@ class Health:
             found.append("hub: has not said how it is yet")
         elif (silence := self._clock() - snapshot.taken) > self._stall_s:
             found.append(f"hub: has not said how it is for {silence:.0f} s")
-        if why := self._unwritable():
+        if why := self._write_error():
             found.append(f"store: {why}")
         if snapshot is None:
             return found
@@ -71,10 +72,10 @@ class Health:
         return found
 
 
-def unwritable(folder: Path) -> str | None:
-    """Write a little into a folder, without leaving a file; say why where that fails."""
+def write_error(folder: Path) -> str | None:
+    """Try to write into a folder, leaving no file; give what the system says where that fails."""
     try:
-        # It has no name where the file system knows O_TMPFILE, and loses it at once elsewhere.
+        # Without a name where the file system knows O_TMPFILE; elsewhere it is unlinked at once.
         with tempfile.TemporaryFile(dir=folder) as file:
             file.write(bytes(4096))
             file.flush()

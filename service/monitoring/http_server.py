@@ -28,13 +28,13 @@ _POLL_S = 0.1
 
 
 class MetricsServer(ThreadingMixIn, WSGIServer):
-    """Answers until closed; whoever is slow or talks nonsense is cut off, and nobody waits for it.
+    """Answers until its `with` block ends; slow clients are cut off, and nobody waits for them.
 
     Parameters
     ----------
     address : host and port; port 0 is any free one
     metrics : answers `/metrics`
-    health : says whether all is well, and what there is to say
+    health : says whether all is well, and what `/healthz` shows as JSON
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""Looks on at what goes into the hub and comes out, counts it and takes the times.
+"""Counts and times what goes into the hub and comes out of it.
 
-The hub's state machine knows nothing of it: every stage of a capture shows in its messages.
+The hub's state machine does not know: every stage of a capture shows in its messages.
 """
 
 from collections.abc import Sequence
@@ -14,37 +14,34 @@ from denseface.service.runtime.bounded_dict import BoundedDict
 
 __all__ = ["MessageWatch"]
 
-_MOST = 10_000
-"""Captures whose times are followed; beyond it the oldest is let go of."""
+_MAX_CAPTURES = 10_000
+"""Captures, and refused presses, that are remembered; beyond it the oldest is forgotten."""
 
 
 @dataclass
 class _Times:
+    """When a capture reached a stage, seconds of the hub's clock."""
+
     pressed: float | None = None
     accepted: float | None = None
     dispatched: float | None = None
 
 
 class MessageWatch:
-    """Counts what `service.monitoring.prometheus` has names for.
+    """Counts what `service.monitoring.prometheus` names.
 
-    Times are those of the hub's clock, after it has done what a message asked for.
+    Times are those of the hub's clock after it has handled a message.
     """
 
     def __init__(self, figures: Figures) -> None:
         self._counters = figures.counters
         self._latencies = figures.latencies
-        self._captures: BoundedDict[str, _Times] = BoundedDict(_MOST)
-        self._refused: BoundedDict[tuple[bytes, str, int], None] = BoundedDict(_MOST)
-        """Presses that were told so: a repeat is told again."""
+        self._captures: BoundedDict[str, _Times] = BoundedDict(_MAX_CAPTURES)
+        self._refused: BoundedDict[tuple[bytes, str, int], None] = BoundedDict(_MAX_CAPTURES)
+        """Peer, capture and request of presses that were refused: a repeat is refused again."""
 
     def record(self, now: float, packet: Packet | None, outputs: Sequence[Output]) -> None:
-        """Take note of a message and of all that it brought about; of no message at a tick.
-
-        Parameters
-        ----------
-        now : seconds, after the fact
-        """
+        """Record a message, None for a tick, and the outputs that it caused; `now` in seconds."""
         if packet and isinstance(packet.message, messages.Result | messages.JobFailed):
             self._ended(now, packet.message.capture_id)
         refused: dict[str, messages.PressRefused] = {}
@@ -54,10 +51,10 @@ class MessageWatch:
                 case messages.Take(capture_id=capture_id):
                     self._follow(capture_id).pressed = now
                 case messages.PressRefused(capture_id=capture_id) if isinstance(output, Send):
-                    told = output.peer, capture_id, message.request
-                    if told not in self._refused:
+                    press = output.peer, capture_id, message.request
+                    if press not in self._refused:
                         refused[capture_id] = message
-                        self._remember(told)
+                        self._refused[press] = None
                 case messages.FrameAccepted(capture_id=capture_id):
                     self._accepted(now, capture_id)
                 case messages.Job(capture_id=capture_id, attempt=attempt):
@@ -69,12 +66,9 @@ class MessageWatch:
                         self._counters.add("fetched")
                 case messages.Preview():
                     self._counters.add("previews")
-        for one in refused.values():  # once, however many pressed
+        for one in refused.values():  # one for each capture, however many pressed
             self._captures.pop(one.capture_id, None)
             self._counters.add("press_refused", one.reason)
-
-    def _remember(self, told: tuple[bytes, str, int]) -> None:
-        self._refused[told] = None
 
     def _follow(self, capture_id: str) -> _Times:
         times = self._captures.pop(capture_id, None) or _Times()

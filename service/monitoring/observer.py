@@ -1,4 +1,4 @@
-"""All that the hub's process measures of itself, and how it shows it."""
+"""What the hub's process measures of itself, and the snapshots that other threads read."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ _MEASURE_S = 60.0
 
 @dataclass(frozen=True)
 class Snapshot:
-    """The hub at one moment, its last heartbeat; nothing in it changes any more."""
+    """The hub at its last heartbeat; immutable."""
 
     taken: float
     """Seconds of `time.monotonic`."""
@@ -36,7 +36,7 @@ class Snapshot:
 
 
 class Observer(Closing):
-    """Is told by the hub's loop what happens, and shows it to other threads as a snapshot.
+    """Records what the hub's loop tells it, and gives other threads snapshots.
 
     Parameters
     ----------
@@ -60,13 +60,13 @@ class Observer(Closing):
         return self._snapshot
 
     def record(self, now: float, packet: Packet | None, outputs: Sequence[Output]) -> None:
-        """Take note of what a message, or a tick where there is none, brought about."""
+        """Record a message, None for a tick, and the outputs that it caused; `now` in seconds."""
         self._watch.record(now, packet, outputs)
 
     def record_tick(
         self, now: float, outputs: Sequence[Output], subscriptions: Mapping[str, int]
     ) -> None:
-        """Take a snapshot at each status that a tick gave out."""
+        """Take a snapshot at each status that a tick publishes."""
         self._measure_folder(now)
         for output in outputs:
             message = output.packet.message
@@ -88,7 +88,7 @@ class Observer(Closing):
 
 
 def folder_bytes(folder: Path) -> int:
-    """Give the size of all files under a folder; one that goes away meanwhile has none."""
+    """Give the size of all files under a folder, bytes; one that is removed meanwhile has none."""
     total = 0
     with os.scandir(folder) as entries:
         for entry in entries:

@@ -28,16 +28,16 @@ COUNTERS: dict[str, tuple[str, str | None, str]] = {
     "refused": ("refused", "reason", "Connections and messages refused."),
     "drops": ("publication_drops", "topic",
               "Publications at which a subscriber's queue was found full."),
-    "fetched": ("fetched", None, "Outcomes that subscribers asked for instead of hearing them."),
+    "fetched": ("fetched", None, "Outcomes that subscribers requested."),
     "previews": ("previews", None, "Previews published."),
 }
-"""Name in `Counters` -> name of the metric, its label, what it says."""
+"""Name in `Counters` -> name of the metric, its label, its help text."""
 
 _PREFIX = "denseface_"
 
 
 class Metrics(Collector):
-    """Renders the hub's last snapshot; for any thread.
+    """Shows the hub's last snapshot; for any thread.
 
     Parameters
     ----------
@@ -73,25 +73,25 @@ def _counters(snapshot: Snapshot) -> Iterator[Metric]:
 
 def _gauges(snapshot: Snapshot) -> Iterator[Metric]:
     status = snapshot.status
-    yield _family("in_flight", "Captures without an outcome.", "state", {
+    yield _gauge_family("in_flight", "Captures without an outcome.", "state", {
         "pressed": status.pressed, "queued": status.queued, "working": status.working})
-    yield _family("kept_captures", "Captures kept in the data folder.", "state", {
+    yield _gauge_family("kept_captures", "Captures kept in the data folder.", "state", {
         "done": status.done, "failed": status.failed, "dead": status.dead})
-    yield _family("subscriptions", "Subscriptions.", "topic", snapshot.subscriptions)
-    yield _one("sensors", "Sensors alive.", len(status.sensors))
-    yield _one("workers", "Workers alive.", len(status.workers))
+    yield _gauge_family("subscriptions", "Subscriptions.", "topic", snapshot.subscriptions)
+    yield _gauge("sensors", "Sensors alive.", len(status.sensors))
+    yield _gauge("workers", "Workers alive.", len(status.workers))
     if status.free_bytes is not None:
-        yield _one("disk_free_bytes", "Room left on the data folder's disk.", status.free_bytes)
+        yield _gauge("disk_free_bytes", "Room left on the data folder's disk.", status.free_bytes)
     if status.kept_bytes is not None:
-        yield _one("kept_bytes", "Size of the files kept.", status.kept_bytes)
-    yield _family("build", "Always 1.", "version", {status.hub_version: 1})
+        yield _gauge("kept_bytes", "Size of the files kept.", status.kept_bytes)
+    yield _gauge_family("build", "Always 1.", "version", {status.hub_version: 1})
 
 
-def _one(name: str, text: str, value: int) -> Metric:
+def _gauge(name: str, text: str, value: int) -> Metric:
     return GaugeMetricFamily(_PREFIX + name, text, value=value)
 
 
-def _family(name: str, text: str, label: str, values: dict[str, int]) -> Metric:
+def _gauge_family(name: str, text: str, label: str, values: dict[str, int]) -> Metric:
     family = GaugeMetricFamily(_PREFIX + name, text, labels=[label])
     for one, value in values.items():
         family.add_metric([one], value)

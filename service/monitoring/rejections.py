@@ -18,6 +18,8 @@ _PER_S = 0.2
 
 @dataclass
 class _TokenBucket:
+    """Limits the log lines of one reason."""
+
     lines: float = _BURST
     since: float = 0.0
     suppressed: int = 0
@@ -36,10 +38,10 @@ class Rejections:
 
     def counts(self) -> dict[str, int]:
         """Give the number of rejections by reason."""
-        return self._counters.labels("refused")
+        return self._counters.by_label("refused")
 
     def note(self, reason: str, **who: object) -> None:
-        """Count a refusal and, if there were not too many, log it.
+        """Count a rejection and log it, unless its reason has logged too much.
 
         Parameters
         ----------

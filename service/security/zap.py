@@ -9,7 +9,7 @@ from collections.abc import Callable
 import zmq
 import zmq.utils.z85
 
-from denseface.service.monitoring.rejections import Rejections
+from denseface.service.monitoring import Rejections
 from denseface.service.security.allow_list import AllowedKey, AllowList
 
 __all__ = ["MESSAGES_DOMAIN", "PUBLICATIONS_DOMAIN", "Authenticator"]

@@ -4,7 +4,7 @@ import pytest
 
 from denseface.recon.settings import Settings
 from denseface.service.hub import Hub
-from denseface.service.monitoring.figures import Figures
+from denseface.service.monitoring import Figures
 from denseface.service.monitoring.message_watch import MessageWatch
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import send, steps

@@ -5,7 +5,7 @@ from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
 from denseface.service.monitoring.figures import Latencies
-from denseface.service.monitoring.health import Health, unwritable
+from denseface.service.monitoring.health import Health, write_error
 from denseface.service.monitoring.observer import Snapshot
 from denseface.service.monitoring.prometheus import COUNTERS, Metrics
 from denseface.service.protocol.messages import Status
@@ -100,6 +100,6 @@ def test_a_hub_that_is_silent_a_store_and_everything(snapshot):
 
 
 def test_the_probe_of_the_store_leaves_nothing_and_says_what_is_wrong(tmp_path):
-    assert unwritable(tmp_path) is None
+    assert write_error(tmp_path) is None
     assert list(tmp_path.iterdir()) == []
-    assert unwritable(tmp_path / "missing") == f"{tmp_path / 'missing'}: No such file or directory"
+    assert write_error(tmp_path / "missing") == f"{tmp_path / 'missing'}: No such file or directory"

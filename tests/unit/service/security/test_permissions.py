@@ -5,8 +5,7 @@ from typing import get_args
 import pytest
 
 from denseface.recon.settings import Settings
-from denseface.service.monitoring.figures import Counters
-from denseface.service.monitoring.rejections import Rejections
+from denseface.service.monitoring import Counters, Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.payload import FrameHeader
 from denseface.service.protocol.topics import Topic
@@ -97,4 +96,4 @@ def test_refusals_are_all_counted_and_not_all_logged(capsys):
     logged = [line for line in capsys.readouterr().out.splitlines() if "refused" in line]
     assert len(logged) == 7
     assert "suppressed=995" in logged[-1]
-    assert counters.labels("refused") == {"malformed": 1, "role": 1001}
+    assert counters.by_label("refused") == {"malformed": 1, "role": 1001}

@@ -7,8 +7,7 @@ import pytest
 import zmq
 
 from denseface.service.errors import AddressError, KeyFileError
-from denseface.service.monitoring.figures import Counters
-from denseface.service.monitoring.rejections import Rejections
+from denseface.service.monitoring import Counters, Rejections
 from denseface.service.runtime.limits import MemoryWatch
 from denseface.service.security.allow_list import Role, allow, revoke
 from denseface.service.security.keys import KeyPair, new_pair, read_public
