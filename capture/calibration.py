@@ -17,7 +17,7 @@ from denseface.capture.errors import CalibrationError
 __all__ = ["MAX_SIDE", "Calibration", "CameraModel", "DepthToColor"]
 
 MAX_SIDE = 16384
-"""Pixels: no image may be wider or higher."""
+"""Pixels: the widest and the highest image."""
 
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -25,9 +25,13 @@ _Side = Annotated[int, Field(gt=0, le=MAX_SIDE)]
 _Row = tuple[_Finite, _Finite, _Finite]
 
 _UNDISTORT_ITERATIONS = 20
+"""Newton steps, at most."""
 _UNDISTORT_TOLERANCE = 1e-12
+"""Residual, at z = 1, at which they end."""
 _INVERTIBLE_PX = 1e-6
+"""Pixels: a distortion is refused where undoing it is off by more."""
 _ROTATION_TOLERANCE = 1e-4
+"""Largest entry of R R^T - I."""
 
 
 class _Model(BaseModel):
@@ -99,7 +103,7 @@ class CameraModel(_Model):
         return _rays(self)
 
     def scaled(self, factor: float) -> Self:
-        """Give the same camera at another resolution (pixel centres at whole numbers)."""
+        """Give the same camera at another resolution."""
         return self.model_copy(update={
             "width": round(self.width * factor), "height": round(self.height * factor),
             "fx": self.fx * factor, "fy": self.fy * factor,
@@ -149,7 +153,7 @@ class CameraModel(_Model):
         return self
 
 
-@lru_cache(maxsize=32)  # each frame says anew of which cameras it is
+@lru_cache(maxsize=32)  # every frame that is read brings equal cameras
 def _folds(camera: CameraModel) -> bool:
     u, v = np.meshgrid(np.linspace(0, camera.width - 1, 9), np.linspace(0, camera.height - 1, 9))
     pixels = np.stack([u, v], axis=-1)

@@ -12,8 +12,7 @@ import zlib
 from collections.abc import Iterator
 from math import prod
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Any, NamedTuple, Self
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from numpy.lib import format as npy
@@ -23,13 +22,18 @@ from denseface.capture._calibration_choice import ChosenCalibration
 from denseface.capture.calibration import MAX_SIDE, Calibration
 from denseface.capture.errors import CaptureError, FrameError, UnreadableSourceError
 from denseface.capture.frame import RgbdFrame
+from denseface.capture.source import Source
 
 __all__ = ["NpzSource", "load_frame", "save_frame"]
 
 _MAX_BYTES = 256 * 2**20
-_MAX_TEXT = 1 << 20
-_MAX_HEADER = 4096
+"""Bytes of an array of numbers."""
+_MAX_TEXT_BYTES = 1 << 20
+"""Bytes of the calibration, 4 a character."""
+_MAX_HEADER_BYTES = 4096
+"""Bytes of an array's header."""
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+"""Reader of an array's header by its version."""
 
 
 class _Kind(NamedTuple):
@@ -49,10 +53,10 @@ _KEYS = {
 }
 
 
-class NpzSource:
+class NpzSource(Source):
     """The one frame of a `.npz` file as a source."""
 
-    frame_count: int | None = 1
+    frame_count = 1
 
     def __init__(self, path: Path, chosen: ChosenCalibration | None = None) -> None:
         self.uri = str(path)
@@ -60,17 +64,6 @@ class NpzSource:
 
     def __iter__(self) -> Iterator[RgbdFrame]:
         yield self._frame
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Nothing is held open."""
@@ -118,9 +111,9 @@ def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> Rgb
 
 
 def save_frame(path: str | Path, frame: RgbdFrame) -> None:
-    """Write a frame file: aside, then renamed, so that no half of one is ever seen."""
+    """Write a frame file: under a temporary name, then renamed, so that it is always whole."""
     path = Path(path)
-    handle, aside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
     try:
         with os.fdopen(handle, "wb") as file:
             np.savez_compressed(
@@ -132,10 +125,10 @@ def save_frame(path: str | Path, frame: RgbdFrame) -> None:
             )
             file.flush()
             os.fsync(file.fileno())
-        Path(aside).chmod(0o644)
-        Path(aside).replace(path)
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
     except BaseException:
-        Path(aside).unlink(missing_ok=True)
+        Path(temporary).unlink(missing_ok=True)
         raise
 
 
@@ -170,24 +163,24 @@ def _read_arrays(
 def _read_array(name: str, file: IO[bytes], kind: _Kind) -> NDArray[Any]:
     try:
         version = npy.read_magic(file)
-        shape, fortran, dtype = _HEADERS[version](file, max_header_size=_MAX_HEADER)
+        shape, fortran, dtype = _HEADERS[version](file, max_header_size=_MAX_HEADER_BYTES)
     except OSError:
         raise
-    except Exception as error:  # the text is read as Python is: nobody lists what that can raise
+    except Exception as error:  # the header is parsed as Python, which may raise anything
         raise UnreadableSourceError(f"{name}: not a NumPy array") from error
     expected = f"expected {kind.dtype} {kind.shape}"
     found = f"found {dtype} {shape}"
     right_dtype = dtype.kind == "U" if kind.dtype == "str" else dtype == np.dtype(kind.dtype)
     if dtype.hasobject or not right_dtype or len(shape) != kind.ndim:
         raise FrameError(f"{name}: {expected}, {found}")
-    limit = _MAX_TEXT if kind.dtype == "str" else _MAX_BYTES
+    limit = _MAX_TEXT_BYTES if kind.dtype == "str" else _MAX_BYTES
     size = prod(shape) * dtype.itemsize
     if (not all(0 < side <= MAX_SIDE for side in shape) or size > limit
             or (kind.ndim == 3 and shape[2] != 3)):
         raise FrameError(f"{name}: {expected} with sides of 1 to {MAX_SIDE} and at most "
                          f"{limit} bytes, {found}")
     data = file.read(size)
-    # One byte more than announced is asked for: it reaches the archive's checksum.
+    # Reading past the announced size makes `zipfile` check the member's CRC.
     if len(data) != size or file.read(1):
         raise UnreadableSourceError(f"{name}: {found} needs {size} bytes, the file holds "
                                     f"{'fewer' if len(data) < size else 'more'}")

@@ -15,10 +15,11 @@ HALF_FRAME_US = 17_000
 """Half a frame period at 30 frames a second, microseconds, rounded up."""
 
 _CAPACITY = 4
+"""Items of a stream that wait for a partner, at most."""
 
-D = TypeVar("D")
-C = TypeVar("C")
-T = TypeVar("T")
+D = TypeVar("D")  # depth
+C = TypeVar("C")  # colour
+T = TypeVar("T")  # either
 _Queue = deque[tuple[int, T]]
 
 

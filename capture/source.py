@@ -10,20 +10,29 @@ URI                what it opens
 ================== ===============================================================================
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self, runtime_checkable
+from typing import Any, Protocol, Self, runtime_checkable
 
-from denseface.capture._calibration_choice import choose_calibration
+from denseface.capture._calibration_choice import ChosenCalibration, choose_calibration
 from denseface.capture.calibration import Calibration
 from denseface.capture.errors import UnreadableSourceError
 from denseface.capture.frame import RgbdFrame
 
 __all__ = ["Source", "open_source"]
 
-_LIVE = "openni2:"
-_ACCEPTED = "accepted: NAME.npz, NAME.oni, openni2: or openni2:URI"
+_SOURCES = {
+    ".npz": "npz:NpzSource",
+    ".oni": "openni2:RecordingSource",
+    "openni2:": "openni2:LiveSource",
+}
+"""A file's ending or a sensor's scheme, and which class of which module of `capture` opens it.
+
+The class is imported when first needed, and called with the file's path (of a sensor: with what
+follows the scheme, or None) and the chosen calibration or None.
+"""
 
 
 @runtime_checkable
@@ -34,27 +43,26 @@ class Source(Protocol):
     step gives the newest pair.
     """
 
-    @property
-    def uri(self) -> str:
-        """What was opened."""
-
-    @property
-    def frame_count(self) -> int | None:
-        """How many frames one pass gives at most; None for a live sensor."""
+    uri: str
+    """What was opened."""
+    frame_count: int | None
+    """How many frames one pass gives at most; None for a live sensor."""
 
     def __iter__(self) -> Iterator[RgbdFrame]: ...
 
-    def __enter__(self) -> Self: ...
+    def close(self) -> None:
+        """Release the sensor or file; harmless when repeated."""
+
+    def __enter__(self) -> Self:
+        return self
 
     def __exit__(
         self,
         kind: type[BaseException] | None,
         error: BaseException | None,
         traceback: TracebackType | None,
-    ) -> None: ...
-
-    def close(self) -> None:
-        """Let go of the sensor or file; harmless when repeated."""
+    ) -> None:
+        self.close()
 
 
 def open_source(
@@ -81,21 +89,28 @@ def open_source(
         The OpenNI2 library, the device or one of its streams is missing.
     """
     text = str(uri)
-    if text.lower().startswith(_LIVE):
-        from denseface.capture.openni2 import LiveSource
-
-        return LiveSource(text[len(_LIVE):] or None, choose_calibration(None, calibration))
+    for scheme in filter(lambda kind: kind.endswith(":"), _SOURCES):
+        if text.lower().startswith(scheme):
+            address = text[len(scheme):] or None
+            return _opener(scheme)(address, choose_calibration(None, calibration))
     path = Path(text)
-    kind = path.suffix.lower()
-    if kind not in (".npz", ".oni"):
-        raise UnreadableSourceError(f"{text}: not a known kind of source; {_ACCEPTED}")
+    ending = path.suffix.lower()
+    if ending not in _SOURCES:
+        raise UnreadableSourceError(f"{text}: not a known kind of source; {_accepted()}")
     if not path.is_file():
         found = "is a folder, not a file" if path.is_dir() else "no such file"
         raise UnreadableSourceError(f"{text}: {found}")
-    if kind == ".npz":
-        from denseface.capture.npz import NpzSource
+    return _opener(ending)(path, choose_calibration(path, calibration))
 
-        return NpzSource(path, choose_calibration(path, calibration))
-    from denseface.capture.openni2 import RecordingSource
 
-    return RecordingSource(path, choose_calibration(path, calibration))
+def _opener(kind: str) -> Callable[[Any, ChosenCalibration | None], Source]:
+    module, name = _SOURCES[kind].split(":")
+    opener: Callable[[Any, ChosenCalibration | None], Source] = getattr(
+        import_module(f"denseface.capture.{module}"), name)
+    return opener
+
+
+def _accepted() -> str:
+    forms = [form for kind in _SOURCES
+             for form in ((f"NAME{kind}",) if kind.startswith(".") else (kind, f"{kind}URI"))]
+    return f"accepted: {', '.join(forms[:-1])} or {forms[-1]}"

@@ -1,15 +1,14 @@
 """Recordings and live sensors through OpenNI2.
 
-The library's traps and what is done about them:
+How the library's faults are avoided:
 
-- frames are copied at once (`_openni2_streams`), since the next read reuses their memory;
-- nothing is read that was not announced, so nothing can block for ever; nothing is sought;
-- a file is checked before the library sees it (`_oni_file`), and given an ASCII name
-  (`_openni2_path`): others crash it;
-- what a recording holds mirrored is turned back, as switching it off works on live sensors alone;
-- depth and colour are paired by their stamps (`sync`);
-- the library is loaded once and quietly (`_openni2_library`), streams rest before they are
-  destroyed (`_openni2_recording`).
+- frames are copied at once (`_streams`): the next read reuses their memory;
+- a frame is read only after it was announced, so that no read blocks for ever; nothing is sought;
+- a file is checked first (`_oni_file`) and opened by an ASCII name (`_path`): others crash it;
+- mirrored recordings are turned back: mirroring can be switched off on live sensors only;
+- depth and colour are paired by their stamps (`capture.pairing`);
+- the library is loaded once, without its log (`_library`), and streams rest before they are
+  destroyed (`_recording`).
 """
 
 from denseface.capture.openni2._live import LiveSource

@@ -1,23 +1,23 @@
-"""What recordings and live sensors have in common: a device, its streams, a calibration, pairs."""
+"""What recordings and live sensors share: a device, its streams, a calibration, pairs."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from denseface.capture._calibration_choice import ChosenCalibration
 from denseface.capture.errors import FrameError, SensorError
 from denseface.capture.frame import RgbdFrame
-from denseface.capture.openni2._calibration import calibration_of
+from denseface.capture.openni2._calibration import derive_calibration
 from denseface.capture.openni2._library import close_at_exit, close_handle
 from denseface.capture.openni2._streams import COLOR, DEPTH, Image, Streams
 from denseface.capture.pairing import Pair, Pairer
+from denseface.capture.source import Source
 
 __all__ = ["OpenNI2Source"]
 
 
-class OpenNI2Source(ABC):
+class OpenNI2Source(Source):
     """An open device that gives frames."""
 
     frame_count: int | None = None
@@ -32,17 +32,6 @@ class OpenNI2Source(ABC):
         self.pairer: Pairer[Any, Any] = Pairer()
         self._chosen = chosen
         self._registered = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def __del__(self) -> None:
         self.close()
@@ -70,9 +59,9 @@ class OpenNI2Source(ABC):
         try:
             streams = self._streams = Streams(openni2, device, self._name, live=self._live)
             if self._chosen is None:
-                calibration, said = calibration_of(
+                calibration, derivation = derive_calibration(
                     streams.properties, streams.size(DEPTH), streams.size(COLOR))
-                self._chosen = ChosenCalibration(calibration, f"{self._origin}: {said}")
+                self._chosen = ChosenCalibration(calibration, f"{self._origin}: {derivation}")
         except BaseException:
             self.close()
             raise

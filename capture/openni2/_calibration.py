@@ -1,7 +1,7 @@
-"""What a PrimeSense sensor knows of its own geometry, as a `Calibration`.
+"""A `Calibration` from what a PrimeSense sensor says of its own geometry.
 
-Focal length of the depth camera = ZPD / ZPPS (zero plane distance by zero plane pixel size) in
-pixels of 1280 columns; the colour camera stands DCRCDIS beside it.
+The depth camera's focal length is ZPD / ZPPS (zero plane distance by zero plane pixel size) in
+pixels of an image of 1280 columns; the colour camera is DCRCDIS beside it.
 """
 
 import math
@@ -10,15 +10,18 @@ from typing import TypeGuard
 
 from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
 
-__all__ = ["SensorProperties", "calibration_of"]
+__all__ = ["SensorProperties", "derive_calibration"]
 
-_REFERENCE_COLUMNS = 1280
-_KINECT_FOCAL = 575.8
-_XTION_FOCAL = 570.3
-_COLOR_FOCAL = 525.0
+_ZPPS_COLUMNS = 1280
+"""Columns of the image whose pixels ZPPS is given in."""
+_KINECT_FOCAL, _XTION_FOCAL, _COLOR_FOCAL = 575.8, 570.3, 525.0
+"""Default focal lengths: depth cameras of a Kinect v1 and an Xtion, any colour camera; pixels of
+an image of `_FOCAL_COLUMNS`."""
 _FOCAL_COLUMNS = 640
 _BASELINE_CM = 2.3
+"""Default DCRCDIS."""
 _PRIMESENSE_VENDOR = 0x1D27
+"""USB vendor of the Xtion."""
 
 
 @dataclass(frozen=True)
@@ -35,14 +38,14 @@ class SensorProperties:
     usb_vendor: int = 0
 
 
-def calibration_of(
+def derive_calibration(
     properties: SensorProperties, depth_size: tuple[int, int], color_size: tuple[int, int]
 ) -> tuple[Calibration, str]:
     """Turn a sensor's properties into a calibration.
 
-    Principal points lie in the middle and the cameras look the same way. Seen from the sensor,
-    the projector and the colour camera stand to the right of the depth camera, so a point's x is
-    *smaller* for the colour camera: the translation is minus DCRCDIS.
+    Principal points are at the images' centres and the cameras' axes are parallel. The colour
+    camera is to the right of the depth camera, seen from the sensor, so a point's x is *smaller*
+    in its frame: the translation is minus DCRCDIS.
 
     Parameters
     ----------
@@ -50,30 +53,31 @@ def calibration_of(
 
     Returns
     -------
-    the calibration, and in words where it comes from
+    the calibration, and in words what it was derived from
     """
-    said = []
+    derivation = []
     p = properties
     width = depth_size[0]
     if _positive(p.zpd_mm) and _positive(p.zpps_mm):
-        depth_focal = p.zpd_mm / p.zpps_mm * width / _REFERENCE_COLUMNS
-        said += [f"ZPD {p.zpd_mm}", f"ZPPS {p.zpps_mm:.6g}"]
+        depth_focal = p.zpd_mm / p.zpps_mm * width / _ZPPS_COLUMNS
+        derivation += [f"ZPD {p.zpd_mm}", f"ZPPS {p.zpps_mm:.6g}"]
     elif _is_angle(p.depth_fov):
         depth_focal = width / 2 / math.tan(p.depth_fov / 2)
-        said.append(f"depth field of view {math.degrees(p.depth_fov):.1f} deg")
+        derivation.append(f"depth field of view {math.degrees(p.depth_fov):.1f} deg")
     else:
-        xtion = p.usb_vendor == _PRIMESENSE_VENDOR
-        depth_focal = (_XTION_FOCAL if xtion else _KINECT_FOCAL) * width / _FOCAL_COLUMNS
-        said.append(f"default depth f {depth_focal:.1f} ({'Xtion' if xtion else 'Kinect v1'})")
+        sensor, focal = (("Xtion", _XTION_FOCAL) if p.usb_vendor == _PRIMESENSE_VENDOR
+                         else ("Kinect v1", _KINECT_FOCAL))
+        depth_focal = focal * width / _FOCAL_COLUMNS
+        derivation.append(f"default depth f {depth_focal:.1f} ({sensor})")
     baseline_cm = _BASELINE_CM
     if _positive(p.dcrcdis_cm):
         baseline_cm = p.dcrcdis_cm
-        said.append(f"DCRCDIS {baseline_cm:.6g}")
+        derivation.append(f"DCRCDIS {baseline_cm:.6g}")
     else:
-        said.append(f"default DCRCDIS {baseline_cm}")
+        derivation.append(f"default DCRCDIS {baseline_cm}")
     if _is_angle(p.color_fov):
         color_focal = color_size[0] / 2 / math.tan(p.color_fov / 2)
-        said.append(f"color field of view {math.degrees(p.color_fov):.1f} deg")
+        derivation.append(f"color field of view {math.degrees(p.color_fov):.1f} deg")
     else:
         color_focal = _COLOR_FOCAL * color_size[0] / _FOCAL_COLUMNS
     calibration = Calibration(
@@ -81,7 +85,7 @@ def calibration_of(
         color=_centred(color_size, color_focal),
         depth_to_color=DepthToColor(translation_mm=(-10 * baseline_cm, 0, 0)),
     )
-    return calibration, ", ".join(said)
+    return calibration, ", ".join(derivation)
 
 
 def _centred(size: tuple[int, int], focal: float) -> CameraModel:

@@ -10,17 +10,20 @@ from weakref import WeakSet
 
 from denseface.capture.errors import SensorError
 
-__all__ = ["close_at_exit", "close_handle", "find_library", "gone_devices", "load",
-           "open_sources", "reason"]
+__all__ = ["close_at_exit", "close_handle", "error_text", "find_library", "load", "lost_devices",
+           "open_sources"]
 
 _NAME = "libOpenNI2.so"
+"""File name of the library."""
 _VARIABLES = ("OPENNI2_REDIST64", "OPENNI2_REDIST")
+"""Environment variables that name its folder."""
 _ERRORS_ONLY = 3
+"""OpenNI2's log severity."""
 
 _lock = threading.Lock()
-_loaded_in: int | None = None
-_watch: Any = None
-_open: WeakSet[Any] = WeakSet()
+_loaded_pid: int | None = None
+_listener: Any = None
+_sources: WeakSet[Any] = WeakSet()
 
 
 def find_library() -> Path:
@@ -55,50 +58,50 @@ def find_library() -> Path:
 def load() -> Any:
     """Give the `primesense.openni2` module, initialised.
 
-    It is never unloaded before the process ends: a second initialisation crashes.
+    It stays loaded until the process ends: a second initialisation crashes.
 
     Raises
     ------
     SensorError
         The library is missing or refuses, or the process was forked after it was loaded.
     """
-    global _loaded_in, _watch
+    global _loaded_pid, _listener
     with _lock:
         from primesense import _openni2 as c_api
         from primesense import openni2
         from primesense.utils import OpenNIError
 
-        if _loaded_in is not None:
-            if _loaded_in != os.getpid():
+        if _loaded_pid is not None:
+            if _loaded_pid != os.getpid():
                 raise SensorError("OpenNI2 was loaded before this process was forked: start "
                                   "processes by spawn, or open the sensor in the child alone")
             return openni2
         folder = find_library()
         try:
             c_api.load_dll(str(folder / _NAME))
-            _be_quiet(c_api)
+            _silence_logging(c_api)
             # The binding's own loading would change the working directory.
             openni2.loaded_dll_directory = str(folder)
             openni2.initialize()
-            _be_quiet(c_api)
-            _watch = _make_watch(openni2)
+            _silence_logging(c_api)
+            _listener = _make_listener(openni2)
         except (OSError, AttributeError, ValueError, OpenNIError) as error:
             raise SensorError(f"{folder / _NAME}: OpenNI2 cannot be loaded: "
-                              f"{reason(error)}") from error
+                              f"{error_text(error)}") from error
         # Before the binding's own clean-up, which destroys streams in any order.
         atexit.register(_close_all)
-        _loaded_in = os.getpid()
+        _loaded_pid = os.getpid()
         return openni2
 
 
 def close_at_exit(source: Any) -> None:
-    """Close this, where its owner forgets, before the library is unloaded."""
-    _open.add(source)
+    """Close a source before the library is unloaded, where its owner forgets to."""
+    _sources.add(source)
 
 
 def open_sources() -> list[Any]:
     """Give the sources that may be open."""
-    return list(_open)
+    return list(_sources)
 
 
 def _close_all() -> None:
@@ -106,9 +109,9 @@ def _close_all() -> None:
         source.close()
 
 
-def gone_devices() -> set[bytes]:
+def lost_devices() -> set[bytes]:
     """Give the URIs of the devices that were unplugged or failed since they were opened."""
-    return _watch.gone if _watch is not None else set()
+    return _listener.lost if _listener is not None else set()
 
 
 def close_handle(handle: Any) -> None:
@@ -118,12 +121,12 @@ def close_handle(handle: Any) -> None:
     try:
         handle.close()
     except OpenNIError:
-        # Its finaliser would only try, and complain, again.
+        # Else its finaliser would try again and print a traceback.
         handle._handle = None
 
 
-def reason(error: BaseException) -> str:
-    """Give one line for an error of the binding."""
+def error_text(error: BaseException) -> str:
+    """Give an error of the binding in one line."""
     message = error.args[1] if len(error.args) > 1 else None
     if isinstance(message, bytes) and message:
         return " ".join(message.decode("utf-8", "replace").split())
@@ -131,29 +134,29 @@ def reason(error: BaseException) -> str:
     return repr(code).split(".")[-1] if code is not None else str(error) or type(error).__name__
 
 
-def _be_quiet(c_api: Any) -> None:
-    """No Log folder in the working directory and nothing on the terminal."""
+def _silence_logging(c_api: Any) -> None:
+    """Create no Log folder in the working directory and print nothing."""
     c_api.oniSetLogFileOutput(False)
     c_api.oniSetLogConsoleOutput(False)
     c_api.oniSetLogMinSeverity(_ERRORS_ONLY)
 
 
-def _make_watch(openni2: Any) -> Any:
-    class Watch(openni2.DeviceListener):  # type: ignore[misc]
-        """Notes who left. The binding's own handlers use sets that do not exist yet."""
+def _make_listener(openni2: Any) -> Any:
+    class Listener(openni2.DeviceListener):  # type: ignore[misc]
+        """Records lost devices. The binding's own handlers use sets that do not exist yet."""
 
         def __init__(self) -> None:
-            self.gone: set[bytes] = set()
+            self.lost: set[bytes] = set()
             super().__init__()
 
         def _on_connected(self, info: Any, _: Any) -> None:
-            """A device that came back has to be opened anew: it stays noted as gone."""
+            """A device that came back has to be opened anew: it stays lost."""
 
         def _on_disconnected(self, info: Any, _: Any) -> None:
-            self.gone.add(bytes(info[0].uri))
+            self.lost.add(bytes(info[0].uri))
 
         def _on_state_changed(self, info: Any, state: Any, _: Any) -> None:
             if int(state) == 1:  # ONI_DEVICE_STATE_ERROR
-                self.gone.add(bytes(info[0].uri))
+                self.lost.add(bytes(info[0].uri))
 
-    return Watch()
+    return Listener()

@@ -7,14 +7,15 @@ from denseface.capture._calibration_choice import ChosenCalibration
 from denseface.capture.errors import SensorError, SensorTimeoutError
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.openni2._base import OpenNI2Source
-from denseface.capture.openni2._library import gone_devices, load, reason
+from denseface.capture.openni2._library import error_text, load, lost_devices
 from denseface.capture.openni2._streams import COLOR, DEPTH, Streams
 
 __all__ = ["LiveSource"]
 
 _SLICE_S = 0.1
-"""Waiting is cut into slices: Ctrl-C and an unplugged sensor are noticed between them."""
+"""Longest single wait, seconds: Ctrl-C and an unplugged sensor are noticed in between."""
 _STALE_S = 0.1
+"""Seconds since the last read after which waiting frames are thrown away."""
 
 
 class LiveSource(OpenNI2Source):
@@ -56,22 +57,22 @@ class LiveSource(OpenNI2Source):
         if not found:
             raise SensorError(f"{self._name}: OpenNI2 finds no sensor")
         wanted = found[0] if device_uri is None else device_uri.encode()
-        # Only what was found: OpenNI2 would also take the name of a file.
+        # OpenNI2 would also open the name of a file.
         if wanted not in found:
             known = ", ".join(uri.decode("utf-8", "replace") for uri in found)
             raise SensorError(f"{self._name}: no such sensor; found: {known}")
         try:
             device = openni2.Device(wanted)
         except OpenNIError as error:
-            raise SensorError(f"{self._name}: cannot be opened: {reason(error)}") from error
+            raise SensorError(f"{self._name}: cannot be opened: {error_text(error)}") from error
         self._device_uri = bytes(device.uri)
-        gone_devices().discard(self._device_uri)
+        lost_devices().discard(self._device_uri)
         self._open_streams(openni2, device)
         if start:
             self.start()
 
     def start(self) -> None:
-        """Start both streams, where that was left to the caller."""
+        """Start both streams of a source that was made with `start=False`."""
         self.streams.start()
         self._last_read = time.monotonic()
 
@@ -82,29 +83,29 @@ class LiveSource(OpenNI2Source):
     def read(self) -> RgbdFrame:
         """Wait for a pair and give it.
 
-        OpenNI2 keeps the newest frame of each stream, however old. When nothing was read for a
-        while, what waits is thrown away first: a frame is never from before the call.
+        OpenNI2 keeps the newest frame of each stream, however old. After a pause in reading, those
+        are thrown away first: no frame is from before the call.
         """
         streams = self.streams
         if time.monotonic() - self._last_read > _STALE_S:
             self.flush()
         deadline = time.monotonic() + self.timeout_s
-        seen: dict[str, int] = {DEPTH: 0, COLOR: 0}
+        received = {DEPTH: 0, COLOR: 0}
         while True:
             kind = streams.wait(min(_SLICE_S, max(deadline - time.monotonic(), 0.0)))
             self._check_present()
             if kind is not None:
-                seen[kind] += 1
+                received[kind] += 1
                 if pair := self._add(kind, streams.read(kind)):
                     self._last_read = time.monotonic()
                     return self._frame(pair)
             if time.monotonic() >= deadline:
                 raise SensorTimeoutError(
                     f"{self._name}: no depth and color pair within {self.timeout_s:g} s (received "
-                    f"{seen[DEPTH]} depth and {seen[COLOR]} color frames)")
+                    f"{received[DEPTH]} depth and {received[COLOR]} color frames)")
 
     def flush(self) -> None:
-        """Throw away what waits: the next frame is from after this call."""
+        """Throw away waiting frames: the next one is from after this call."""
         streams = self.streams
         for kind in (DEPTH, COLOR):
             if streams.wait(0.0, (kind,)) is not None:
@@ -126,6 +127,6 @@ class LiveSource(OpenNI2Source):
         return self._streams
 
     def _check_present(self) -> None:
-        if self._device_uri in gone_devices():
+        if self._device_uri in lost_devices():
             raise SensorError(f"{self._name}: the sensor {self._device_uri.decode()} was unplugged "
                               "or failed")

@@ -1,9 +1,9 @@
 r"""The record structure of an `.oni` file: what is read of it before OpenNI2 may see the file.
 
-OpenNI2 reports any damage as one bare error, or delivers fewer frames and falls silent. And it
-tells nothing of depth that OpenNI 1 recorded in the colour camera's pixels. Both stand in the
-records, which are a header and a chain: ``NIR\0``, uint32 type, node, size of fields, size of
-payload, uint64 undo position, fields, payload; all little-endian.
+OpenNI2 reports all damage as one bare error, or delivers fewer frames and then none. It does not
+say that OpenNI 1 recorded depth in the colour camera's pixels. The records tell both. They follow a
+file header; each is ``NIR\0``, uint32 type, node, size of fields, size of payload, uint64 undo
+position, fields, payload; all little-endian.
 """
 
 import struct
@@ -14,22 +14,28 @@ from typing import BinaryIO
 
 from denseface.capture.errors import UnreadableSourceError
 
-__all__ = ["DEPTH_NODE", "IMAGE_NODE", "OniNode", "check_oni", "frames_so_far"]
+__all__ = ["DEPTH_NODE", "IMAGE_NODE", "OniNode", "check_oni", "written_frames"]
 
 DEPTH_NODE, IMAGE_NODE = 2, 3
+"""Kinds of node, as in a record that adds one."""
 
 _HEADER = struct.Struct("<4sBBHIQI")
+"""Of the file."""
 _RECORD = struct.Struct("<4s4IQ")
+"""Start of a record, see above."""
 _U32 = struct.Struct("<I")
 _NODE_ADDED = (0x02, 0x0C, 0x0D)
-_INT_PROPERTY = 0x03
-_PROPERTIES = (0x03, 0x04, 0x05, 0x06)
+"""Types of record that add a node."""
+_PROPERTIES, _INT_PROPERTY = (0x03, 0x04, 0x05, 0x06), 0x03
+"""Types of record that set a property, and the one of these for a whole number."""
+_NEW_DATA, _END = 0x0A, 0x0B
+"""Types of record that hold a frame and that end the file."""
 _MODE = "xnMapOutputMode"
+"""Property that holds the size of the images."""
 _MODE_VALUE = struct.Struct("<III")
 """Its size, then width and height."""
-_NEW_DATA = 0x0A
-_END = 0x0B
 _MAX_FIELDS = 1 << 20
+"""Bytes of a record's fields; more is damage."""
 
 
 @dataclass
@@ -76,8 +82,8 @@ def check_oni(path: Path) -> tuple[list[OniNode], int]:
         raise UnreadableSourceError(f"{path}: {error.strerror or error}") from error
 
 
-def frames_so_far(path: Path) -> int:
-    """Count the frames that a recorder has written of each stream, at least, while it is at work.
+def written_frames(path: Path) -> int:
+    """Count the frames of each stream, at least, in a file that is still being recorded.
 
     0 where there is no depth or no colour stream.
     """

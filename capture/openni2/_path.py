@@ -1,7 +1,7 @@
-"""File names that OpenNI2 survives.
+"""File names that OpenNI2 can open.
 
-It crashes on a name with a byte outside ASCII (which indexes a hash table, signed) and cuts off
-names of 256 bytes and more.
+It crashes on a name with a byte outside ASCII (a signed index into a hash table) and cuts off names
+of 256 bytes and more.
 """
 
 import os
@@ -10,20 +10,21 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["plain_name"]
+__all__ = ["ascii_name"]
 
-_LONGEST = 255
+_MAX_BYTES = 255
+"""Bytes of a name."""
 
 
 @contextmanager
-def plain_name(path: Path, *, another: bool = False) -> Iterator[bytes]:
+def ascii_name(path: Path, *, unique: bool = False) -> Iterator[bytes]:
     """Give a name for a file, which need not exist yet, by which OpenNI2 can open it.
 
-    Where its own name will not do, or `another` one is wanted, that is a link to its folder or to
-    itself in a temporary folder; it is gone after the block. An open file stays open.
+    That is its own name or, where that will not do or must be `unique`, a link to it or its folder
+    in a temporary folder, which is removed after the block. An open file stays open.
     """
     name = os.fsencode(path.absolute())
-    if _is_plain(name) and not another:
+    if _can_open(name) and not unique:
         yield name
         return
     with tempfile.TemporaryDirectory(prefix="denseface-") as folder:
@@ -34,10 +35,10 @@ def plain_name(path: Path, *, another: bool = False) -> Iterator[bytes]:
             (Path(folder) / "to").symlink_to(path.absolute().parent)
             link = Path(folder) / "to" / path.name
         name = os.fsencode(link)
-        if not _is_plain(name):
-            raise OSError(f"{path}: OpenNI2 takes only ASCII names of up to {_LONGEST} bytes")
+        if not _can_open(name):
+            raise OSError(f"{path}: OpenNI2 takes only ASCII names of up to {_MAX_BYTES} bytes")
         yield name
 
 
-def _is_plain(name: bytes) -> bool:
-    return name.isascii() and len(name) <= _LONGEST
+def _can_open(name: bytes) -> bool:
+    return name.isascii() and len(name) <= _MAX_BYTES

@@ -9,15 +9,17 @@ from denseface.capture.calibration import MAX_SIDE
 from denseface.capture.errors import SensorError, UnreadableSourceError
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.openni2._base import OpenNI2Source
-from denseface.capture.openni2._library import load, open_sources, reason
+from denseface.capture.openni2._library import error_text, load, open_sources
 from denseface.capture.openni2._oni_file import DEPTH_NODE, IMAGE_NODE, OniNode, check_oni
-from denseface.capture.openni2._path import plain_name
+from denseface.capture.openni2._path import ascii_name
 from denseface.capture.openni2._streams import COLOR, DEPTH, Streams
 
 __all__ = ["RecordingSource"]
 
 _FILE_WAIT_S = 2.0
+"""Longest wait for a frame of a file, seconds: longer, and the file is damaged."""
 _SETTLE_S = 0.1
+"""Wait between stopping and destroying streams, seconds."""
 
 
 class RecordingSource(OpenNI2Source):
@@ -38,15 +40,15 @@ class RecordingSource(OpenNI2Source):
         super().__init__(str(path), chosen)
         self._unread = True
         nodes, _ = check_oni(path)
-        depth, color = (self._node(nodes, kind, what)
+        depth, color = (self._find_node(nodes, kind, what)
                         for kind, what in ((DEPTH_NODE, DEPTH), (IMAGE_NODE, COLOR)))
         self._open()
         self._registered = depth.registered
         self._expected = {DEPTH: depth.frames, COLOR: color.frames}
         self.frame_count = min(self._expected.values())
 
-    def _node(self, nodes: list[OniNode], kind: int, what: str) -> OniNode:
-        """Find a stream. One without a size, OpenNI2 makes up a size for, and crashes on it."""
+    def _find_node(self, nodes: list[OniNode], kind: int, what: str) -> OniNode:
+        """Find a stream that has a size: without one, OpenNI2 invents it and crashes."""
         node = next((node for node in nodes if node.kind == kind), None)
         if node is None:
             raise UnreadableSourceError(
@@ -59,7 +61,7 @@ class RecordingSource(OpenNI2Source):
 
     def __iter__(self) -> Iterator[RgbdFrame]:
         if not self._unread or self._streams is None:
-            # Seeking hangs: a new pass is a new opening.
+            # Seeking hangs, so each new pass opens the file again.
             self.close()
             self._open()
         self._unread = False
@@ -82,7 +84,7 @@ class RecordingSource(OpenNI2Source):
                     f"{read[COLOR]} of {self._expected[COLOR]} color frames: damaged")
             left[kind] -= 1
             if max(left.values()) <= 0:
-                # At the end the player's thread would spin.
+                # At the end the player's thread would busy-wait.
                 streams.stop()
             if pair := self._add(kind, image):
                 yield self._frame(pair)
@@ -90,8 +92,8 @@ class RecordingSource(OpenNI2Source):
     def close(self) -> None:
         """Stop the streams and close the file; harmless when repeated."""
         if self._streams is not None and not self._unread:
-            # The player's thread walks through the list of streams without a lock, and crashes
-            # when one is destroyed meanwhile. Once they are stopped it sleeps 10 ms a round.
+            # The player's thread reads the list of streams without a lock, and crashes when one
+            # is destroyed meanwhile. While all are stopped, it sleeps 10 ms a round.
             self._streams.stop()
             time.sleep(_SETTLE_S)
         super().close()
@@ -105,20 +107,20 @@ class RecordingSource(OpenNI2Source):
         from primesense.utils import OpenNIError
 
         try:
-            # Under one name, OpenNI2 gives every opening the same position in the file.
+            # Devices that were opened by the same name share their position in the file.
             path = Path(self.uri).absolute()
             again = any(other is not self and other.holds(path) for other in open_sources())
-            with plain_name(path, another=again) as name:
+            with ascii_name(path, unique=again) as name:
                 device = openni2.Device.open_file(name)
             if not device.is_file():
                 device.close()
                 raise UnreadableSourceError(f"{self.uri}: OpenNI2 does not take it as a recording")
-            # A float: the binding hands an int over as the bits of one.
+            # A float: the binding would reinterpret an int's bits as one.
             device.playback.set_speed(-1.0)
             device.playback.set_repeat_enabled(False)
             return self._open_streams(openni2, device)
         except OpenNIError as error:
             raise UnreadableSourceError(
-                f"{self.uri}: OpenNI2 cannot open it: {reason(error)}") from error
+                f"{self.uri}: OpenNI2 cannot open it: {error_text(error)}") from error
         except SensorError as error:
             raise UnreadableSourceError(str(error)) from error

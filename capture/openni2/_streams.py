@@ -11,17 +11,21 @@ from numpy.typing import NDArray
 from denseface.capture.calibration import MAX_SIDE
 from denseface.capture.errors import SensorError
 from denseface.capture.openni2._calibration import SensorProperties
-from denseface.capture.openni2._library import close_handle, reason
+from denseface.capture.openni2._library import close_handle, error_text
 
 __all__ = ["COLOR", "DEPTH", "Image", "Streams"]
 
 DEPTH, COLOR = "depth", "color"
+"""Kinds of stream."""
 Image = tuple[int, NDArray[Any]]
 """Stamp (sensor clock, microseconds) and pixels: (H, W) uint16 mm or (H, W, 3) uint8 RGB."""
 
 _FOV, _MIRRORING = 1, 7
+"""OpenNI2's numbers of stream properties."""
 _ZPD, _ZPPS, _DCRCDIS = 0x1080100C, 0x1080100D, 0x1080100F
+"""PrimeSense's numbers of stream properties (PS1080.h); see `_calibration`."""
 _LIVE_SIZE, _LIVE_FPS = (640, 480), 30
+"""Video mode of live sensors: pixels, frames a second."""
 _C = TypeVar("_C", bound="ctypes._SimpleCData[Any]")
 
 
@@ -58,7 +62,7 @@ class Streams:
 
         self._error = OpenNIError
         try:
-            # Both are created before either starts: a sensor may begin with the first start.
+            # Both are created before either starts: a sensor may send from the first start on.
             for kind in (DEPTH, COLOR):
                 self._streams[kind] = self._create(device, kind, live=live)
             self.properties = self._read_properties(device)
@@ -67,13 +71,13 @@ class Streams:
             raise
 
     def start(self) -> None:
-        """Start both; only then may they be read."""
+        """Start both, before any `wait` or `read`."""
         for kind, stream in self._streams.items():
             try:
                 stream.handle.start()
             except self._error as error:
                 raise SensorError(f"{self._name}: the {kind} stream does not start: "
-                                  f"{reason(error)}") from error
+                                  f"{error_text(error)}") from error
 
     def stop(self) -> None:
         """Stop both; a device that is gone may refuse."""
@@ -92,14 +96,14 @@ class Streams:
     def wait(self, timeout_s: float, kinds: tuple[str, ...] = (DEPTH, COLOR)) -> str | None:
         """Wait until a stream has a frame; None where none came in time, or the file is at its end.
 
-        This is the only safe way to wait: reading without it may block for ever.
+        A `read` of what was not announced here may block for ever.
         """
         handles = [self.handle(kind) for kind in kinds]
         try:
             ready = self._openni2.wait_for_any_stream(handles, timeout_s)
         except self._error as error:
             raise SensorError(f"{self._name}: waiting for a frame failed: "
-                              f"{reason(error)}") from error
+                              f"{error_text(error)}") from error
         return next((k for k, h in zip(kinds, handles, strict=True) if h is ready), None)
 
     def read(self, kind: str) -> Image:
@@ -109,14 +113,14 @@ class Streams:
             frame = stream.handle.read_frame()
         except self._error as error:
             raise SensorError(f"{self._name}: reading a {kind} frame failed: "
-                              f"{reason(error)}") from error
+                              f"{error_text(error)}") from error
         try:
             return int(frame.timestamp), self._copy(stream, frame)
         finally:
             frame.close()
 
     def close(self) -> None:
-        """Stop and destroy both; a device that is gone may refuse, which changes nothing."""
+        """Stop and destroy both, also of a device that is gone."""
         for stream in self._streams.values():
             close_handle(stream.handle)
         self._streams.clear()
@@ -127,7 +131,7 @@ class Streams:
             handle = make()
         except self._error as error:
             raise SensorError(f"{self._name}: the {kind} stream cannot be opened: "
-                              f"{reason(error)}") from error
+                              f"{error_text(error)}") from error
         if handle is None:
             raise SensorError(f"{self._name}: has no {kind} stream; depth and color are needed")
         try:
@@ -135,7 +139,7 @@ class Streams:
         except self._error as error:
             close_handle(handle)
             raise SensorError(f"{self._name}: the {kind} stream has no video mode: "
-                              f"{reason(error)}") from error
+                              f"{error_text(error)}") from error
         except BaseException:
             close_handle(handle)
             raise
@@ -144,7 +148,7 @@ class Streams:
         if live:
             self._choose_mode(device, kind, handle)
         mode = handle.video_mode
-        accepted = _accepted(self._openni2, kind)
+        accepted = _pixel_formats(self._openni2, kind)
         if int(mode.pixelFormat) not in accepted:
             raise SensorError(
                 f"{self._name}: the {kind} stream is {_format_name(mode.pixelFormat)}, "
@@ -158,14 +162,14 @@ class Streams:
     def _choose_mode(self, device: Any, kind: str, handle: Any) -> None:
         modes = [(int(m.resolutionX), int(m.resolutionY), int(m.fps), int(m.pixelFormat))
                  for m in device.get_sensor_info(handle.sensor_type).videoModes]
-        for pixel_format in _accepted(self._openni2, kind):
+        for pixel_format in _pixel_formats(self._openni2, kind):
             wanted = (*_LIVE_SIZE, _LIVE_FPS, pixel_format)
             if wanted in modes:
                 handle.configure_mode(*wanted)
                 return
         raise SensorError(
             f"{self._name}: the {kind} stream does not offer 640x480 at 30 frames a second as "
-            f"{' or '.join(_accepted(self._openni2, kind).values())}")
+            f"{' or '.join(_pixel_formats(self._openni2, kind).values())}")
 
     def _mirrored(self, handle: Any) -> bool:
         """Switch mirroring off; where that fails, as on recordings, say whether it is on."""
@@ -214,7 +218,7 @@ class Streams:
         return np.ascontiguousarray(image[:, ::-1]) if stream.mirrored else image
 
 
-def _accepted(openni2: Any, kind: str) -> dict[int, str]:
+def _pixel_formats(openni2: Any, kind: str) -> dict[int, str]:
     if kind == DEPTH:
         return {int(openni2.PIXEL_FORMAT_DEPTH_1_MM): "depth in 1 mm",
                 int(openni2.PIXEL_FORMAT_DEPTH_100_UM): "depth in 100 um"}

@@ -6,15 +6,17 @@ from pathlib import Path
 
 from denseface.capture.errors import SensorError, SensorTimeoutError
 from denseface.capture.openni2 import LiveSource
-from denseface.capture.openni2._library import load, reason
-from denseface.capture.openni2._oni_file import check_oni, frames_so_far
-from denseface.capture.openni2._path import plain_name
+from denseface.capture.openni2._library import error_text, load
+from denseface.capture.openni2._oni_file import check_oni, written_frames
+from denseface.capture.openni2._path import ascii_name
 from denseface.capture.openni2._streams import COLOR, DEPTH
 
 __all__ = ["record"]
 
 _SILENCE_S = 3.0
+"""Seconds without a frame after which the sensor has fallen silent."""
 _POLL_S = 0.01
+"""Seconds between looks at what was written."""
 
 
 def record(device_uri: str | None, path: str | Path, frames: int) -> int:
@@ -48,7 +50,7 @@ def record(device_uri: str | None, path: str | Path, frames: int) -> int:
     try:
         _record(device_uri, part, frames)
         _, end = check_oni(part)
-        found = frames_so_far(part)
+        found = written_frames(part)
         if found < frames:
             raise SensorTimeoutError(
                 f"{path}: the sensor fell silent after {found} of {frames} frames")
@@ -66,10 +68,10 @@ def _record(device_uri: str | None, part: Path, frames: int) -> None:
 
     with LiveSource(device_uri, start=False) as source:
         try:
-            with plain_name(part) as name:
+            with ascii_name(part) as name:
                 recorder = openni2.Recorder(name)
             try:
-                # Both before the start, or the second stream's frames are not in the file.
+                # Both before the start: a stream that is attached later is not recorded.
                 for each in (DEPTH, COLOR):
                     recorder.attach(source.streams.handle(each), each == COLOR)
                 recorder.start()
@@ -86,11 +88,11 @@ def _record(device_uri: str | None, part: Path, frames: int) -> None:
             finally:
                 recorder.close()
         except OpenNIError as error:
-            raise SensorError(f"{part}: recording failed: {reason(error)}") from error
+            raise SensorError(f"{part}: recording failed: {error_text(error)}") from error
 
 
 def _wait_until_written(part: Path, frames: int) -> None:
-    """The recorder writes in a thread of its own; what it has not begun at its stop, it drops."""
+    """Wait for the recorder's own thread: when stopped, it drops what it has not yet written."""
     deadline = time.monotonic() + _SILENCE_S
-    while frames_so_far(part) < frames and time.monotonic() < deadline:
+    while written_frames(part) < frames and time.monotonic() < deadline:
         time.sleep(_POLL_S)

@@ -33,7 +33,7 @@ def number(stamp_us: int) -> int:
 
 
 def test_frames_are_bit_exact_and_not_mirrored(clip, shown):
-    frames, origin = play("openni2:", environment(clip), most=6)
+    frames, origin = play("openni2:", environment(clip), max_frames=6)
     assert len(frames) == 6
     for frame in frames:
         depth, color = shown[number(frame.depth_timestamp_us) % 3]
@@ -52,18 +52,18 @@ def test_frames_are_bit_exact_and_not_mirrored(clip, shown):
 
 @pytest.mark.parametrize("skew_us", [-11_700, 11_700])
 def test_the_skew_stays_on_the_frame(clip, skew_us):
-    frames, _ = play("openni2:virtual:0", environment(clip, skew_us=skew_us), most=3)
+    frames, _ = play("openni2:virtual:0", environment(clip, skew_us=skew_us), max_frames=3)
     assert [frame.skew_us for frame in frames] == [-skew_us] * 3
 
 
 def test_depth_in_tenths_of_a_millimetre(clip, shown):
-    (frame,), _ = play("openni2:", environment(clip, depth_unit="100um"), most=1)
+    (frame,), _ = play("openni2:", environment(clip, depth_unit="100um"), max_frames=1)
     depth, _ = shown[number(frame.depth_timestamp_us) % 3]
     np.testing.assert_array_equal(frame.depth, np.minimum(depth, 6554))
 
 
 def test_an_argument_wins_over_what_the_sensor_says(clip, tmp_path):
-    (frame,), _ = play("openni2:", environment(clip), most=1)
+    (frame,), _ = play("openni2:", environment(clip), max_frames=1)
     mine = frame.calibration.model_copy(
         update={"color": frame.calibration.color.model_copy(update={"fx": 500.0})})
     path = tmp_path / "mine.json"

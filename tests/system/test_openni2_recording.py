@@ -134,7 +134,7 @@ def test_names_that_openni2_does_not_survive(recorded, tmp_path, name):
     path = tmp_path / name
     path.parent.mkdir(exist_ok=True)
     path.write_bytes(recorded.read_bytes())
-    assert len(play(path, most=1)[0]) == 1
+    assert len(play(path, max_frames=1)[0]) == 1
 
 
 @pytest.mark.parametrize("closed", [True, False])

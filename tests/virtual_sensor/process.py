@@ -92,11 +92,11 @@ def record_clip(
 
 
 def play(
-    uri: str | Path, env: dict[str, str] | None = None, most: int = 1000
+    uri: str | Path, env: dict[str, str] | None = None, max_frames: int = 1000
 ) -> tuple[list[RgbdFrame], str]:
-    """Read frames through `open_source` in a process of its own; give the calibration's origin."""
+    """Read frames through `open_source` in a process of its own; give also their calibration_origin."""
     with tempfile.TemporaryDirectory() as folder:
-        done = run_python(_PLAY, uri, folder, most, env=env or environment())
+        done = run_python(_PLAY, uri, folder, max_frames, env=env or environment())
         if done.returncode or done.stderr:
             raise RuntimeError(f"playing {uri} failed ({done.returncode}): {done.stderr}")
         lines = done.stdout.splitlines()

@@ -53,7 +53,8 @@ def test_unknown_kinds_are_named_with_those_accepted(uri):
     with pytest.raises(UnreadableSourceError) as caught:
         open_source(uri)
     assert str(caught.value).startswith(uri)
-    assert all(kind in str(caught.value) for kind in (".npz", ".oni", "openni2:"))
+    assert str(caught.value).endswith(
+        "not a known kind of source; accepted: NAME.npz, NAME.oni, openni2: or openni2:URI")
 
 
 @pytest.mark.parametrize("kind", ["npz", "oni", "ONI"])

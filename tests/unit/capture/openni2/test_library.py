@@ -2,7 +2,7 @@ import pytest
 
 from denseface.capture.errors import SensorError
 from denseface.capture.openni2 import _library as library
-from denseface.capture.openni2._path import plain_name
+from denseface.capture.openni2._path import ascii_name
 
 
 def test_the_environment_names_the_folder(tmp_path, monkeypatch):
@@ -26,8 +26,8 @@ def test_a_missing_library_names_the_debian_package(monkeypatch):
         library.find_library()
 
 
-def test_plain_names_are_left_alone(tmp_path):
-    with plain_name(tmp_path / "a.oni") as name:
+def test_ascii_names_are_left_alone(tmp_path):
+    with ascii_name(tmp_path / "a.oni") as name:
         assert name == str(tmp_path / "a.oni").encode()
 
 
@@ -36,7 +36,7 @@ def test_odd_names_get_a_link(tmp_path, odd):
     path = tmp_path / odd
     path.parent.mkdir(exist_ok=True)
     path.write_text("here")
-    with plain_name(path) as name:
+    with ascii_name(path) as name:
         assert name.isascii()
         assert len(name) < 256
         with open(name) as file:  # noqa: PTH123 # a name in bytes
@@ -46,6 +46,6 @@ def test_odd_names_get_a_link(tmp_path, odd):
 def test_a_new_file_in_an_odd_folder(tmp_path):
     folder = tmp_path / "ö"
     folder.mkdir()
-    with plain_name(folder / "new.oni") as name, open(name, "w") as file:  # noqa: PTH123
+    with ascii_name(folder / "new.oni") as name, open(name, "w") as file:  # noqa: PTH123
         file.write("made")
     assert (folder / "new.oni").read_text() == "made"

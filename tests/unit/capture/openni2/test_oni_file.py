@@ -5,7 +5,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from denseface.capture.errors import UnreadableSourceError
-from denseface.capture.openni2._oni_file import DEPTH_NODE, IMAGE_NODE, check_oni, frames_so_far
+from denseface.capture.openni2._oni_file import DEPTH_NODE, IMAGE_NODE, check_oni, written_frames
 
 
 def text(value: str) -> bytes:
@@ -67,14 +67,14 @@ def test_what_is_wrong_is_said(tmp_path, content, words):
     assert words in str(caught.value)
 
 
-def test_frames_so_far_while_a_recorder_is_at_work(tmp_path):
+def test_written_frames_while_a_recorder_is_at_work(tmp_path):
     path = tmp_path / "part.oni"
-    assert frames_so_far(path) == 0
+    assert written_frames(path) == 0
     whole = recording()
     path.write_bytes(whole[:-28 - 90] + bytes(5000))
-    assert frames_so_far(path) == 1
+    assert written_frames(path) == 1
     path.write_bytes(whole[:200])
-    assert frames_so_far(path) == 0
+    assert written_frames(path) == 0
 
 
 def complaint(path) -> str | None:
