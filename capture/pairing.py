@@ -17,10 +17,10 @@ HALF_FRAME_US = 17_000
 _CAPACITY = 4
 """Items of a stream that wait for a partner, at most."""
 
-D = TypeVar("D")  # depth
-C = TypeVar("C")  # colour
-T = TypeVar("T")  # either
-_Queue = deque[tuple[int, T]]
+D = TypeVar("D")
+C = TypeVar("C")
+T = TypeVar("T")
+U = TypeVar("U")
 
 
 @dataclass(frozen=True)
@@ -49,71 +49,67 @@ class Pairer(Generic[D, C]):
             raise ValueError(f"capacity must be at least 1, got {capacity}")
         self.tolerance_us = tolerance_us
         self.capacity = capacity
-        self.dropped_depth = 0
-        self.dropped_color = 0
-        self._depth: _Queue[D] = deque()
-        self._color: _Queue[C] = deque()
-        self._last_depth_us: int | None = None
-        self._last_color_us: int | None = None
+        self._depth: _Stream[D] = _Stream()
+        self._color: _Stream[C] = _Stream()
 
     @property
     def waiting(self) -> tuple[int, int]:
         """How many depth and colour items wait for a partner."""
-        return len(self._depth), len(self._color)
+        return len(self._depth.items), len(self._color.items)
+
+    @property
+    def dropped_depth(self) -> int:
+        """How many depth items found no partner."""
+        return self._depth.dropped
+
+    @property
+    def dropped_color(self) -> int:
+        """How many colour items found no partner."""
+        return self._color.dropped
 
     def add_depth(self, stamp_us: int, item: D) -> Pair[D, C] | None:
         """Take a depth item; give the pair that it completes, if any."""
-        self._restart_if(self._last_depth_us is not None and stamp_us <= self._last_depth_us)
-        self._last_depth_us = stamp_us
-        at = self._nearest(self._color, stamp_us)
-        if at is None:
-            self.dropped_depth += _push(self._depth, (stamp_us, item), self.capacity)
-            return None
-        color_us, color = self._color[at]
-        self.dropped_color += _discard(self._color, at + 1) - 1
-        self.dropped_depth += _discard(self._depth, len(self._depth))
-        return Pair(item, color, stamp_us, color_us)
+        partner = self._add(self._depth, self._color, stamp_us, item)
+        return partner and Pair(item, partner[1], stamp_us, partner[0])
 
     def add_color(self, stamp_us: int, item: C) -> Pair[D, C] | None:
         """Take a colour item; give the pair that it completes, if any."""
-        self._restart_if(self._last_color_us is not None and stamp_us <= self._last_color_us)
-        self._last_color_us = stamp_us
-        at = self._nearest(self._depth, stamp_us)
-        if at is None:
-            self.dropped_color += _push(self._color, (stamp_us, item), self.capacity)
-            return None
-        depth_us, depth = self._depth[at]
-        self.dropped_depth += _discard(self._depth, at + 1) - 1
-        self.dropped_color += _discard(self._color, len(self._color))
-        return Pair(depth, item, depth_us, stamp_us)
+        partner = self._add(self._color, self._depth, stamp_us, item)
+        return partner and Pair(partner[1], item, partner[0], stamp_us)
 
     def clear(self) -> None:
         """Drop what waits, as at a press: what comes next is newer."""
-        self.dropped_depth += _discard(self._depth, len(self._depth))
-        self.dropped_color += _discard(self._color, len(self._color))
-        self._last_depth_us = self._last_color_us = None
+        for stream in (self._depth, self._color):
+            stream.drop(len(stream.items))
+            stream.last_us = None
 
-    def _restart_if(self, backwards: bool) -> None:
-        """A stamp that does not grow means that the sensor's clock started over."""
-        if backwards:
-            self.clear()
-
-    def _nearest(self, queue: _Queue[T], stamp_us: int) -> int | None:
-        best = min(range(len(queue)), key=lambda i: abs(queue[i][0] - stamp_us), default=None)
-        if best is None or abs(queue[best][0] - stamp_us) > self.tolerance_us:
+    def _add(
+        self, own: "_Stream[T]", other: "_Stream[U]", stamp_us: int, item: T
+    ) -> tuple[int, U] | None:
+        """Take the nearest partner from the other stream, or let the item wait."""
+        if own.last_us is not None and stamp_us <= own.last_us:
+            self.clear()  # the sensor's clock started over
+        own.last_us = stamp_us
+        distances = [abs(other_us - stamp_us) for other_us, _ in other.items]
+        if not distances or min(distances) > self.tolerance_us:
+            own.items.append((stamp_us, item))
+            own.drop(len(own.items) - self.capacity)
             return None
-        return best
+        other.drop(distances.index(min(distances)))
+        own.drop(len(own.items))
+        return other.items.popleft()
 
 
-def _push(queue: _Queue[T], entry: tuple[int, T], capacity: int) -> int:
-    """Append and give how many of the oldest had to go."""
-    queue.append(entry)
-    return _discard(queue, len(queue) - capacity)
+class _Stream(Generic[T]):
+    """What waits of one stream, oldest first, with its stamps."""
 
+    def __init__(self) -> None:
+        self.items: deque[tuple[int, T]] = deque()
+        self.last_us: int | None = None
+        self.dropped = 0
 
-def _discard(queue: _Queue[T], count: int) -> int:
-    """Take away the oldest `count` and give how many that were."""
-    count = max(count, 0)
-    for _ in range(count):
-        queue.popleft()
-    return count
+    def drop(self, count: int) -> None:
+        """Drop the oldest `count`, if any."""
+        for _ in range(count):
+            self.items.popleft()
+            self.dropped += 1

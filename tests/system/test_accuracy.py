@@ -54,7 +54,7 @@ class Taken:
 
 
 def first_frame(name: str) -> RgbdFrame:
-    (frame,), _ = play(FOLDER / f"{name}.oni", most=1)
+    (frame,), _ = play(FOLDER / f"{name}.oni", max_frames=1)
     return frame
 
 

@@ -235,7 +235,7 @@ def test_a_press_without_a_sensor_is_refused(tmp_path):
 @pytest.fixture(scope="module")
 def clip(tmp_path_factory):
     """What the virtual sensor shows: a face."""
-    frames, _ = play(RECORDINGS / "frontal_700.oni", most=2)
+    frames, _ = play(RECORDINGS / "frontal_700.oni", max_frames=2)
     path = tmp_path_factory.mktemp("clip") / "clip"
     write_clip(path, [(frame.depth, frame.color) for frame in frames])
     return path

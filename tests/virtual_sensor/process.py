@@ -94,7 +94,7 @@ def record_clip(
 def play(
     uri: str | Path, env: dict[str, str] | None = None, max_frames: int = 1000
 ) -> tuple[list[RgbdFrame], str]:
-    """Read frames through `open_source` in a process of its own; give also their calibration_origin."""
+    """Read frames in a process of its own; give also the calibration's origin."""
     with tempfile.TemporaryDirectory() as folder:
         done = run_python(_PLAY, uri, folder, max_frames, env=env or environment())
         if done.returncode or done.stderr:
