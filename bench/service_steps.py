@@ -19,7 +19,7 @@ from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.wire import Buffer, Packet, decode_from_hub, decode_to_hub, encode
 from denseface.service.runtime.files import write_atomically
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage import FolderStore
 
 __all__ = ["Laps", "one_capture_each"]
 

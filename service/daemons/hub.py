@@ -22,8 +22,7 @@ from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.security.permissions import missing_role
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.writer import WriterThreads
+from denseface.service.storage import FolderStore, WriterThreads
 from denseface.service.transport.listener import Incoming
 from denseface.service.transport.listeners import Listeners
 

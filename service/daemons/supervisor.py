@@ -16,7 +16,7 @@ from denseface.service.daemons.startup import ONE_THREAD
 from denseface.service.errors import AddressError
 from denseface.service.runtime.signals import PARENT_VARIABLE, StopSignal
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage.folder_lock import check_folder
+from denseface.service.storage import check_folder
 from denseface.service.transport.addresses import check_bindable, is_local
 from denseface.service.transport.listeners import server_credentials
 

@@ -5,8 +5,7 @@ from typing import NamedTuple
 from denseface.service.hub.captures import Captures
 from denseface.service.hub.peers import Peers
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.writer import Writer
+from denseface.service.storage import FolderStore, Writer
 
 __all__ = ["Common"]
 

@@ -13,8 +13,7 @@ from denseface.service.protocol.states import (
     CaptureState,
     advance,
 )
-from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.writer import WriteResult
+from denseface.service.storage import FolderStore, WriteResult
 
 __all__ = ["Captures"]
 

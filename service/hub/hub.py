@@ -34,9 +34,14 @@ from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.records import FaceMetadata, FrameMetadata
-from denseface.service.storage.writer import InlineWriter, Writer, WriteResult
+from denseface.service.storage import (
+    FaceMetadata,
+    FolderStore,
+    FrameMetadata,
+    InlineWriter,
+    Writer,
+    WriteResult,
+)
 
 __all__ = ["Hub"]
 
@@ -244,7 +249,7 @@ class Hub:
 
     def _requeue_damaged(self, error: DamagedFaceError, kept_before: bool) -> None:
         # One that is damaged as soon as it is written has used up an attempt.
-        self._jobs.requeue_damaged(error.capture_id, str(error), attempts_left=kept_before)
+        self._jobs.requeue_damaged(error.capture_id, str(error), reset_attempts=kept_before)
 
     def _has_room(self, kind: Literal["sensor", "worker"], peer: bytes, name: str) -> bool:
         room = self._peers.has_room(kind, peer)

@@ -18,8 +18,7 @@ from denseface.service.protocol.outgoing import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.failpoints import failpoint
-from denseface.service.storage.base import CaptureRow
-from denseface.service.storage.writer import WriteResult
+from denseface.service.storage import CaptureRow, WriteResult
 
 __all__ = ["Jobs"]
 
@@ -73,10 +72,10 @@ class Jobs:
         for worker in self._peers.workers.values():
             worker.jobs = [one for one in worker.jobs if one not in capture_ids]
 
-    def requeue_damaged(self, capture_id: str, reason: str, *, attempts_left: bool = True) -> None:
+    def requeue_damaged(self, capture_id: str, reason: str, *, reset_attempts: bool = True) -> None:
         """Take up a capture again whose face turned out to be damaged."""
         with self._captures.transition(CaptureEvent.DAMAGED, capture_id) as state:
-            self._store.reopen(capture_id, state, attempts_left=attempts_left)
+            self._store.reopen(capture_id, state, reset_attempts=reset_attempts)
         self._last_errors[capture_id] = "CorruptFileError", reason
         self.add(capture_id)
         self._log.warning("face to be made again", capture_id=capture_id, reason=reason)

@@ -89,7 +89,7 @@ class Maintenance:
         else:
             self._store.frame(capture_id)  # without it, the dead letter stays as it is
             with self._captures.transition(CaptureEvent.RETRIED, capture_id) as state:
-                self._store.reopen(capture_id, state, attempts_left=True)
+                self._store.reopen(capture_id, state, reset_attempts=True)
             self._jobs.add(capture_id)
             self._log.info("dead letter retried", capture_id=capture_id)
             yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))

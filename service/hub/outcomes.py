@@ -8,7 +8,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, Publish, Send, send
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage import FolderStore
 
 __all__ = ["Outcomes"]
 

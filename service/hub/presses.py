@@ -15,7 +15,7 @@ from denseface.service.protocol.states import CaptureEvent, CaptureState
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.bounded_dict import BoundedDict
 from denseface.service.runtime.failpoints import failpoint
-from denseface.service.storage.writer import WriteResult
+from denseface.service.storage import WriteResult
 
 __all__ = ["Presses", "settings_hash"]
 

@@ -2,9 +2,7 @@
 
 from denseface.service.errors import StoreError
 from denseface.service.protocol.wire import Packet
-from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.records import PendingWrite
-from denseface.service.storage.writer import Writer
+from denseface.service.storage import FolderStore, PendingWrite, Writer
 
 __all__ = ["UnsavedFaces"]
 

@@ -1,4 +1,4 @@
-"""Files that are whole or not there, and files and folders for this user alone."""
+"""Atomic and durable writes; files and folders for this user alone."""
 
 import os
 import stat
@@ -13,25 +13,28 @@ from denseface.service.runtime.failpoints import failpoint
 __all__ = ["private_folder", "read_private_text", "sync_folder", "write_atomically",
            "write_private_text"]
 
-_MOST_TEXT_BYTES = 4096
-"""Of a private text: more than any key file."""
+_MAX_TEXT_BYTES = 4096
+"""Of a private text; longer than any key file."""
 
 
 def write_atomically(
-    path: Path, chunks: Sequence[bytes | memoryview], *, durable: bool = True, named: bool = True,
-    direct: bool = False, mode: int = 0o666, steps: str = "",
+    path: Path, chunks: Sequence[bytes | memoryview], *, durable: bool = True,
+    sync_name: bool = True, direct: bool = False, mode: int = 0o666, failpoints: str = "",
 ) -> None:
-    """Write a file so that `path` is ever either the old contents or all of the new.
+    """Write a file so that `path` always has either its old contents or all of the new.
 
-    With `durable`, it is on the disk, and with `named` so is its name, when this returns; without,
-    that is left to `sync_folder`. With `direct` it does not pass through the page cache where that
-    can be had. `mode`, less the umask, is that of the file. `steps` begins the names of this
-    write's failpoints.
+    Parameters
+    ----------
+    durable : sync the file before it gets its name
+    sync_name : sync the folder too, if `durable`; else `sync_folder` is left to the caller
+    direct : write past the page cache, where the file system can
+    mode : of the file, less the umask
+    failpoints : prefix of the names of this write's failpoints
 
     Raises
     ------
     OSError
-        As from the system; nothing half-written stays, though all of it may.
+        As from the system. The old contents, or all of the new, are left.
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
@@ -41,22 +44,22 @@ def write_atomically(
                 for chunk in chunks:
                     file.write(chunk)
                 file.flush()
-            failpoint(f"{steps}.written")
+            failpoint(f"{failpoints}.written")
             if durable:
                 os.fsync(file.fileno())
-                failpoint(f"{steps}.synced")
+                failpoint(f"{failpoints}.synced")
         temporary.replace(path)
-        failpoint(f"{steps}.renamed")
+        failpoint(f"{failpoints}.renamed")
     except BaseException:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise
-    if durable and named:
+    if durable and sync_name:
         sync_folder(path.parent)
 
 
 def sync_folder(folder: Path) -> None:
-    """Put the names in a folder on the disk; OSError where that fails."""
+    """Sync the names in a folder; OSError where that fails."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(descriptor)
@@ -65,12 +68,12 @@ def sync_folder(folder: Path) -> None:
 
 
 def private_folder(path: Path) -> Path:
-    """Create a folder that only this user can enter, or check that it is one.
+    """Create a folder that only this user can enter, or make it one, and give it.
 
     Raises
     ------
     SettingsError
-        Where it is no folder, belongs to someone else or cannot be made.
+        Where it is no folder, belongs to another user or cannot be created.
     """
     try:
         path.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -85,7 +88,7 @@ def private_folder(path: Path) -> Path:
 
 
 def write_private_text(path: Path, text: str) -> None:
-    """Write a file of mode 0600, whole or not at all.
+    """Write a file of mode 0600 atomically.
 
     Raises
     ------
@@ -99,21 +102,21 @@ def write_private_text(path: Path, text: str) -> None:
 
 
 def read_private_text(path: Path, forbidden: int) -> bytes:
-    """Read a small file unless others have one of the `forbidden` permissions.
+    """Read a key file unless its mode has one of the bits in `forbidden`.
 
     Raises
     ------
     KeyFileError
-        Where it is no regular file, too long, not ours or open to others.
+        Where it is no regular file, too long, another user's or open to others.
     """
     try:
         with path.open("rb") as file:
             found = os.fstat(file.fileno())
-            text = file.read(_MOST_TEXT_BYTES + 1) if stat.S_ISREG(found.st_mode) else b""
+            text = file.read(_MAX_TEXT_BYTES + 1) if stat.S_ISREG(found.st_mode) else b""
     except OSError as error:
         raise KeyFileError(f"{path}: {reason_of(error)}") from error
-    if not stat.S_ISREG(found.st_mode) or len(text) > _MOST_TEXT_BYTES:
-        raise KeyFileError(f"{path}: expected a key file of at most {_MOST_TEXT_BYTES} bytes")
+    if not stat.S_ISREG(found.st_mode) or len(text) > _MAX_TEXT_BYTES:
+        raise KeyFileError(f"{path}: expected a key file of at most {_MAX_TEXT_BYTES} bytes")
     if forbidden and found.st_uid != os.getuid():
         raise KeyFileError(f"{path}: belongs to user {found.st_uid}, expected {os.getuid()}")
     if found.st_mode & forbidden:

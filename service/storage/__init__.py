@@ -1,1 +1,38 @@
 """The data folder: frames and faces as files, what became of them in SQLite."""
+
+from denseface.service.storage._capture_rows import CaptureRow
+from denseface.service.storage._folder_layout import FolderLayout
+from denseface.service.storage._folder_lock import check_folder
+from denseface.service.storage._store_clock import Clock, SystemClock
+from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage.records import (
+    FaceMetadata,
+    FaceRecord,
+    FrameMetadata,
+    FrameRecord,
+    PendingWrite,
+    read_face,
+    read_frame,
+)
+from denseface.service.storage.writer import InlineWriter, Writer, WriteResult, WriterThreads, write
+
+__all__ = [
+    "CaptureRow",
+    "Clock",
+    "FaceMetadata",
+    "FaceRecord",
+    "FolderLayout",
+    "FolderStore",
+    "FrameMetadata",
+    "FrameRecord",
+    "InlineWriter",
+    "PendingWrite",
+    "SystemClock",
+    "WriteResult",
+    "Writer",
+    "WriterThreads",
+    "check_folder",
+    "read_face",
+    "read_frame",
+    "write",
+]

@@ -1,7 +1,6 @@
-"""What a frame's and a face's file hold: all that the database knows of them, and more.
+"""The files of frames and faces, from which alone the database can be rebuilt.
 
-The first part says when and with which settings; then comes the message as it arrived. So the
-database can be made again from the files alone.
+Part 0 of the file is the metadata, JSON; the other parts are the message as it arrived.
 """
 
 from contextlib import suppress
@@ -15,7 +14,7 @@ from denseface.service.errors import CorruptFileError, ProtocolError
 from denseface.service.protocol.messages import Frame, Result
 from denseface.service.protocol.payload import Arrays
 from denseface.service.protocol.wire import Packet, decode_kept, encode
-from denseface.service.storage.record_file import read_parts, write_parts
+from denseface.service.storage._record_file import read_parts, write_parts
 
 __all__ = [
     "FaceMetadata",
@@ -35,21 +34,21 @@ class _Metadata(BaseModel):
 
     accepted_at: _Time
     clock: str
-    """The store's account of its age when this was written."""
+    """What `StoreClock.save` gave when this was written."""
 
 
 class FrameMetadata(_Metadata):
-    """What a frame does not say of itself."""
+    """What the database knows of a frame and its message does not say."""
 
     settings: str
-    """Of the reconstruction, JSON."""
+    """Settings of the reconstruction, JSON."""
     settings_hash: Annotated[str, Field(pattern=r"^[0-9a-f]{1,64}$")]
     pressed_by: Annotated[str, Field(pattern=r"^[0-9a-f]{0,16}$")] = ""
     """Fingerprint of the key that pressed; empty where none was needed."""
 
 
 class FaceMetadata(_Metadata):
-    """What a face does not say of itself."""
+    """What the database knows of a face and its message does not say."""
 
     finished_at: _Time
 
@@ -76,7 +75,7 @@ class FaceRecord:
 
 @dataclass(frozen=True)
 class PendingWrite:
-    """A frame or a face before it is on the disk: its file comes first, then its row."""
+    """A frame or a face of which neither file nor row is written."""
 
     capture_id: str
     path: Path
@@ -84,21 +83,23 @@ class PendingWrite:
     packet: Packet
 
     @property
-    def steps(self) -> str:
-        """How the names of its failpoints begin."""
-        return "hub.frame" if isinstance(self.metadata, FrameMetadata) else "hub.face"
+    def is_frame(self) -> bool:
+        """Whether this is a frame; else it is a face."""
+        return isinstance(self.metadata, FrameMetadata)
+
+    @property
+    def failpoints(self) -> str:
+        """Prefix of the names of its failpoints."""
+        return "hub.frame" if self.is_frame else "hub.face"
 
     def write(self) -> str:
-        """Write the file, whose name is not yet durable, and give its checksum.
-
-        Raises as `write_parts`.
-        """
+        """Write and sync the file, not its folder; give its checksum; raises as `write_parts`."""
         return write_parts(
             self.path, [self.metadata.model_dump_json().encode(), *encode(self.packet)],
-            named=False, direct=True, steps=self.steps)
+            sync_name=False, direct=True, failpoints=self.failpoints)
 
     def discard(self) -> None:
-        """Remove the file; where it resists, it is taken in at the next start."""
+        """Remove the file; one that cannot be removed gets its row at the next start."""
         with suppress(OSError):
             self.path.unlink(missing_ok=True)
 
@@ -109,7 +110,7 @@ def read_frame(path: Path, checksum: str | None = None) -> FrameRecord:
     Raises
     ------
     CorruptFileError, StoreError
-        As `read_parts`; the first also where the contents are whole and no frame.
+        As `read_parts`; CorruptFileError also where the file holds something else.
     """
     packet, metadata, found = _read(path, checksum, FrameMetadata)
     if not isinstance(packet.message, Frame):
@@ -125,14 +126,16 @@ def read_face(path: Path, checksum: str | None = None) -> FaceRecord:
     return FaceRecord(packet.message, packet.arrays, metadata, found)
 
 
-_A = TypeVar("_A", bound=_Metadata)
+_MetadataT = TypeVar("_MetadataT", bound=_Metadata)
 
 
-def _read(path: Path, checksum: str | None, kind: type[_A]) -> tuple[Packet, _A, str]:
+def _read(
+    path: Path, checksum: str | None, kind: type[_MetadataT]
+) -> tuple[Packet, _MetadataT, str]:
     parts, found = read_parts(path, checksum)
     try:
         metadata = kind.model_validate_json(bytes(parts[0]) if parts else b"")
         return decode_kept(parts[1:]), metadata, found
     except (ProtocolError, ValidationError) as error:
-        # Whole, so written by another version.
+        # The checksum is right: another version wrote it.
         raise CorruptFileError(f"{path}: {error}") from error

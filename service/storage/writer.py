@@ -1,7 +1,7 @@
-"""Frames and faces are written beside the hub's loop, which goes on meanwhile.
+"""Writes the files of frames and faces in threads of their own, so that the hub's loop goes on.
 
-What a `Writer` gives back is a file that is safe with its name, or why it is not. The row that
-makes it count is the hub's to write, in its own thread, and so is all that is said of it.
+A `Writer` reports each file as safe under its name, or the error. The hub then writes the row, in
+its own thread.
 """
 
 import threading
@@ -17,13 +17,13 @@ from denseface.service.runtime.closing import Closing
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.files import sync_folder
 from denseface.service.runtime.wake_pipe import WakePipe
-from denseface.service.storage.record_file import store_error
-from denseface.service.storage.records import FrameMetadata, PendingWrite
+from denseface.service.storage._record_file import store_error
+from denseface.service.storage.records import PendingWrite
 
 __all__ = ["InlineWriter", "WriteResult", "Writer", "WriterThreads", "write"]
 
-_BATCH = 8
-"""Most files that one sync of their folder is shared by: the first waits for the last."""
+_MAX_BATCH = 8
+"""Files that share one sync of their folder; the first waits for the last."""
 
 
 @dataclass(frozen=True)
@@ -32,28 +32,28 @@ class WriteResult:
 
     pending: PendingWrite
     checksum: str = ""
-    """Of its file, where there is no error."""
+    """Of the file; empty where there is an error."""
     error: Exception | None = None
-    """A StoreError where the disk refused."""
+    """A StoreError where the disk or file system failed."""
 
 
 class Writer(Protocol):
-    """Writes files; those of one kind in the order in which they came."""
+    """Writes files; those of frames in order, and those of faces."""
 
     def start(self, pending: PendingWrite) -> None:
-        """Begin to write one."""
+        """Begin to write a file."""
 
     def take_results(self) -> list[WriteResult]:
-        """Give what has ended since the last call."""
+        """Give the results since the last call."""
 
     def wait(self) -> None:
-        """Wait until all that was begun has ended."""
+        """Wait until every write has a result."""
 
 
 def write(pending_writes: Sequence[PendingWrite]) -> list[WriteResult]:
-    """Write and sync files, then each of their folders once; nothing stays of a frame that fails.
+    """Write and sync files, then each of their folders once; errors are in the results.
 
-    Whatever is raised is in what is given back.
+    The file of a frame that fails is removed.
     """
     written = [_write(pending) for pending in pending_writes]
     failed = {folder: error for folder in {one.pending.path.parent for one in written
@@ -62,8 +62,8 @@ def write(pending_writes: Sequence[PendingWrite]) -> list[WriteResult]:
         one.pending, one.checksum, failed.get(one.pending.path.parent)) for one in written]
     for one in written:
         if one.error is None:
-            failpoint(f"{one.pending.steps}.named")
-        elif isinstance(one.pending.metadata, FrameMetadata):
+            failpoint(f"{one.pending.failpoints}.named")
+        elif one.pending.is_frame:
             one.pending.discard()
     return written
 
@@ -84,86 +84,85 @@ def _sync(folder: Path) -> StoreError | None:
 
 
 class InlineWriter:
-    """Writes in the thread that asks for it."""
+    """Writes in the caller's thread."""
 
     def __init__(self) -> None:
-        self._done: list[WriteResult] = []
+        self._results: list[WriteResult] = []
 
     def start(self, pending: PendingWrite) -> None:
-        """Write."""
-        self._done += write([pending])
+        """Write the file."""
+        self._results += write([pending])
 
     def take_results(self) -> list[WriteResult]:
-        """Give what was written."""
-        done, self._done = self._done, []
-        return done
+        """Give the results since the last call."""
+        results, self._results = self._results, []
+        return results
 
     def wait(self) -> None:
-        """Do nothing: it has ended."""
+        """Return: every write has its result."""
 
 
 class WriterThreads(Closing):
-    """Writes frames in one thread and faces in another.
+    """Writes frames in one thread and faces in another: a press does not wait for a face.
 
-    A presser waits for a frame, so none waits for a face. What has ended makes `fileno` readable
-    until it is taken.
+    `fileno` is readable while there are results.
     """
 
     def __init__(self) -> None:
         self._wake = WakePipe()
         self._closed = False
         self._changed = threading.Condition()
-        self._begun = 0
-        self._done: list[WriteResult] = []
-        self._frames = _Lane("frames", self._ended)
-        self._faces = _Lane("faces", self._ended)
+        self._unfinished = 0
+        self._results: list[WriteResult] = []
+        self._frames = _WriterThread("frames", self._finished)
+        self._faces = _WriterThread("faces", self._finished)
 
     def fileno(self) -> int:
-        """Give the descriptor that is readable where something has ended."""
+        """Give the descriptor to poll for reading."""
         return self._wake.fileno()
 
     def has_results(self) -> bool:
-        """Whether `take_results` would give anything; `fileno` is readable as long as it would."""
+        """Whether `take_results` would give anything."""
         with self._changed:
-            return bool(self._done)
+            return bool(self._results)
 
     def start(self, pending: PendingWrite) -> None:
-        """Begin to write one."""
+        """Begin to write a file."""
         with self._changed:
-            self._begun += 1
-        (self._frames if isinstance(pending.metadata, FrameMetadata) else self._faces).put(pending)
+            self._unfinished += 1
+        (self._frames if pending.is_frame else self._faces).put(pending)
 
     def take_results(self) -> list[WriteResult]:
-        """Give what has ended since the last call."""
+        """Give the results since the last call."""
         with self._changed:
-            done, self._done = self._done, []
-            if done and not self._closed:
+            results, self._results = self._results, []
+            if results and not self._closed:
                 self._wake.drain()
-        return done
+        return results
 
     def wait(self) -> None:
-        """Wait until all that was begun has ended."""
+        """Wait until every write has a result."""
         with self._changed:
-            self._changed.wait_for(lambda: self._begun == 0)
+            self._changed.wait_for(lambda: self._unfinished == 0)
 
-    def _ended(self, written: list[WriteResult]) -> None:
+    def _finished(self, written: list[WriteResult]) -> None:
         with self._changed:
-            self._begun -= len(written)
-            self._done += written
+            self._unfinished -= len(written)
+            self._results += written
             self._wake.wake()
             self._changed.notify_all()
 
     def close(self) -> None:
-        """Write what was begun and end both threads; `take_results` still gives it."""
-        for lane in (self._frames, self._faces):
-            lane.close()
+        """Finish every write and end both threads; `take_results` still gives the results."""
+        for thread in (self._frames, self._faces):
+            thread.close()
         self._wake.close()
         self._closed = True
 
 
-class _Lane:
-    def __init__(self, name: str, ended: Callable[[list[WriteResult]], None]) -> None:
-        self._ended = ended
+class _WriterThread:
+    def __init__(self, name: str, finished: Callable[[list[WriteResult]], None]) -> None:
+        self._finished = finished
         self._waiting: SimpleQueue[PendingWrite | None] = SimpleQueue()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
@@ -179,8 +178,9 @@ class _Lane:
         while (pending := self._waiting.get()) is not None:
             batch = [pending]
             with suppress(Empty):
-                while len(batch) < _BATCH and (pending := self._waiting.get_nowait()) is not None:
+                while len(batch) < _MAX_BATCH and (
+                        pending := self._waiting.get_nowait()) is not None:
                     batch.append(pending)
-            self._ended(write(batch))
+            self._finished(write(batch))
             if pending is None:
                 return

@@ -5,8 +5,7 @@ from contextlib import closing
 from pathlib import Path
 
 from denseface.service.errors import StoreError
-from denseface.service.storage.folder_layout import FolderLayout
-from denseface.service.storage.records import read_face, read_frame
+from denseface.service.storage import FolderLayout, read_face, read_frame
 from tests.chaos.history import Kept
 
 __all__ = ["read_kept"]

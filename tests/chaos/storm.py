@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from denseface.service.runtime.failpoints import FAILPOINT_NAMES
-from denseface.service.storage.folder_layout import FolderLayout
+from denseface.service.storage import FolderLayout
 from tests.chaos.cluster import Part
 from tests.chaos.scene import Scene
 

@@ -11,7 +11,7 @@ import zmq
 
 from denseface.service.protocol.topics import Topic
 from denseface.service.runtime.failpoints import FAILPOINT_NAMES
-from denseface.service.storage.folder_layout import FolderLayout
+from denseface.service.storage import FolderLayout
 from denseface.service.transport.addresses import publications_of
 from tests.chaos.cluster import Nursery, Part, until
 from tests.chaos.history import Answer, violations
@@ -124,7 +124,7 @@ def test_a_full_disk_refuses_presses_and_keeps_what_was_accepted(scene):
         running.settle()
         assert running.pressers[-1].reasons == []
     check(running, done=6, dead=0)
-    assert not list(FolderLayout(running.cluster.data).half_written())
+    assert not list(FolderLayout(running.cluster.data).temporary_files())
 
 
 def test_spoiled_frames_end_as_dead_letters_and_the_rest_goes_on(scene):

@@ -27,7 +27,7 @@ from denseface.service.protocol.messages import (
 )
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.wire import Packet, decode_from_hub, encode
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage import FolderStore
 from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, service
 from tests.unit.service.faces import small_face, small_frame
 from tests.unit.service.storing import accept, finish

@@ -4,9 +4,7 @@ from collections import deque
 from collections.abc import Callable
 
 from denseface.service.errors import DiskFullError
-from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.records import PendingWrite
-from denseface.service.storage.writer import WriteResult, write
+from denseface.service.storage import FolderStore, PendingWrite, WriteResult, write
 
 __all__ = ["FaultyStore", "KilledError", "StepWriter"]
 

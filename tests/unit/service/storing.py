@@ -4,8 +4,7 @@ from denseface.recon.settings import Settings
 from denseface.service.errors import StoreError
 from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet
-from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.writer import write
+from denseface.service.storage import FolderStore, write
 
 __all__ = ["accept", "finish"]
 

@@ -6,7 +6,7 @@ from denseface.recon.settings import Settings
 from denseface.service.errors import StoreError
 from denseface.service.hub.captures import Captures
 from denseface.service.protocol.states import CaptureEvent, CaptureState, TransitionError
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage import FolderStore
 from tests.unit.service.storage.test_folder_store import frame
 from tests.unit.service.storing import accept
 

@@ -5,7 +5,7 @@ import pytest
 from denseface.recon.settings import Settings
 from denseface.service.hub import Hub
 from denseface.service.protocol.states import CaptureState
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage import FolderStore
 from tests.unit.service.clocks import FakeClock
 from tests.unit.service.hub.test_hub import SETTINGS, Bench
 

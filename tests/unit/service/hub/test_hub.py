@@ -15,7 +15,7 @@ from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage import FolderStore
 from tests.unit.service.faces import small_face, small_frame
 
 SENSOR, CLIENT, WORKER, OTHER = b"sensor", b"client", b"worker", b"other"
@@ -346,7 +346,7 @@ def test_a_result_with_a_bad_face_is_tried_again(bench):
 
 def test_a_damaged_frame_becomes_a_dead_letter(bench, tmp_path):
     bench.accepted("a", "b")
-    bench.store._fresh.pop("a")  # as after a restart
+    bench.store._frame_cache.pop("a")  # as after a restart
     (tmp_path / "data" / "frames" / "a.frame").write_bytes(b"damaged")
     (job,) = bench.worker()
     assert job[1].capture_id == "b"

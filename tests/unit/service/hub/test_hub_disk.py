@@ -6,7 +6,7 @@ from denseface.recon.settings import Settings
 from denseface.service.errors import StoreError
 from denseface.service.hub import Hub
 from denseface.service.protocol import messages
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage import FolderStore
 from tests.unit.service.hub.test_hub import CLIENT, SETTINGS, WORKER, Bench, kinds
 
 

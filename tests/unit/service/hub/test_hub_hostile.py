@@ -24,7 +24,7 @@ from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, decode_from_hub, decode_to_hub, encode
 from denseface.service.security.permissions import ROLES_BY_KIND
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage import FolderStore
 from tests.fuzzing.corpus import Parts, encoded, kinds
 from tests.fuzzing.mutate import mutate
 from tests.unit.service.faulty import StepWriter

@@ -9,7 +9,7 @@ from denseface.service.hub.presses import _MAX_SAVING
 from denseface.service.hub.unsaved_faces import _MAX_UNSAVED
 from denseface.service.protocol import messages
 from denseface.service.protocol.states import CaptureState
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage import FolderStore
 from tests.unit.service.faulty import StepWriter
 from tests.unit.service.hub.test_hub import CLIENT, OTHER, SENSOR, SETTINGS, WORKER, Bench, kinds
 

@@ -9,7 +9,7 @@ from denseface.service.hub import Hub
 from denseface.service.protocol import messages
 from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage import FolderStore
 from tests.unit.service.clocks import FakeClock
 from tests.unit.service.hub.test_hub import (
     CLIENT,

@@ -11,7 +11,7 @@ from denseface.service.protocol.outgoing import Publish
 from denseface.service.protocol.payload import MAX_PREVIEW_SIDE, PreviewHeader
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage import FolderStore
 from tests.unit.service.hub.test_hub import OTHER, SENSOR, SETTINGS, Bench, kinds
 
 IMAGE = {"image": np.zeros((3, 4, 3), np.uint8)}

@@ -9,7 +9,7 @@ from denseface.service.monitoring.message_watch import MessageWatch
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import send, steps
 from denseface.service.protocol.wire import Packet
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage import FolderStore
 from tests.unit.service.faces import small_face
 from tests.unit.service.hub.test_hub import (
     CLIENT,

@@ -18,7 +18,7 @@ from denseface.service.errors import (
 from denseface.service.protocol import messages
 from denseface.service.protocol.wire import decode_from_hub, decode_to_hub
 from denseface.service.security.keys import new_pair, read_pair, read_public
-from denseface.service.storage.record_file import read_parts
+from denseface.service.storage._record_file import read_parts
 from tests.fuzzing.corpus import encoded, kinds, pack, packets, unpack
 from tests.fuzzing.mutate import mutate
 from tests.fuzzing.targets import Cost, UnexpectedError, check
@@ -166,6 +166,6 @@ def test_letters_of_z85_that_are_no_key(tmp_path, half):
 
 
 def test_a_file_larger_than_any_message_is_not_read_whole(tmp_path, monkeypatch):
-    monkeypatch.setattr("denseface.service.storage.record_file._MOST_BYTES", 1000)
+    monkeypatch.setattr("denseface.service.storage._record_file._MAX_BYTES", 1000)
     with pytest.raises(CorruptFileError, match="more than 1000 bytes"):
         read_parts(record_file(tmp_path / "x", bytes(1000)))

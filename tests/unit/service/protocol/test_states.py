@@ -16,7 +16,7 @@ from denseface.service.protocol.states import (
 )
 
 ENDS = {CaptureState.REMOVED, CaptureState.REFUSED}
-READING = {"get", "one", "rows", "ids"}
+READING = {"get", "select", "select_one", "select_ids"}
 """What may be given a state besides `advance`: they change nothing."""
 
 

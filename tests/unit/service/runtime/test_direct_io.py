@@ -7,7 +7,7 @@ import os
 import pytest
 
 from denseface.service.runtime import _direct_io
-from denseface.service.storage.record_file import read_parts, write_parts
+from denseface.service.storage._record_file import read_parts, write_parts
 
 PARTS = [b"header", os.urandom(2**20 + 17), b"", memoryview(os.urandom(3 * 2**20 + 1))]
 

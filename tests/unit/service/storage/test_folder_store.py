@@ -13,10 +13,9 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet
-from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.frame_cache import FrameCache
-from denseface.service.storage.record_file import read_parts, write_parts
-from denseface.service.storage.writer import write
+from denseface.service.storage import FolderStore, write
+from denseface.service.storage._frame_cache import FrameCache
+from denseface.service.storage._record_file import read_parts, write_parts
 from tests.unit.service.faces import small_face, small_frame
 from tests.unit.service.storing import accept, finish
 
@@ -75,14 +74,14 @@ def test_a_row_comes_after_its_file_is_safe(store, monkeypatch):
         steps.append("row")
         return transaction()
 
-    monkeypatch.setattr("denseface.service.storage.record_file.os.fsync", synced)
+    monkeypatch.setattr("denseface.service.runtime.files.os.fsync", synced)
     monkeypatch.setattr(Path, "replace", renamed)
     pending = store.prepare_frame(frame("a"), Settings(), "0f")
     monkeypatch.setattr(store._database, "transaction", begun)
     store.accept(write([pending]), CaptureState.ACCEPTED)
     assert steps == ["file", "a.frame", "folder", "row"]
-    assert store._database.one("PRAGMA synchronous")[0] == 2
-    assert store._database.one("PRAGMA journal_mode")[0] == "wal"
+    assert store._database.select_one("PRAGMA synchronous")[0] == 2
+    assert store._database.select_one("PRAGMA journal_mode")[0] == "wal"
 
 
 def test_outcomes_are_numbered_in_order(store):
@@ -177,7 +176,7 @@ def test_a_full_disk_leaves_nothing_half_written(tmp_path, monkeypatch):
     def full(_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("denseface.service.storage.record_file.os.fsync", full)
+    monkeypatch.setattr("denseface.service.runtime.files.os.fsync", full)
     with pytest.raises(StoreError, match="No space left"):
         write_parts(tmp_path / "x", [b"data"])
     assert list(tmp_path.iterdir()) == []
@@ -185,7 +184,7 @@ def test_a_full_disk_leaves_nothing_half_written(tmp_path, monkeypatch):
 
 def test_frames_are_held_in_memory_as_far_as_there_is_room(store, monkeypatch):
     size = sum(array.nbytes for array in frame("a").arrays.values())
-    monkeypatch.setattr("denseface.service.storage.frame_cache._BYTES", 2 * size)
+    monkeypatch.setattr("denseface.service.storage._frame_cache._MAX_BYTES", 2 * size)
     fresh = FrameCache()
     kept = {}
     for name in "abc":

@@ -15,7 +15,7 @@ from denseface.service.errors import (
     StoreError,
 )
 from denseface.service.protocol.states import CaptureState
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage import FolderStore
 from tests.unit.service.clocks import FakeClock
 from tests.unit.service.storage.test_folder_store import frame, result
 from tests.unit.service.storing import accept, finish
@@ -139,14 +139,14 @@ def test_what_was_kept_is_as_old_after_a_rebuild(data):
         assert store.expired(DAY, 9) == ["done"]
 
 
-def test_a_frame_without_a_row_is_taken_in(data):
+def test_a_frame_without_a_row_gets_its_row(data):
     _forget(data, "waits")
     with FolderStore(data, FakeClock()) as store:
         assert states(store)["waits"] is CaptureState.ACCEPTED
         finish(store, result("waits", store))
 
 
-def test_a_face_without_a_row_is_taken_in(data):
+def test_a_face_without_a_row_gets_its_row(data):
     with sqlite3.connect(data / "captures.sqlite3") as database:
         database.execute("DELETE FROM outcomes WHERE capture_id = 'done'")
         database.execute("UPDATE captures SET state = 'accepted' WHERE capture_id = 'done'")
@@ -176,12 +176,12 @@ def test_a_damaged_face_names_its_capture(data):
             store.outcome_after(0)
         assert caught.value.capture_id == "done"
         assert not face.exists()
-        store.reopen("done", CaptureState.ACCEPTED, attempts_left=True)
+        store.reopen("done", CaptureState.ACCEPTED, reset_attempts=True)
         assert store.outcome_after(0).message.capture_id == "failed"
         assert store.find("done").state is CaptureState.ACCEPTED
 
 
-def test_a_frame_under_another_name_is_not_taken_in(data):
+def test_a_frame_under_another_name_gets_no_row(data):
     (data / "frames" / "waits.frame").rename(data / "frames" / "other.frame")
     with FolderStore(data, FakeClock()) as store:
         assert store.find("other") is None
@@ -233,7 +233,7 @@ def test_a_removal_that_was_cut_short_is_finished(data, monkeypatch):
         raise StoreError("killed")
 
     with FolderStore(data, FakeClock()) as store:
-        monkeypatch.setattr(store._removal, "_finish", killed)
+        monkeypatch.setattr(store._retention, "_erase", killed)
         store.remove(["done", "waits"], CaptureState.REMOVED)
         with pytest.raises(StoreError):
             store.erase(["done", "waits"])
@@ -269,13 +269,14 @@ def test_a_frame_that_cannot_be_kept_leaves_nothing(
         before = sorted((data / "frames").iterdir())
         match step:
             case "write":
-                monkeypatch.setattr("denseface.service.storage.record_file.write_atomically", fails)
+                monkeypatch.setattr(
+                    "denseface.service.storage._record_file.write_atomically", fails)
             case "fsync":
-                monkeypatch.setattr("denseface.service.storage.record_file.os.fsync", fails)
+                monkeypatch.setattr("denseface.service.runtime.files.os.fsync", fails)
             case "rename":
                 monkeypatch.setattr("pathlib.Path.replace", fails)
             case "folder":
-                monkeypatch.setattr("denseface.service.storage.record_file.os.fsync", second_fails)
+                monkeypatch.setattr("denseface.service.runtime.files.os.fsync", second_fails)
         with pytest.raises(kind, match=message):
             accept(store, frame("new"), Settings(), "0f")
         monkeypatch.undo()
@@ -286,8 +287,8 @@ def test_a_frame_that_cannot_be_kept_leaves_nothing(
 
 def test_a_full_database_leaves_no_frame(data):
     with FolderStore(data, FakeClock()) as store:
-        pages = store._database.one("PRAGMA page_count")[0]
-        store._database.one(f"PRAGMA max_page_count = {pages}")
+        pages = store._database.select_one("PRAGMA page_count")[0]
+        store._database.select_one(f"PRAGMA max_page_count = {pages}")
         for number in range(200):
             try:
                 accept(store, frame(f"x{number}"), Settings(), "0f")
@@ -301,14 +302,14 @@ def test_a_full_database_leaves_no_frame(data):
 
 def test_a_purge_makes_room_on_a_full_disk(data, monkeypatch):
     with FolderStore(data, FakeClock()) as store:
-        real = store._removal._mark
+        real = store._retention._mark
 
         def full(*arguments):
             if (data / "ballast").exists():
                 raise DiskFullError("no room on the disk")
             real(*arguments)
 
-        monkeypatch.setattr(store._removal, "_mark", full)
+        monkeypatch.setattr(store._retention, "_mark", full)
         assert (data / "ballast").stat().st_size == 2**20
         store.remove(["waits"], CaptureState.REMOVED)
         store.erase(["waits"])
@@ -321,7 +322,7 @@ def test_damage_while_serving_ends_the_hub(data):
         store._database.truncate_log()
         path = data / "captures.sqlite3"
         path.write_bytes(path.read_bytes()[:4096] + b"\xff" * 40960)
-        store._database.all("PRAGMA shrink_memory")
+        store._database.execute("PRAGMA shrink_memory")
         with pytest.raises(DamagedDatabaseError):
             store.counts()
 

@@ -9,8 +9,7 @@ import pytest
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import DiskFullError
-from denseface.service.storage.folder_store import FolderStore
-from denseface.service.storage.writer import WriterThreads, write
+from denseface.service.storage import FolderStore, WriterThreads, write
 from tests.unit.service.storage.test_folder_store import frame, result
 from tests.unit.service.storing import accept
 
@@ -33,7 +32,7 @@ def synced(monkeypatch):
         steps.append("folder" if stat.S_ISDIR(os.fstat(descriptor).st_mode) else "file")
         sync(descriptor)
 
-    monkeypatch.setattr("denseface.service.storage.record_file.os.fsync", note)
+    monkeypatch.setattr("denseface.service.runtime.files.os.fsync", note)
     return steps
 
 
@@ -76,7 +75,7 @@ def test_a_folder_that_cannot_be_synced_fails_all_of_it(store, monkeypatch):
             raise OSError(28, "No space left on device")
         fsync(descriptor)
 
-    monkeypatch.setattr("denseface.service.storage.record_file.os.fsync", no_folder)
+    monkeypatch.setattr("denseface.service.runtime.files.os.fsync", no_folder)
     assert [type(one.error) for one in write(pending_writes)] == [DiskFullError, DiskFullError]
     assert not list(store._layout.frames.iterdir())
 

@@ -1,4 +1,4 @@
-"""A file thrown overboard when the disk is full: what makes room needs room itself."""
+"""Disk space held back for removals: on a full disk, even a removal needs some."""
 
 import os
 from collections.abc import Callable
@@ -15,13 +15,13 @@ _BYTES = 2**20
 
 
 class DiskReserve:
-    """One MiB, put back as soon as there is room again."""
+    """A file of one MiB that is removed where the disk is full and allocated again later."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
-    def take_in(self) -> None:
-        """Make sure that it is there; without room it is not."""
+    def allocate(self) -> None:
+        """Allocate the file unless it is there; on a full disk, leave it out."""
         with suppress(OSError):
             if self._path.exists() and self._path.stat().st_size == _BYTES:
                 return
@@ -33,14 +33,14 @@ class DiskReserve:
             finally:
                 os.close(descriptor)
 
-    def overboard(self, action: Callable[[], None]) -> None:
-        """Do what makes room, without ballast where there is no room for it."""
+    def spend_on(self, action: Callable[[], None]) -> None:
+        """Run an action that makes room; where the disk is full, once more without the reserve."""
         try:
             action()
         except DiskFullError as error:
-            structlog.get_logger("store").warning("ballast thrown overboard", reason=str(error))
+            structlog.get_logger("store").warning("disk reserve released", reason=str(error))
             with suppress(OSError):
                 self._path.unlink(missing_ok=True)
             action()
         finally:
-            self.take_in()
+            self.allocate()

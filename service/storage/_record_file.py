@@ -1,11 +1,11 @@
-"""Files that are whole or not there: several byte strings under one checksum.
+"""Files of several byte strings, its parts, under one checksum.
 
 Layout: the magic line, the checksum (32 bytes), the index, which is the number of parts (uint32)
 and the length of each (uint64), then the parts. The checksum is the SHA-256 of the index and of the
 CRC-32 of each part (uint32). All numbers are little-endian.
 
-It shall find damage, which takes no cryptography: a CRC-32 misses no one or two wrong bits in a
-part, no run of wrong bits up to 32 long, and anything else once in 2**32. The SHA-256 of the parts
+The checksum finds damage, not forgery. A CRC-32 finds one or two wrong bits in a part and any run
+of wrong bits up to 32 long; it misses other damage once in 2**32. The SHA-256 of the parts
 themselves was a fifth of all that the hub computes for a capture.
 """
 
@@ -21,24 +21,26 @@ from pathlib import Path
 from denseface.service.errors import CorruptFileError, DiskFullError, StoreError, reason_of
 from denseface.service.runtime.files import write_atomically
 
-__all__ = ["naming", "read_parts", "store_error", "write_parts"]
+__all__ = ["read_parts", "store_error", "wrap_os_errors", "write_parts"]
 
 _MAGIC = b"denseface spool 3\n"
 _DIGEST_BYTES = hashlib.sha256().digest_size
-_MOST_BYTES = 128 * 2**20
-"""Of a file that is read: more than any message."""
+_MAX_BYTES = 128 * 2**20
+"""Of a file; larger than any message."""
 
 
 def write_parts(
-    path: Path, parts: Sequence[bytes | memoryview], *, named: bool = True,
-    direct: bool = False, steps: str = "",
+    path: Path, parts: Sequence[bytes | memoryview], *, sync_name: bool = True,
+    direct: bool = False, failpoints: str = "",
 ) -> str:
-    """Write parts durably and give their checksum, hexadecimal; the rest as `write_atomically`.
+    """Write parts durably and give their checksum, hexadecimal.
+
+    Parameters are those of `write_atomically`.
 
     Raises
     ------
     DiskFullError
-        Where there is no room.
+        Where the disk is full.
     StoreError
         Where the file cannot be written for another reason.
     """
@@ -46,8 +48,8 @@ def write_parts(
     digest = _checksum(index, parts)
     try:
         write_atomically(
-            path, [_MAGIC, digest, index, *parts], named=named, direct=direct, mode=0o600,
-            steps=steps)
+            path, [_MAGIC, digest, index, *parts], sync_name=sync_name, direct=direct, mode=0o600,
+            failpoints=failpoints)
     except OSError as error:
         raise store_error(path, error) from error
     return digest.hex()
@@ -59,30 +61,30 @@ def _checksum(index: bytes, parts: Sequence[bytes | memoryview]) -> bytes:
 
 
 def read_parts(path: Path, checksum: str | None = None) -> tuple[list[memoryview], str]:
-    """Read what `write_parts` wrote and give it with its checksum.
+    """Read a file that `write_parts` wrote: its parts and its checksum.
 
     Parameters
     ----------
-    checksum : that it must have; where None, the one that the file itself states
+    checksum : expected; where None, the one that the file states
 
     Raises
     ------
     CorruptFileError
-        Where the file is missing, cannot be read or is not what had the checksum.
+        Where the file is missing, cannot be read or does not have the checksum.
     StoreError
-        Where this process has no means to read anything now.
+        Where this process is out of descriptors or memory.
     """
     try:
         with path.open("rb") as file:
-            # Not more than there is: the memory for it would be fetched anew each time.
-            size = min(os.fstat(file.fileno()).st_size, _MOST_BYTES) + 1
+            # `read` allocates what it is asked for, so it is asked for no more than there is.
+            size = min(os.fstat(file.fileno()).st_size, _MAX_BYTES) + 1
             data = memoryview(file.read(size))
     except OSError as error:
-        passing = error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
-        raise (StoreError if passing else CorruptFileError)(
+        transient = error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
+        raise (StoreError if transient else CorruptFileError)(
             f"{path}: {reason_of(error)}") from error
-    if len(data) > _MOST_BYTES:
-        raise CorruptFileError(f"{path}: has more than {_MOST_BYTES} bytes")
+    if len(data) > _MAX_BYTES:
+        raise CorruptFileError(f"{path}: has more than {_MAX_BYTES} bytes")
     start = len(_MAGIC) + _DIGEST_BYTES
     magic, stated, body = data[:len(_MAGIC)], bytes(data[len(_MAGIC):start]).hex(), data[start:]
     parts = _split(body)
@@ -95,7 +97,7 @@ def read_parts(path: Path, checksum: str | None = None) -> tuple[list[memoryview
 
 
 def _split(data: memoryview) -> list[memoryview] | None:
-    """Give the parts behind their index; None where they do not fill the data exactly."""
+    """Give the parts after their index; None where their lengths do not add up to the data's."""
     try:
         (count,) = struct.unpack_from("<I", data)
         lengths = struct.unpack_from(f"<{count}Q", data, 4)
@@ -122,8 +124,8 @@ def store_error(path: Path, error: OSError) -> StoreError:
 
 
 @contextmanager
-def naming(path: Path) -> Iterator[None]:
-    """Say of what the system refuses within where it was; raises StoreError."""
+def wrap_os_errors(path: Path) -> Iterator[None]:
+    """Raise each OSError within as a StoreError that names `path`."""
     try:
         yield
     except OSError as error:

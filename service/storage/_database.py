@@ -1,4 +1,4 @@
-"""The rows of the data folder: SQLite, checked when it is opened, every error named."""
+"""The SQLite database of the data folder; its errors become those of the service."""
 
 import secrets
 import sqlite3
@@ -13,11 +13,11 @@ from denseface.service.errors import DamagedDatabaseError, DiskFullError, StoreE
 __all__ = ["Database"]
 
 _VERSION = 3
-_ABSURD = 2**53
+"""Version of the schema, in `PRAGMA user_version`."""
+_MAX_SEQUENCE = 2**53
+"""Sequence numbers stay below it; a higher one is damage."""
 _BUSY_S = 1.0
-"""Longest wait for someone who looks into the database with a tool, seconds."""
-
-# The checks let `integrity_check` see a flipped bit in what the hub acts upon.
+"""Longest wait for another program that has the database open, seconds."""
 _SCHEMA = f"""
 CREATE TABLE meta (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
 CREATE TABLE captures (
@@ -45,6 +45,7 @@ CREATE TABLE outcomes (
 ) STRICT;
 PRAGMA user_version = {_VERSION};
 """
+"""By the CHECK clauses, `integrity_check` finds flipped bits in what the hub acts on."""
 
 
 class Database:
@@ -53,7 +54,7 @@ class Database:
     Raises
     ------
     DamagedDatabaseError
-        Where it is malformed, is none, or is of another version.
+        Where it is malformed, no database, or of another version.
     StoreError
         Where it cannot be opened.
     """
@@ -62,11 +63,11 @@ class Database:
         self.path = path
         log = path.with_name(f"{path.name}-wal")
         self.left_open = log.exists() and log.stat().st_size > 0
-        """The last hub was killed: of its last rows, some may be lost."""
-        with self._named():
+        """The last hub was killed: some of its last rows may be lost."""
+        with self._translate_errors():
             self._connection = sqlite3.connect(path, isolation_level=None, timeout=_BUSY_S)
         try:
-            with self._named():
+            with self._translate_errors():
                 self._open()
         except BaseException:
             self._connection.close()
@@ -92,14 +93,14 @@ class Database:
         last, highest = connection.execute(
             "SELECT coalesce((SELECT seq FROM sqlite_sequence WHERE name = 'outcomes'), 0),"
             " coalesce((SELECT max(sequence) FROM outcomes), 0)").fetchone()
-        if not highest <= last < _ABSURD:
+        if not highest <= last < _MAX_SEQUENCE:
             raise DamagedDatabaseError(f"{self.path}: the last number is {last}, found {highest}")
         connection.execute(
             "INSERT OR IGNORE INTO meta VALUES ('epoch', ?)", (secrets.token_hex(8),))
 
     @property
-    def changes(self) -> int:
-        """How many rows were changed since this was opened."""
+    def change_count(self) -> int:
+        """Rows changed since the database was opened."""
         return self._connection.total_changes
 
     def close(self) -> None:
@@ -108,21 +109,21 @@ class Database:
 
     @contextmanager
     def transaction(self, *, synced: bool = True) -> Iterator[sqlite3.Connection]:
-        """All that is done within is durable at the end, or none of it.
+        """Make all statements within durable together, or none of them.
 
-        Without `synced` it outlives this process at once and a power cut from the next
-        transaction on.
+        Without `synced`, they survive a kill of this process at once, and a power cut only after
+        the next transaction that is synced.
 
         Raises
         ------
         DiskFullError
-            Where there is no room.
+            Where the disk is full.
         DamagedDatabaseError
-            Where the database turns out to be malformed.
+            Where the database is malformed.
         StoreError
-            Where it fails otherwise.
+            Where a statement fails otherwise.
         """
-        with self._named(), self._synchronous(synced=synced):
+        with self._translate_errors(), self._sync_mode(synced=synced):
             self._connection.execute("BEGIN IMMEDIATE")
             try:
                 yield self._connection
@@ -134,8 +135,8 @@ class Database:
                 raise
 
     @contextmanager
-    def _synchronous(self, *, synced: bool) -> Iterator[None]:
-        if synced:  # as it was opened
+    def _sync_mode(self, *, synced: bool) -> Iterator[None]:
+        if synced:  # FULL, as set by `_open`
             yield
             return
         self._connection.execute("PRAGMA synchronous=NORMAL")
@@ -144,68 +145,68 @@ class Database:
         finally:
             self._connection.execute("PRAGMA synchronous=FULL")
 
-    def all(
+    def execute(
         self, statement: str, *values: str | float | None, synced: bool = True
     ) -> list[sqlite3.Row]:
-        """Run one statement that changes something, durably, and give its rows."""
+        """Run one statement in a transaction of its own and give its rows."""
         with self.transaction(synced=synced) as connection:
             return connection.execute(statement, values).fetchall()
 
-    def rows(self, statement: str, *values: str | float | None) -> list[sqlite3.Row]:
-        """Run one statement that only reads and give its rows."""
-        with self._named():
+    def select(self, statement: str, *values: str | float | None) -> list[sqlite3.Row]:
+        """Run one query and give its rows."""
+        with self._translate_errors():
             return self._connection.execute(statement, values).fetchall()
 
-    def ids(self, statement: str, *values: str | float | None) -> list[str]:
-        """Run one statement that only reads and give the captures that it names."""
-        return [row["capture_id"] for row in self.rows(statement, *values)]
+    def select_ids(self, statement: str, *values: str | float | None) -> list[str]:
+        """Run one query and give its column `capture_id`."""
+        return [row["capture_id"] for row in self.select(statement, *values)]
 
-    def one(self, statement: str, *values: str | float | None) -> sqlite3.Row | None:
-        """Run one statement that only reads and give its first row."""
-        with self._named():
+    def select_one(self, statement: str, *values: str | float | None) -> sqlite3.Row | None:
+        """Run one query and give its first row, None where there is none."""
+        with self._translate_errors():
             cursor = self._connection.execute(statement, values)
             row: sqlite3.Row | None = cursor.fetchone()
-            cursor.close()  # else it would go on reading an old state
+            cursor.close()  # else its read transaction stays open
         return row
 
     def meta(self, name: str) -> str | None:
-        """Give a value that was set by name."""
-        row = self.one("SELECT value FROM meta WHERE name = ?", name)
+        """Give a value of the table `meta`, None where there is none."""
+        row = self.select_one("SELECT value FROM meta WHERE name = ?", name)
         return row["value"] if row else None
 
     def set_meta(self, name: str, value: str) -> None:
-        """Keep a value by name."""
-        self.all("INSERT INTO meta VALUES (?, ?)"
+        """Set a value of the table `meta`."""
+        self.execute("INSERT INTO meta VALUES (?, ?)"
                  " ON CONFLICT (name) DO UPDATE SET value = excluded.value", name, value)
 
-    def jump(self, numbers: int) -> None:
-        """Leave out sequence numbers."""
+    def skip_sequence_numbers(self, count: int) -> None:
+        """Leave out the next `count` sequence numbers of outcomes."""
         with self.transaction() as connection:
             connection.execute(
                 "INSERT INTO sqlite_sequence SELECT 'outcomes', 0 WHERE NOT EXISTS"
                 " (SELECT * FROM sqlite_sequence WHERE name = 'outcomes')")
             connection.execute(
-                "UPDATE sqlite_sequence SET seq = seq + ? WHERE name = 'outcomes'", (numbers,))
+                "UPDATE sqlite_sequence SET seq = seq + ? WHERE name = 'outcomes'", (count,))
 
     def truncate_log(self) -> None:
-        """Empty the write-ahead log, so that what was deleted is in it no more."""
-        row = self.one("PRAGMA wal_checkpoint(TRUNCATE)")
+        """Empty the write-ahead log, which still holds rows that were deleted."""
+        row = self.select_one("PRAGMA wal_checkpoint(TRUNCATE)")
         if row is None or row[0]:
             structlog.get_logger("store").warning(
                 "the write-ahead log could not be emptied: someone reads the database",
                 file=self.path.name)
 
     @contextmanager
-    def _named(self) -> Iterator[None]:
+    def _translate_errors(self) -> Iterator[None]:
         try:
             yield
         except sqlite3.Error as error:
-            raise _named_error(self.path, error) from error
-        except UnicodeDecodeError as error:  # a name in SQLite's own message is damaged
+            raise _translated(self.path, error) from error
+        except UnicodeDecodeError as error:  # from a damaged name in SQLite's message
             raise DamagedDatabaseError(f"{self.path.name}: malformed") from error
 
 
-def _named_error(path: Path, error: sqlite3.Error) -> StoreError | DamagedDatabaseError:
+def _translated(path: Path, error: sqlite3.Error) -> StoreError | DamagedDatabaseError:
     code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)
     reason = f"{path.name}: {error}"
     if code & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB) or code in (

@@ -1,4 +1,4 @@
-"""One hub at a time has a data folder."""
+"""A lock that one hub at a time has on a data folder."""
 
 import fcntl
 import os
@@ -11,12 +11,12 @@ __all__ = ["check_folder", "lock"]
 
 
 def check_folder(folder: Path) -> None:
-    """Create a data folder, or check that a hub could have it.
+    """Create a data folder, or check that a hub could open it.
 
     Raises
     ------
     SettingsError
-        Where it cannot be had.
+        Where it cannot be created, opened or is another user's.
     HubRunningError
         Where a hub has it open.
     """
@@ -24,7 +24,7 @@ def check_folder(folder: Path) -> None:
 
 
 def lock(path: Path) -> int:
-    """Lock a data folder by its file, for as long as the descriptor that this gives is open.
+    """Lock a data folder by a file in it, until the descriptor returned is closed.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Which file is where in the data folder."""
+"""Names and paths of the files in the data folder."""
 
 import re
 from collections.abc import Iterator
@@ -9,18 +9,18 @@ from denseface.service.runtime.files import private_folder, sync_folder
 
 __all__ = ["FolderLayout"]
 
-_FRAME = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.frame")
-_FACE = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.[0-9a-f]{1,64}\.face")
-_TEMPORARY = re.compile(r"\..*\.tmp")
+_FRAME_NAME = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.frame")
+_FACE_NAME = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.[0-9a-f]{1,64}\.face")
+_TEMPORARY_NAME = re.compile(r"\..*\.tmp")
 
 
 class FolderLayout:
-    """The paths of a data folder; makes the folders that are missing, durably.
+    """The paths of a data folder; creates the folders that are missing, durably.
 
     Raises
     ------
     SettingsError, OSError
-        Where a folder cannot be made or is not this user's.
+        Where a folder cannot be created or is another user's.
     """
 
     def __init__(self, root: Path) -> None:
@@ -29,48 +29,48 @@ class FolderLayout:
         self.quarantine = private_folder(root / "quarantine")
         self.database = root / "captures.sqlite3"
         self.lock = root / "lock"
-        self.ballast = root / "ballast"
+        self.disk_reserve = root / "ballast"
         self.root = root
         sync_folder(root)
-        with suppress(PermissionError):  # to sync it, it must be readable
+        with suppress(PermissionError):  # a folder that cannot be read cannot be synced
             sync_folder(root.absolute().parent)
 
     def frame(self, capture_id: str) -> Path:
-        """Where a capture's frame is."""
+        """Give the path of a capture's frame."""
         return self.frames / f"{capture_id}.frame"
 
     def face(self, capture_id: str, settings_hash: str) -> Path:
-        """Where a capture's face is."""
+        """Give the path of a capture's face."""
         return self.faces / f"{capture_id}.{settings_hash}.face"
 
     def database_files(self) -> list[Path]:
-        """Give the database's files, there or not."""
+        """Give the paths of SQLite's files, which need not exist."""
         return [self.database.with_name(self.database.name + ending)
                 for ending in ("", "-wal", "-shm")]
 
     def all_frames(self) -> Iterator[tuple[str, Path]]:
-        """Give each frame's file with the id of its capture."""
-        return _named(self.frames, _FRAME)
+        """Give capture id and path of each frame."""
+        return _matching(self.frames, _FRAME_NAME)
 
     def all_faces(self) -> Iterator[tuple[str, Path]]:
-        """Give each face's file with the id of its capture."""
-        return _named(self.faces, _FACE)
+        """Give capture id and path of each face."""
+        return _matching(self.faces, _FACE_NAME)
 
-    def half_written(self) -> Iterator[Path]:
-        """Give what a killed hub left behind."""
+    def temporary_files(self) -> Iterator[Path]:
+        """Give half-written files of a hub that was killed."""
         for folder in (self.frames, self.faces, self.quarantine):
-            yield from (path for path in folder.iterdir() if _TEMPORARY.fullmatch(path.name))
+            yield from (path for path in folder.iterdir() if _TEMPORARY_NAME.fullmatch(path.name))
 
-    def unknown(self) -> Iterator[Path]:
-        """Give what is not ours."""
-        ours = {self.frames, self.faces, self.quarantine, self.lock, self.ballast,
+    def unknown_files(self) -> Iterator[Path]:
+        """Give files that the hub did not write."""
+        ours = {self.frames, self.faces, self.quarantine, self.lock, self.disk_reserve,
                 *self.database_files()}
         yield from (path for path in self.root.iterdir() if path not in ours)
-        for folder, name in ((self.frames, _FRAME), (self.faces, _FACE)):
+        for folder, name in ((self.frames, _FRAME_NAME), (self.faces, _FACE_NAME)):
             yield from (path for path in folder.iterdir() if not name.fullmatch(path.name))
 
 
-def _named(folder: Path, name: re.Pattern[str]) -> Iterator[tuple[str, Path]]:
+def _matching(folder: Path, name: re.Pattern[str]) -> Iterator[tuple[str, Path]]:
     for path in sorted(folder.iterdir()):
         if match := name.fullmatch(path.name):
             yield match.group(1), path

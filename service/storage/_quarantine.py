@@ -1,4 +1,4 @@
-"""Where damaged files go: out of the way, with a report beside each, for someone to look at."""
+"""The folder of damaged files, with a report beside each."""
 
 import json
 from collections.abc import Collection
@@ -8,7 +8,7 @@ from pathlib import Path
 import structlog
 
 from denseface.service.runtime.files import private_folder, write_atomically
-from denseface.service.storage.store_clock import StoreClock, stamp
+from denseface.service.storage._store_clock import StoreClock, format_timestamp
 
 __all__ = ["Quarantine"]
 
@@ -16,27 +16,27 @@ __all__ = ["Quarantine"]
 class Quarantine:
     """The folder `quarantine/`: `TIME.NAME` and its report, `TIME.NAME.json`.
 
-    A damaged frame is still a picture of someone: it goes with its capture, or after the
-    retention, like all that is kept.
+    A damaged frame is still a picture of someone: it is removed with its capture, or after the
+    retention.
     """
 
-    def __init__(self, folder: Path, account: StoreClock) -> None:
+    def __init__(self, folder: Path, clock: StoreClock) -> None:
         self._folder = private_folder(folder)
-        self._account = account
+        self._clock = clock
         self._log = structlog.get_logger("store")
 
-    def take(self, path: Path, reason: str, capture_id: str | None = None) -> None:
-        """Move a file here; one that is gone or cannot be moved is reported only."""
+    def add(self, path: Path, reason: str, capture_id: str | None = None) -> None:
+        """Move a file here; where it is gone or cannot be moved, only log it."""
         self._log.error("damaged", file=path.name, capture_id=capture_id, reason=reason)
         if not path.exists():
             return
-        moment = stamp(self._account.wall()).replace(":", "")
+        moment = format_timestamp(self._clock.wall()).replace(":", "")
         moved = self._folder / f"{moment}.{path.name}"
         report = moved.with_name(f"{moved.name}.json")
         try:
             write_atomically(report, [json.dumps({
                 "file": str(path), "capture_id": capture_id, "reason": reason, "found": moment,
-                "age_s": self._account.now()}, indent=2).encode()])
+                "age_s": self._clock.now()}, indent=2).encode()])
             path.replace(moved)
         except OSError as error:
             with suppress(OSError):
@@ -46,21 +46,21 @@ class Quarantine:
             self._log.warning("quarantined", file=path.name, moved_to=str(moved))
 
     def remove(self, capture_ids: Collection[str]) -> None:
-        """Remove what belongs to captures; OSError where a file cannot be removed."""
+        """Remove the files of captures; OSError where one cannot be removed."""
         for report in self._reports():
             if _read(report).get("capture_id") in capture_ids:
                 _remove(report)
 
     def remove_older(self, retention_s: float) -> int:
-        """Remove what is here for longer and give the number; OSError as `remove`."""
-        before = self._account.now() - retention_s
+        """Remove files older than that and give their number; OSError as `remove`."""
+        before = self._clock.now() - retention_s
         old = [report for report in self._reports() if _age_s(report) <= before]
         for report in old:
             _remove(report)
         return len(old)
 
     def clear(self) -> int:
-        """Remove all and give the number; OSError as `remove`."""
+        """Remove all files and give their number; OSError as `remove`."""
         files = [path for path in self._folder.iterdir() if path.is_file()]
         for path in files:
             path.unlink()
@@ -79,7 +79,7 @@ def _read(report: Path) -> dict[str, object]:
 
 
 def _age_s(report: Path) -> float:
-    """Give the age of the store when a file came here; 0, very old, where nobody knows."""
+    """Give the age of the store when a file came here, seconds; 0, the oldest, if unknown."""
     found = _read(report).get("age_s")
     return float(found) if isinstance(found, int | float) else 0.0
 
