@@ -26,7 +26,7 @@ from denseface.service.client.exchanges import (
 )
 from denseface.service.client.follower import TOPICS, Follower
 from denseface.service.errors import ClientClosedError, ClientTimeoutError, ProtocolError
-from denseface.service.protocol.messages import Request, Status
+from denseface.service.protocol.messages import BaseRequest, Status
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, encode
 from denseface.service.transport.connection import receive_packet
@@ -144,7 +144,7 @@ class AsyncClient(BaseClient):
         return subscription.receive()
 
     async def _send_request(
-        self, message: Request, timeout: float, subscription: Subscription | None = None
+        self, message: BaseRequest, timeout: float, subscription: Subscription | None = None
     ) -> Packet:
         """Send until answered; raises as `_send`, and where the hub cannot answer."""
         self._check_open()

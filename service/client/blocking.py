@@ -201,7 +201,8 @@ class Client(Closing, BaseClient):
                 raise ClientTimeoutError("nothing was published in the time allowed")
 
     def _send_request(
-        self, message: messages.Request, timeout: float, subscription: Subscription | None = None
+        self, message: messages.BaseRequest, timeout: float,
+        subscription: Subscription | None = None,
     ) -> Packet:
         """Send until answered; raises as `_send`, and where the hub cannot answer."""
         self._check_open()

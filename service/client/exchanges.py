@@ -49,7 +49,7 @@ _LONGEST_WAIT_S = 20.0
 class SendRequest:
     """Send a request until it is answered; the result is the answer."""
 
-    message: messages.Request
+    message: messages.BaseRequest
     timeout: float
     """Seconds."""
 
@@ -66,7 +66,7 @@ Step = SendRequest | AwaitPublication
 Exchange = Generator[Step, Packet | None, _T]
 
 
-def send_request(message: messages.Request, timeout: float) -> Exchange[Packet]:
+def send_request(message: messages.BaseRequest, timeout: float) -> Exchange[Packet]:
     """Send a request within an exchange, and give the answer; `timeout` in seconds."""
     packet = yield SendRequest(message, timeout)
     if packet is None:

@@ -13,12 +13,12 @@ from denseface.service.client.exchanges import (
 )
 from denseface.service.errors import ClientTimeoutError, LocalProtocolError, RemoteProtocolError
 from denseface.service.protocol.messages import (
+    BaseRequest,
     CaptureFailed,
     FaceDone,
     GetNext,
     GetStatus,
     NothingNewer,
-    Request,
     StartAt,
     Status,
 )
@@ -121,7 +121,7 @@ class Follower:
         self._epoch, self._last, self._behind = epoch, 0, True
         return True
 
-    def _request_until(self, message: Request, until: float) -> Exchange[Packet]:
+    def _request_until(self, message: BaseRequest, until: float) -> Exchange[Packet]:
         while True:
             try:
                 return (yield from send_request(

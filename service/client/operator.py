@@ -82,7 +82,7 @@ class Operator(Client):
 
     def _request_known(
         self, message: messages.RetryDead | messages.DropDead, timeout: float
-    ) -> messages.Message:
+    ) -> messages.BaseMessage:
         answer = self._send_request(message, timeout).message
         if isinstance(answer, messages.CaptureUnknown):
             raise UnknownCaptureError(

@@ -50,7 +50,8 @@ def _new(args: argparse.Namespace, folder: Path) -> None:
 
 
 def _allow(args: argparse.Namespace, folder: Path) -> None:
-    from denseface.service.security.allow_list import Role, allow
+    from denseface.service.protocol.roles import Role
+    from denseface.service.security.allow_list import allow
     from denseface.service.security.keys import read_public
 
     one = allow(folder, args.name, read_public(args.public), frozenset(map(Role, args.roles)))

@@ -174,7 +174,7 @@ class _EventLoop:
             failpoint("hub.outcome.published")
 
 
-def _denied(incoming: Incoming, message: messages.Message, missing: str) -> Output:
+def _denied(incoming: Incoming, message: messages.BaseMessage, missing: str) -> Output:
     """Give the one line that tells a sender which role its key lacks."""
     has = ", ".join(sorted(incoming.sender.roles))
     text = f"refused: {missing}, the key {incoming.sender.name} has {has}"

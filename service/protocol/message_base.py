@@ -1,14 +1,14 @@
 """What messages are made of."""
 
 from datetime import UTC, datetime
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, FailFast, Field
 
 from denseface.service.protocol.payload import Payload
 
-__all__ = ["BaseAnswer", "BaseMessage", "BaseRequest", "CaptureId", "Digest", "Moment", "Name",
-           "Names", "Number", "PeerName", "Seconds", "Text", "Token"]
+__all__ = ["BaseAnswer", "BaseMessage", "BaseRequest", "CaptureId", "Digest", "FromHub", "Moment",
+           "Name", "Names", "Number", "PeerName", "Seconds", "Text", "ToHub", "Token"]
 
 CaptureId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
 """Chosen by whoever pressed; also part of file names, hence no dots and no slashes."""
@@ -41,6 +41,8 @@ class BaseMessage(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     version: Literal[2] = 2
+    if TYPE_CHECKING:  # each kind has its own, behind the fields that it shares with others
+        kind: str
 
     @property
     def payload(self) -> Payload | None:
@@ -48,14 +50,22 @@ class BaseMessage(BaseModel):
         return None
 
 
-class BaseRequest(BaseMessage):
+class ToHub(BaseMessage):
+    """What the hub is told."""
+
+
+class FromHub(BaseMessage):
+    """What the hub says."""
+
+
+class BaseRequest(ToHub):
     """A client asks."""
 
     request: Number
     """Chosen by the client, repeated in the answer."""
 
 
-class BaseAnswer(BaseMessage):
+class BaseAnswer(FromHub):
     """The hub answers."""
 
     request: Number = 0

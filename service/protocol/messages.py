@@ -1,7 +1,8 @@
 """Every message between the processes: who may say what to whom.
 
 Each class is the JSON header of one kind of message; how it is written is in
-`service.protocol.wire`.
+`service.protocol.wire`. A new kind is a class here and a row of `TO_HUB` or `FROM_HUB`; what comes
+of it is a case of `Hub.receive`, and `docs/wire.md` says what it is for.
 """
 
 from typing import Annotated, Literal, Self
@@ -11,9 +12,6 @@ from pydantic import Field, model_validator
 from denseface.recon.settings import Settings
 from denseface.service.protocol.message_base import (
     BaseAnswer,
-    BaseMessage,
-    BaseRequest,
-    CaptureId,
     Digest,
     Moment,
     Name,
@@ -23,28 +21,46 @@ from denseface.service.protocol.message_base import (
     Text,
     Token,
 )
+from denseface.service.protocol.message_base import (
+    BaseMessage as BaseMessage,
+)
+from denseface.service.protocol.message_base import (
+    BaseRequest as BaseRequest,
+)
+from denseface.service.protocol.message_base import (
+    CaptureId as CaptureId,
+)
+from denseface.service.protocol.message_base import (
+    FromHub as FromHub,
+)
+from denseface.service.protocol.message_base import (
+    ToHub as ToHub,
+)
 from denseface.service.protocol.operator_messages import (
-    DeadLetter,
-    DeadLetters,
-    DropDead,
-    ListDead,
-    Purge,
-    Removed,
-    RetryDead,
+    DeadLetter as DeadLetter,
+)
+from denseface.service.protocol.operator_messages import (
+    DeadLetters as DeadLetters,
+)
+from denseface.service.protocol.operator_messages import (
+    DropDead as DropDead,
+)
+from denseface.service.protocol.operator_messages import (
+    ListDead as ListDead,
+)
+from denseface.service.protocol.operator_messages import (
+    Purge as Purge,
+)
+from denseface.service.protocol.operator_messages import (
+    Removed as Removed,
+)
+from denseface.service.protocol.operator_messages import (
+    RetryDead as RetryDead,
 )
 from denseface.service.protocol.payload import FaceHeader, FrameHeader, PreviewHeader
-from denseface.service.protocol.status import Latency, Status
-
-__all__ = [
-    "Announce", "CaptureFailed", "CaptureId", "CapturePending", "CaptureUnknown", "DeadLetter",
-    "DeadLetters", "Denied", "DropDead", "FaceDone", "FindStart", "Frame", "FrameAccepted",
-    "FrameFailed", "FrameRefused", "FromHub", "GetFace", "GetNext", "GetStatus", "Goodbye",
-    "Heartbeat", "Job", "JobFailed", "Latency", "ListDead", "Message", "NothingNewer", "Press",
-    "PressAccepted", "PressReason", "PressRefused", "Preview", "PreviewFrame", "Purge", "Removed",
-    "Request", "RequestFailed", "Result", "RetryDead", "SensorReady", "StartAt", "Status", "Take",
-    "TakePreview", "ToHub", "WorkerReady",
-]
-
+from denseface.service.protocol.roles import Role
+from denseface.service.protocol.status import Latency as Latency
+from denseface.service.protocol.status import Status as Status
 
 PressReason = Literal[
     "no_sensor", "sensor", "sensor_gone", "timeout", "queue", "disk", "purged"]
@@ -201,7 +217,7 @@ class CaptureFailed(_Outcome):
     """Given up after repeated attempts, with the frame kept."""
 
 
-class Preview(_WithPreview):
+class Preview(_WithPreview, FromHub):
     """What the sensor sees: published on topic `preview` and not kept."""
 
     kind: Literal["preview"] = "preview"
@@ -213,7 +229,7 @@ class Preview(_WithPreview):
 
 # --- sensor and worker to hub
 
-class SensorReady(BaseMessage):
+class SensorReady(ToHub):
     """A capture process has its source open."""
 
     kind: Literal["sensor_ready"] = "sensor_ready"
@@ -221,7 +237,7 @@ class SensorReady(BaseMessage):
     source: Text
 
 
-class WorkerReady(BaseMessage):
+class WorkerReady(ToHub):
     """A worker is free for one job."""
 
     kind: Literal["worker_ready"] = "worker_ready"
@@ -230,7 +246,7 @@ class WorkerReady(BaseMessage):
     """One more each time; a repeat of the same one asks for nothing new."""
 
 
-class Heartbeat(BaseMessage):
+class Heartbeat(ToHub):
     """A sensor or worker is alive."""
 
     kind: Literal["heartbeat"] = "heartbeat"
@@ -238,20 +254,20 @@ class Heartbeat(BaseMessage):
     """The job that a worker holds."""
 
 
-class Goodbye(BaseMessage):
+class Goodbye(ToHub):
     """A sensor or worker leaves in order; a job that it did not answer is handed back."""
 
     kind: Literal["goodbye"] = "goodbye"
 
 
-class Frame(_WithFrame):
+class Frame(_WithFrame, ToHub):
     """The frame that was asked for."""
 
     kind: Literal["frame"] = "frame"
     capture_id: CaptureId
 
 
-class FrameFailed(BaseMessage):
+class FrameFailed(ToHub):
     """The sensor has no frame to give."""
 
     kind: Literal["frame_failed"] = "frame_failed"
@@ -259,13 +275,13 @@ class FrameFailed(BaseMessage):
     message: Text
 
 
-class PreviewFrame(_WithPreview):
+class PreviewFrame(_WithPreview, ToHub):
     """The preview that was asked for."""
 
     kind: Literal["preview_frame"] = "preview_frame"
 
 
-class Result(_WithFace):
+class Result(_WithFace, ToHub):
     """A worker's face."""
 
     kind: Literal["result"] = "result"
@@ -275,7 +291,7 @@ class Result(_WithFace):
     """As in the job: another frame may have come under this id meanwhile."""
 
 
-class JobFailed(BaseMessage):
+class JobFailed(ToHub):
     """A worker could not make a face."""
 
     kind: Literal["job_failed"] = "job_failed"
@@ -291,40 +307,40 @@ class JobFailed(BaseMessage):
 
 # --- hub to sensor and worker
 
-class Announce(BaseMessage):
+class Announce(FromHub):
     """The hub does not know you: say that you are ready."""
 
     kind: Literal["announce"] = "announce"
 
 
-class Denied(BaseMessage):
+class Denied(FromHub):
     """Your key has not the role for what you said."""
 
     kind: Literal["denied"] = "denied"
     message: Text
 
 
-class Take(BaseMessage):
+class Take(FromHub):
     """Send the newest frame as this capture."""
 
     kind: Literal["take"] = "take"
     capture_id: CaptureId
 
 
-class TakePreview(BaseMessage):
+class TakePreview(FromHub):
     """Send a preview of what you see, when no frame is to be taken; once."""
 
     kind: Literal["take_preview"] = "take_preview"
 
 
-class FrameAccepted(BaseMessage):
+class FrameAccepted(FromHub):
     """The frame is safe: forget it."""
 
     kind: Literal["frame_accepted"] = "frame_accepted"
     capture_id: CaptureId
 
 
-class FrameRefused(BaseMessage):
+class FrameRefused(FromHub):
     """Nobody waits for this frame, or it cannot be kept: forget it."""
 
     kind: Literal["frame_refused"] = "frame_refused"
@@ -332,7 +348,7 @@ class FrameRefused(BaseMessage):
     message: Text
 
 
-class Job(_WithFrame):
+class Job(_WithFrame, FromHub):
     """Make a face of this frame."""
 
     kind: Literal["job"] = "job"
@@ -344,12 +360,30 @@ class Job(_WithFrame):
     """Of the frame as the hub keeps it."""
 
 
-Request = (Press | GetFace | GetNext | FindStart | GetStatus | ListDead | RetryDead | DropDead
-           | Purge)
-ToHub = (Press | GetFace | GetNext | FindStart | GetStatus | ListDead | RetryDead | DropDead
-         | Purge | SensorReady | WorkerReady | Heartbeat | Goodbye | Frame | FrameFailed
-         | PreviewFrame | Result | JobFailed)
-FromHub = (PressAccepted | PressRefused | CapturePending | CaptureUnknown | RequestFailed
-           | NothingNewer | StartAt | DeadLetters | Removed | FaceDone | CaptureFailed | Status
-           | Preview | Announce | Denied | Take | TakePreview | FrameAccepted | FrameRefused | Job)
-Message = ToHub | FromHub
+TO_HUB: dict[type[ToHub], frozenset[Role]] = {
+    Press: frozenset({Role.PRESSER}),
+    GetFace: frozenset({Role.SUBSCRIBER}),  # also a presser, for what it pressed itself
+    GetNext: frozenset({Role.SUBSCRIBER}),
+    FindStart: frozenset({Role.SUBSCRIBER}),
+    GetStatus: frozenset(Role),
+    ListDead: frozenset({Role.OPERATOR}),
+    RetryDead: frozenset({Role.OPERATOR}),
+    DropDead: frozenset({Role.OPERATOR}),
+    Purge: frozenset({Role.OPERATOR}),
+    SensorReady: frozenset({Role.SENSOR}),
+    WorkerReady: frozenset({Role.WORKER}),
+    Heartbeat: frozenset({Role.SENSOR, Role.WORKER}),
+    Goodbye: frozenset({Role.SENSOR, Role.WORKER}),
+    Frame: frozenset({Role.SENSOR}),
+    FrameFailed: frozenset({Role.SENSOR}),
+    PreviewFrame: frozenset({Role.SENSOR}),
+    Result: frozenset({Role.WORKER}),
+    JobFailed: frozenset({Role.WORKER}),
+}
+"""All that may be said to the hub: kind -> roles, of which a key needs one."""
+
+FROM_HUB: tuple[type[FromHub], ...] = (
+    PressAccepted, PressRefused, CapturePending, CaptureUnknown, RequestFailed, NothingNewer,
+    StartAt, DeadLetters, Removed, FaceDone, CaptureFailed, Status, Preview, Announce, Denied, Take,
+    TakePreview, FrameAccepted, FrameRefused, Job)
+"""All that the hub may say."""

@@ -5,16 +5,17 @@ arrays that the header describes. `encode` and `decode_*` are pure functions;
 `docs/wire.md` says the same in prose.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar, Union
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError
 
 from denseface.service.errors import LocalProtocolError, RemoteProtocolError, first_error
-from denseface.service.protocol.messages import FromHub, Message, ToHub
+from denseface.service.protocol.message_base import BaseMessage, FromHub, ToHub
+from denseface.service.protocol.messages import FROM_HUB, TO_HUB
 from denseface.service.protocol.payload import Arrays
 
 __all__ = ["MAX_HEADER_BYTES", "MAX_HEADER_BYTES_TO_HUB", "MAX_PARTS", "Buffer", "Packet",
@@ -28,15 +29,23 @@ MAX_PARTS = 1 + 16
 Buffer = bytes | memoryview
 """One part of a message."""
 
-_TO_HUB: TypeAdapter[ToHub] = TypeAdapter(Annotated[ToHub, Field(discriminator="kind")])
-_FROM_HUB: TypeAdapter[FromHub] = TypeAdapter(Annotated[FromHub, Field(discriminator="kind")])
+_MessageT = TypeVar("_MessageT", ToHub, FromHub)
+
+
+def _reader(kinds: Iterable[type[_MessageT]]) -> TypeAdapter[_MessageT]:
+    union: Any = Annotated[Union[tuple(kinds)], Field(discriminator="kind")]  # noqa: UP007
+    return TypeAdapter(union)
+
+
+_TO_HUB = _reader(TO_HUB)
+_FROM_HUB = _reader(FROM_HUB)
 
 
 @dataclass(frozen=True)
 class Packet:
     """A message and the arrays that its header announces."""
 
-    message: Message
+    message: BaseMessage
     arrays: Arrays = field(default_factory=dict)
 
 
@@ -97,7 +106,7 @@ def decode_from_hub(parts: Sequence[Buffer]) -> Packet:
 
 
 def _decode(
-    parts: Sequence[Buffer], adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub], most: int
+    parts: Sequence[Buffer], reader: TypeAdapter[_MessageT], most: int
 ) -> Packet:
     if not 1 <= len(parts) <= MAX_PARTS:
         raise RemoteProtocolError(f"message has {len(parts)} parts, 1 to {MAX_PARTS} expected",
@@ -106,7 +115,7 @@ def _decode(
     if len(header) > most:
         raise RemoteProtocolError(
             f"header has {len(header)} bytes, at most {most} allowed", "oversized")
-    message = _header(bytes(header), adapter)
+    message = _header(bytes(header), reader)
     infos = message.payload.arrays if message.payload else ()
     if len(buffers) != len(infos):
         raise RemoteProtocolError(
@@ -121,10 +130,10 @@ def _decode(
         for info, buffer in zip(infos, buffers, strict=True)})
 
 
-def _header(header: bytes, adapter: TypeAdapter[ToHub] | TypeAdapter[FromHub]) -> ToHub | FromHub:
+def _header(header: bytes, reader: TypeAdapter[_MessageT]) -> _MessageT:
     try:
         with np.errstate(all="ignore"):  # absurd calibrations overflow before they are refused
-            message = adapter.validate_json(header)
+            message = reader.validate_json(header)
     except ValidationError as error:
         field, complaint = first_error(error)
         reason = "version" if field.rpartition(".")[2] == "version" else "malformed"

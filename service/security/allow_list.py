@@ -6,7 +6,6 @@ Whatever is wrong with a file keeps its key out, never in.
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from enum import StrEnum
 from hashlib import sha256
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import structlog
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from denseface.service.errors import KeyFileError, first_error, reason_of
+from denseface.service.protocol.roles import Role
 from denseface.service.runtime.files import private_folder, read_private_text
 from denseface.service.runtime.limits import OUT_OF_DESCRIPTORS
 from denseface.service.security.keys import (
@@ -23,19 +23,9 @@ from denseface.service.security.keys import (
     write_key_file,
 )
 
-__all__ = ["AllowList", "AllowedKey", "Role", "allow", "revoke"]
+__all__ = ["AllowList", "AllowedKey", "allow", "revoke"]
 
 _WRITABLE_BY_OTHERS = 0o022
-
-
-class Role(StrEnum):
-    """What a key is for; see the tables of `service.security.permissions`."""
-
-    SENSOR = "sensor"
-    WORKER = "worker"
-    PRESSER = "presser"
-    SUBSCRIBER = "subscriber"
-    OPERATOR = "operator"
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,11 @@ import numpy as np
 
 from denseface.recon.settings import Settings
 from denseface.service.protocol import messages
-from denseface.service.protocol.messages import Message
 from denseface.service.protocol.payload import Arrays, FaceHeader, FrameHeader, Payload
 from denseface.service.protocol.wire import Packet, encode
 from tests.unit.service.faces import small_face, small_frame
 
-__all__ = ["Parts", "encoded", "kinds", "pack", "packets", "unpack"]
+__all__ = ["Parts", "encoded", "pack", "packets", "unpack"]
 
 Parts = list[bytes]
 
@@ -22,17 +21,11 @@ _BY_TYPE: dict[str, Any] = {
     "integer": 1, "number": 0.5, "boolean": False, "array": (), "object": {}, "null": None}
 
 
-def kinds(union: Any) -> tuple[type[Message], ...]:
-    """Give the classes of `ToHub` or `FromHub`."""
-    found: tuple[type[Message], ...] = union.__args__
-    return found
-
-
 def packets() -> Iterator[Packet]:
     """Give messages of every kind there is, made from the fields that the kind declares."""
     frame, _ = FrameHeader.of(small_frame())
     face, _ = FaceHeader.of(small_face())
-    for kind in (*kinds(messages.ToHub), *kinds(messages.FromHub)):
+    for kind in (*messages.TO_HUB, *messages.FROM_HUB):
         given: dict[str, Any] = {"frame": frame, "face": face, "settings": Settings()}
         schema = kind.model_json_schema()
         for name, about in schema["properties"].items():

@@ -17,8 +17,9 @@ from zmq.utils.monitor import parse_monitor_message
 from denseface.service.client import Client
 from denseface.service.protocol import messages
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
+from denseface.service.protocol.roles import Role
 from denseface.service.protocol.wire import Packet, decode_from_hub, encode
-from denseface.service.security.allow_list import Role, allow
+from denseface.service.security.allow_list import allow
 from denseface.service.security.keys import KeyPair, new_pair, read_pair, read_public
 from denseface.service.transport.addresses import publications_of
 from tests.ports import free_port
@@ -52,7 +53,7 @@ class Peer:
         self.monitor = self.socket.get_monitor_socket()
         self.socket.connect(address)
 
-    def send(self, message: messages.Message, arrays=None) -> None:
+    def send(self, message: messages.BaseMessage, arrays=None) -> None:
         self.socket.send_multipart(encode(Packet(message, arrays or {})))
 
     def receive(self, kind: str) -> Packet:
@@ -63,7 +64,7 @@ class Peer:
                 return packet
         raise AssertionError(f"no {kind} came")
 
-    def request(self, message: messages.Request) -> messages.Message:
+    def request(self, message: messages.BaseRequest) -> messages.BaseMessage:
         self.send(message)
         while self.socket.poll(WAIT_MS):
             answer = decode_from_hub(self.socket.recv_multipart()).message

@@ -12,8 +12,9 @@ import zmq
 from denseface.service.client import Operator
 from denseface.service.errors import ClientTimeoutError, KeyRefusedError
 from denseface.service.protocol import messages
+from denseface.service.protocol.roles import Role
 from denseface.service.protocol.wire import Packet, encode
-from denseface.service.security.allow_list import Role, revoke
+from denseface.service.security.allow_list import revoke
 from tests.system.guarded import (
     FACE,
     FACE_ARRAYS,
@@ -157,7 +158,7 @@ def test_the_wrong_role_is_told_so(hub, connect, refused, role, message):
         _foreign(hub, connect)
     peer = connect(*as_role(hub, role))
     peer.send(message)
-    kind = "request_failed" if isinstance(message, messages.Request) else "denied"
+    kind = "request_failed" if isinstance(message, messages.BaseRequest) else "denied"
     said = peer.receive(kind).message.message
     assert said.startswith(f"refused: {message.kind} needs the role ")
     assert said.endswith(f"the key {role} has {role}")

@@ -93,7 +93,7 @@ class FakeHub:
                             self._router.send_multipart([peer, *encode(answer)])
                 self._changed.notify_all()
 
-    def _answers(self, message: messages.Message) -> Iterator[Packet]:
+    def _answers(self, message: messages.BaseMessage) -> Iterator[Packet]:
         request = getattr(message, "request", 0)
         match message:
             case messages.Press(capture_id=capture_id):

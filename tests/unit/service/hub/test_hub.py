@@ -32,16 +32,16 @@ class Bench:
     hub: Hub
     store: FolderStore
     now: float = 100.0
-    published: list[messages.Message] = field(default_factory=list)
+    published: list[messages.BaseMessage] = field(default_factory=list)
 
-    def say(self, peer: bytes, message, arrays=None) -> list[tuple[bytes, messages.Message]]:
+    def say(self, peer: bytes, message, arrays=None) -> list[tuple[bytes, messages.BaseMessage]]:
         return self._sent(self.hub.receive(self.now, peer, Packet(message, arrays or {})))
 
-    def wait(self, seconds: float) -> list[tuple[bytes, messages.Message]]:
+    def wait(self, seconds: float) -> list[tuple[bytes, messages.BaseMessage]]:
         self.now += seconds
         return self._sent(self.hub.tick(self.now))
 
-    def _sent(self, outputs: list[Output]) -> list[tuple[bytes, messages.Message]]:
+    def _sent(self, outputs: list[Output]) -> list[tuple[bytes, messages.BaseMessage]]:
         self.published += [one.packet.message for one in outputs
                            if isinstance(one, Publish) and one.topic is Topic.FACES]
         return [(one.peer, one.packet.message) for one in outputs if isinstance(one, Send)]

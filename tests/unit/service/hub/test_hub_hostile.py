@@ -25,7 +25,7 @@ from denseface.service.protocol.wire import Packet, decode_from_hub, decode_to_h
 from denseface.service.security.permissions import ROLES_BY_KIND
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage import FolderStore
-from tests.fuzzing.corpus import Parts, encoded, kinds
+from tests.fuzzing.corpus import Parts, encoded
 from tests.fuzzing.mutate import mutate
 from tests.unit.service.faulty import StepWriter
 from tests.unit.service.hub.test_hub import FACE, FACE_ARRAYS, FRAME, FRAME_ARRAYS
@@ -178,7 +178,7 @@ def test_nothing_is_raised_and_nothing_accepted_is_lost(store, seed):
 
 def test_every_kind_to_the_hub_is_tried():
     assert {json.loads(parts[0])["kind"] for parts in CORPUS} == {
-        kind.model_fields["kind"].default for kind in kinds(messages.ToHub)}
+        kind.model_fields["kind"].default for kind in messages.TO_HUB}
 
 
 @pytest.mark.parametrize("kind", [messages.SensorReady, messages.WorkerReady])

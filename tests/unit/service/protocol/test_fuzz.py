@@ -19,7 +19,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.wire import decode_from_hub, decode_to_hub
 from denseface.service.security.keys import new_pair, read_pair, read_public
 from denseface.service.storage._record_file import read_parts
-from tests.fuzzing.corpus import encoded, kinds, pack, packets, unpack
+from tests.fuzzing.corpus import encoded, pack, packets, unpack
 from tests.fuzzing.mutate import mutate
 from tests.fuzzing.targets import Cost, UnexpectedError, check
 
@@ -29,7 +29,7 @@ BY_KIND = {json.loads(parts[0])["kind"]: parts for parts in CORPUS}
 
 def test_the_corpus_has_every_kind():
     assert {type(packet.message) for packet in packets()} == {
-        *kinds(messages.ToHub), *kinds(messages.FromHub)}
+        *messages.TO_HUB, *messages.FROM_HUB}
 
 
 @pytest.mark.parametrize("seed", range(4))

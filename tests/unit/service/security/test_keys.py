@@ -8,7 +8,8 @@ import pytest
 
 from denseface.service.cli import main
 from denseface.service.errors import KeyFileError
-from denseface.service.security.allow_list import AllowList, Role, allow, revoke
+from denseface.service.protocol.roles import Role
+from denseface.service.security.allow_list import AllowList, allow, revoke
 from denseface.service.security.keys import KeyPair, new_pair, read_pair, read_public
 
 ROLES = frozenset({Role.WORKER})

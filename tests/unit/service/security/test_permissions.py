@@ -1,6 +1,5 @@
 """Who may say what."""
 
-from typing import get_args
 
 import pytest
 
@@ -8,8 +7,8 @@ from denseface.recon.settings import Settings
 from denseface.service.monitoring import Counters, Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.payload import FrameHeader
+from denseface.service.protocol.roles import Role
 from denseface.service.protocol.topics import Topic
-from denseface.service.security.allow_list import Role
 from denseface.service.security.permissions import (
     ALL_ROLES,
     ROLES_BY_KIND,
@@ -52,7 +51,7 @@ def test_a_role_may_say_this_and_nothing_else(role):
 
 
 def test_every_kind_and_every_topic_has_its_roles():
-    kinds = {one.model_fields["kind"].default for one in get_args(messages.ToHub)}
+    kinds = {one.model_fields["kind"].default for one in messages.TO_HUB}
     assert set(ROLES_BY_KIND) == kinds
     assert set(ROLES_BY_TOPIC) == set(Topic)
     assert all(roles and roles <= ALL_ROLES

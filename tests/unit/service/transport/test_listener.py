@@ -8,8 +8,9 @@ import zmq
 
 from denseface.service.errors import AddressError, KeyFileError
 from denseface.service.monitoring import Counters, Rejections
+from denseface.service.protocol.roles import Role
 from denseface.service.runtime.limits import MemoryWatch
-from denseface.service.security.allow_list import Role, allow, revoke
+from denseface.service.security.allow_list import allow, revoke
 from denseface.service.security.keys import KeyPair, new_pair, read_public
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.connection import Credentials, connect
