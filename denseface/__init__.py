@@ -19,7 +19,7 @@ __all__ = [
     "open_source", "reconstruct", "save_face",
 ]
 
-_HOMES = {
+_MODULES = {
     "AsyncClient": "denseface.service.client",
     "Client": "denseface.service.client",
     "Face": "denseface.recon",
@@ -30,6 +30,7 @@ _HOMES = {
     "reconstruct": "denseface.recon",
     "save_face": "denseface.service.export",
 }
+"""Module of each public name."""
 
 
 def __getattr__(name: str) -> Any:
@@ -37,8 +38,8 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         value: Any = version("denseface")
-    elif name in _HOMES:
-        value = getattr(import_module(_HOMES[name]), name)
+    elif name in _MODULES:
+        value = getattr(import_module(_MODULES[name]), name)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value

@@ -1,4 +1,4 @@
-"""The command `denseface`: one line on stderr where something is wrong, and an exit status.
+"""The command `denseface`: an error is one line on stderr and an exit status.
 
 0 done; 1 the job failed; 2 wrong usage or unreadable input; 130 after Ctrl-C.
 """
@@ -16,6 +16,7 @@ from denseface.service.commands import COMMANDS, load
 __all__ = ["main"]
 
 _FAILED, _USAGE, _CTRL_C, _BROKEN_PIPE, _TERMINATED = 1, 2, 130, 141, 143
+"""Exit statuses; above 128, 128 and the number of the signal, as a shell has it."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -26,12 +27,12 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and give its exit status."""
     args = _parser().parse_args(arguments)
-    signal.signal(signal.SIGTERM, _terminated)
+    signal.signal(signal.SIGTERM, _raise_exit)
     try:
         status: int = load(args.command).run(args)
         sys.stdout.flush()
     except BrokenPipeError:
-        # Whoever read has left; keep Python from saying so again at exit.
+        # The reader closed the pipe; without a place to flush to, Python reports it at exit again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return _BROKEN_PIPE
     except KeyboardInterrupt:
@@ -46,9 +47,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             structlog.get_logger(args.command).critical("ended", reason=line)
         else:
             print(f"denseface {args.command}: {line}", file=sys.stderr)
-        return _status_of(error)
+        return _exit_status(error)
     finally:
-        # What libraries do at the very end (OpenNI2 takes a while) is no place for an exception.
+        # An exception while libraries unload, which takes OpenNI2 a while, would be a traceback.
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
     return status
 
@@ -79,7 +80,7 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def _status_of(error: Exception) -> int:
+def _exit_status(error: Exception) -> int:
     from denseface.capture.errors import CalibrationError, FrameError, UnreadableSourceError
     from denseface.service.errors import (
         FormatError,
@@ -93,5 +94,5 @@ def _status_of(error: Exception) -> int:
     return _USAGE if isinstance(error, wrong_input) else _FAILED
 
 
-def _terminated(number: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001
+def _raise_exit(number: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001
     raise SystemExit(_TERMINATED)

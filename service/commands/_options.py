@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from denseface.service.client import Client, Operator
     from denseface.service.settings import ServiceSettings
 
-__all__ = ["add_address", "add_credentials", "add_hub", "add_keys", "add_listen", "add_log",
+__all__ = ["add_address", "add_credentials", "add_data", "add_keys", "add_listen", "add_log",
            "add_metrics", "add_outputs", "add_recon", "add_retention", "add_source", "client",
            "count", "operator", "recon_settings", "repeated", "seconds", "service_settings",
            "timestamp"]
 
 
 def add_address(parser: argparse.ArgumentParser) -> None:
-    """Where the hub is."""
+    """Add `--address`: where the hub is."""
     parser.add_argument(
         "--address", "--hub", metavar="ADDRESS",
         help="the hub's, ipc://PATH or tcp://HOST:PORT (default: DENSEFACE_ADDRESS, "
@@ -31,7 +31,7 @@ def add_address(parser: argparse.ArgumentParser) -> None:
 
 
 def add_credentials(parser: argparse.ArgumentParser) -> None:
-    """The keys for a hub on another machine."""
+    """Add `--key` and `--hub-key`, for a hub on another machine."""
     parser.add_argument("--key", type=Path, metavar="FILE",
                         help="one's own secret key, for a hub on another machine "
                              "(default: DENSEFACE_KEY)")
@@ -40,7 +40,7 @@ def add_credentials(parser: argparse.ArgumentParser) -> None:
 
 
 def add_listen(parser: argparse.ArgumentParser) -> None:
-    """Where other machines may connect, and which."""
+    """Add `--listen`, `--keys` and `--key`, for other machines to connect."""
     parser.add_argument("--listen", action="append", metavar="tcp://HOST:PORT",
                         help="listen here too, for those with an allowed key; may be repeated "
                              "(default: DENSEFACE_LISTEN)")
@@ -51,41 +51,41 @@ def add_listen(parser: argparse.ArgumentParser) -> None:
 
 
 def add_keys(parser: argparse.ArgumentParser) -> None:
-    """Where keys are kept."""
+    """Add `--keys`: where keys are kept."""
     parser.add_argument("--keys", type=Path, metavar="DIR",
                         help="folder of keys (default: DENSEFACE_KEYS, else denseface/keys in this "
                              "user's configuration)")
 
 
 def add_log(parser: argparse.ArgumentParser) -> None:
-    """How a process logs."""
+    """Add `--log`: how a process logs."""
     parser.add_argument("--log", choices=("text", "json"), default="text",
                         help="form of the log on stderr (default: text)")
 
 
-def add_hub(parser: argparse.ArgumentParser) -> None:
-    """Where frames and faces are kept."""
+def add_data(parser: argparse.ArgumentParser) -> None:
+    """Add `--data`: where frames and faces are kept."""
     parser.add_argument("--data", type=Path, metavar="DIR",
                         help="folder of frames and faces (default: DENSEFACE_DATA, else this "
                              "user's data folder)")
 
 
 def add_retention(parser: argparse.ArgumentParser) -> None:
-    """For how long captures are kept."""
+    """Add `--retention`: for how long captures are kept."""
     parser.add_argument("--retention", metavar="TIME",
                         help="remove captures so long after their outcome: 24h, 90m, 7d, or off "
                              "(default: DENSEFACE_RETENTION, else 24h)")
 
 
 def add_metrics(parser: argparse.ArgumentParser) -> None:
-    """Where metrics are served."""
+    """Add `--metrics`: where metrics are served."""
     parser.add_argument("--metrics", metavar="PORT",
                         help="serve /metrics and /healthz on this loopback port; 0 chooses one and "
                              "logs it (default: DENSEFACE_METRICS, else off)")
 
 
 def add_source(parser: argparse.ArgumentParser) -> None:
-    """Where frames come from."""
+    """Add `--source` and `--calibration`: where frames come from."""
     parser.add_argument("--source", default="openni2:", metavar="URI",
                         help="openni2: for the first sensor, or a .oni or .npz file "
                              "(default: openni2:)")
@@ -94,7 +94,7 @@ def add_source(parser: argparse.ArgumentParser) -> None:
 
 
 def add_outputs(parser: argparse.ArgumentParser, *flags: str) -> None:
-    """What is written of a face; `flags` are those of the cloud or mesh."""
+    """Add `flags`, those of the cloud or mesh, `--report` and `--preview`."""
     *endings, last = FORMATS
     parser.add_argument(*flags, type=Path, metavar="OUT", dest="output",
                         help=f"write the face: {' '.join(endings)} or {last}")
@@ -104,7 +104,7 @@ def add_outputs(parser: argparse.ArgumentParser, *flags: str) -> None:
 
 
 def add_recon(parser: argparse.ArgumentParser) -> None:
-    """How faces are reconstructed."""
+    """Add `--preset` and `--set`: how faces are reconstructed."""
     parser.add_argument("--preset", metavar="NAME", help="paper, faithful or best (default: best)")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE",
                         help="change one setting of the reconstruction; may be repeated")

@@ -15,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         metavar="N", help="reconstruction processes (default: cores less one)")
     _options.add_address(parser)
     _options.add_listen(parser)
-    _options.add_hub(parser)
+    _options.add_data(parser)
     _options.add_retention(parser)
     _options.add_metrics(parser)
     _options.add_recon(parser)

@@ -1,1 +1,1 @@
-"""The processes of the service, one file each; a process imports its own file alone."""
+"""The processes of the service, one file each; no re-exports, for each imports its own alone."""

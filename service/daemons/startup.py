@@ -1,6 +1,8 @@
 """What a process of the service does before anything else."""
 
 import os
+from contextlib import suppress
+from pathlib import Path
 from typing import Literal
 
 from denseface.service.runtime import failpoints
@@ -14,13 +16,15 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 
 
 def start_process(name: str, log_format: Literal["text", "json"]) -> None:
-    """Tie this process to its supervisor, configure its log, arm its failpoints.
+    """Name this process, tie it to its supervisor, configure its log, arm its failpoints.
 
     Parameters
     ----------
     name : of the process, in each line of its log
     log_format : `text` or `json`
     """
+    with suppress(OSError):
+        Path("/proc/self/comm").write_text("denseface")  # what `ps` and `top` show
     die_with_parent()
     configure(log_format, name)
     failpoints.arm(os.environ)

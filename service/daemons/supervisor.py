@@ -68,16 +68,12 @@ def process_table(workers: int, common: Sequence[str], hub: Sequence[str],
 
 
 def check_settings(settings: ServiceSettings) -> None:
-    """Refuse at once, in one line, what the hub would refuse later, among other lines.
+    """Raise at once what the hub would raise later, among other lines of the log.
 
     Raises
     ------
-    AddressError
-        Where the address is not local to this machine, or cannot be bound.
-    KeyFileError
-        Where other machines are to be let in and a key is missing.
-    StoreError, HubRunningError
-        Where the data folder cannot be used.
+    AddressError, KeyFileError, HubRunningError, StoreError
+        Where an address or the data folder cannot be had.
     """
     if not is_local(settings.address):
         raise AddressError(

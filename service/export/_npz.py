@@ -32,13 +32,7 @@ def to_npz(face: Face) -> bytes:
 
 
 def from_npz(path: str | Path) -> Face:
-    """Read a file of `to_npz`.
-
-    Raises
-    ------
-    FormatError
-        Where the file is missing or no such file.
-    """
+    """Read a file of `to_npz`; raises as `load_face`."""
     try:
         with np.load(path, allow_pickle=False) as file:
             of = {name: file[name] for name in _ARRAYS}

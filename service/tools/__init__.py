@@ -1,1 +1,1 @@
-"""Work that needs no hub."""
+"""What the commands do, apart from reading their flags."""

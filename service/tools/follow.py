@@ -10,16 +10,9 @@ __all__ = ["follow"]
 
 
 def follow(outcomes: Iterable[Published], folder: Path | None) -> Iterator[str]:
-    """Save each face as `ID.ply` with its report, `ID.json`; give a line for each outcome.
+    """Give a line for each outcome; save each face as `ID.ply` with its report, `ID.json`.
 
-    Parameters
-    ----------
-    folder : where to save; None saves nothing
-
-    Raises
-    ------
-    StoreError
-        Where a file cannot be written.
+    Nothing is saved where `folder` is None. Raises as `FaceFiles.write`.
     """
     for outcome in outcomes:
         name = f"{outcome.sequence} {outcome.capture_id}"

@@ -9,12 +9,7 @@ __all__ = ["read_frame"]
 
 
 def read_frame(path: str, number: int, calibration: Path | None) -> RgbdFrame:
-    """Read one frame of a `.npz` or `.oni` file.
-
-    Parameters
-    ----------
-    number : of the frame, from 0
-    calibration : a file that wins over the recording's own
+    """Read a frame of a `.npz` or `.oni` file by its number, from 0.
 
     Raises
     ------

@@ -14,11 +14,7 @@ _POLL_S = 0.1
 
 
 def ready_status(client: Client, timeout: float) -> Status:
-    """Wait until hub, a sensor and a worker are ready; give the status then.
-
-    Parameters
-    ----------
-    timeout : seconds
+    """Wait until hub, a sensor and a worker are ready, at most `timeout` seconds.
 
     Raises
     ------
