@@ -129,7 +129,7 @@ class Supervisor:
     def run(self) -> int:
         """Start all, restart what ends, stop all at SIGINT or SIGTERM; give the exit status.
 
-        A process that ends with status 2 was asked for the impossible: all stop, with that status.
+        All stop with status 2 where one ends so: its usage or input is wrong.
         All stop with status 1 where a vital one ends again and again.
         """
         with StopSignal(signal.SIGCHLD) as stop:

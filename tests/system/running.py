@@ -18,8 +18,8 @@ from tests.waiting import until
 REPOSITORY = Path(__file__).resolve().parents[2]
 RECORDINGS = REPOSITORY / "fixtures" / "recorded_oni"
 PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_LIVENESS": "15"}
-"""Quick to say how things are, and as patient as in earnest: a busy machine stops a process for
-longer than three of these heartbeats."""
+"""Short heartbeats, so that a test soon sees a change; a process counts as gone after the default
+3 s, since a busy machine stops one for longer than three of these heartbeats."""
 
 
 def denseface(*arguments: object, **environment: str) -> "subprocess.CompletedProcess[str]":

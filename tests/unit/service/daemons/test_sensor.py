@@ -27,7 +27,7 @@ class Recording:
 
 
 class LiveCamera(Recording):
-    """Goes on for ever, and notes what was thrown away."""
+    """Goes on for ever, and counts how often it was flushed."""
 
     flushed = 0
 
@@ -48,7 +48,7 @@ def opened(monkeypatch, source):
     return reader
 
 
-def test_what_is_seen_of_a_recording_is_what_the_next_press_gives(monkeypatch):
+def test_a_preview_of_a_recording_shows_what_the_next_press_gives(monkeypatch):
     source = Recording()
     reader = opened(monkeypatch, source)
     assert not reader.live
@@ -61,7 +61,7 @@ def test_what_is_seen_of_a_recording_is_what_the_next_press_gives(monkeypatch):
     assert source.closed
 
 
-def test_what_is_wrong_with_a_recording_the_press_hears_too(monkeypatch):
+def test_an_error_of_a_recording_is_raised_for_the_press_too(monkeypatch):
     source = Recording()
     source.frames = []
     reader = opened(monkeypatch, source)
@@ -70,7 +70,7 @@ def test_what_is_wrong_with_a_recording_the_press_hears_too(monkeypatch):
             call()
 
 
-def test_a_press_after_a_look_gets_nothing_from_before_it(monkeypatch):
+def test_a_press_after_a_preview_gets_no_frame_older_than_itself(monkeypatch):
     source = LiveCamera()
     reader = opened(monkeypatch, source)
     assert reader.live

@@ -35,7 +35,7 @@ def test_an_old_restart_is_forgotten():
     assert process.due == 19 * 30 + 2
 
 
-def test_a_child_asked_for_the_impossible_ends_all_with_status_2():
+def test_wrong_usage_of_a_child_ends_all_with_status_2():
     assert Supervisor([ProcessSpec("x", ("no-such-command",))]).run() == 2
 
 
@@ -46,7 +46,7 @@ def test_a_storm_ends_all_with_status_1(monkeypatch):
                        ]).run() == 1
 
 
-def test_whoever_does_not_end_in_time_is_killed(tmp_path, monkeypatch, capsys):
+def test_a_process_that_does_not_end_in_time_is_killed(tmp_path, monkeypatch, capsys):
     stubborn = tmp_path / "stubborn"
     stubborn.write_text("#!/bin/sh\ntrap '' TERM\necho $$ >\"$(dirname \"$0\")/pid\"\n"
                         "while :; do sleep 1; done\n")
@@ -74,7 +74,7 @@ def test_handlers_are_put_back(number):
     assert signal.getsignal(number) is before
 
 
-def test_a_package_of_our_name_where_the_user_stands_is_not_run(tmp_path, monkeypatch):
+def test_a_package_of_our_name_in_the_working_directory_is_not_run(tmp_path, monkeypatch):
     (tmp_path / "denseface").mkdir()
     (tmp_path / "denseface" / "__init__.py").write_text("raise SystemExit('not ours')")
     monkeypatch.chdir(tmp_path)

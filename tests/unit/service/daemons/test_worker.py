@@ -1,4 +1,4 @@
-"""A worker with its next job at hand."""
+"""The worker process, with a further job waiting."""
 
 import threading
 
@@ -107,7 +107,7 @@ def test_answers_wait_for_the_hub_in_order(run):
     assert connection.sent == [("worker_ready", 1), ("result", "a"), ("result", "b")]
 
 
-def test_two_that_end_before_it_looks_are_both_answered(run):
+def test_two_that_end_at_once_are_both_answered(run):
     _, connection = run(job("a"), job("b"), BOTH_DONE)
     assert connection.sent == [("worker_ready", 1), ("worker_ready", 2), ("result", "a"),
                          ("result", "b")]
@@ -120,7 +120,7 @@ def test_told_to_stop_it_answers_what_it_has_begun_and_begins_nothing(run):
     assert not worker._compute
 
 
-def test_told_to_stop_it_ends_the_job_that_began_by_itself_too(run):
+def test_told_to_stop_it_finishes_the_job_that_followed_too(run):
     worker, connection = run(job("a"), job("b"))
     connection.gate.release()
     worker._compute._calls[0].result(20)

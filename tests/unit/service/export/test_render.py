@@ -1,4 +1,4 @@
-"""The picture of a face."""
+"""The rendering of a face."""
 
 import cv2
 import numpy as np

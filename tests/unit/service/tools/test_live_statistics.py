@@ -19,7 +19,7 @@ def succeeded(face=None, **times):
     return LiveFrame(small_frame(), face or small_face(), times)
 
 
-def test_live_statistics_counts_faces_and_named_failures():
+def test_faces_and_named_failures_are_counted():
     statistics = LiveStatistics(SteppingClock(0.5))
     for done in (succeeded(), failed(), succeeded(), failed(NoDepthError("none")), failed()):
         statistics.add(done)
@@ -31,7 +31,7 @@ def test_live_statistics_counts_faces_and_named_failures():
     assert statistics.points() == (len(face.initial), len(face.dense))
 
 
-def test_live_statistics_of_nothing_has_no_figures():
+def test_without_a_frame_there_are_no_figures():
     statistics = LiveStatistics(SteppingClock())
     assert statistics.frames == statistics.faces == statistics.seconds == 0
     assert statistics.rate == statistics.recent_rate == 0

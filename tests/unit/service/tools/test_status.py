@@ -38,7 +38,7 @@ def test_what_is_missing_at_the_end_is_named(last, missing):
         ready_status(Client(last), 0.01)
 
 
-def test_programs_and_people_read_the_same():
+def test_json_and_text_say_the_same():
     shown = status("s")
     said = json.loads(as_json("ipc:///x", shown))
     assert (said["address"], said["ready"], said["sensors"], said["done"]) == (
