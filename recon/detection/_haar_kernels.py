@@ -183,8 +183,8 @@ def _run_stages(
     at : offset of the first window
     scale : (lanes,), of `_set_scales`; windows of 0 get -1
     """
-    weights, thresholds, outcomes, stages, stage_thresholds = trees
-    nodes = len(thresholds) // len(outcomes)
+    stages, stage_thresholds = trees.stages, trees.stage_thresholds
+    nodes = len(trees.thresholds) // len(trees.outcomes)
     # On the stack: the compiler knows that it shares no memory, and vectorises.
     score = stack_floats()
     for k in range(_LANES):
@@ -194,9 +194,9 @@ def _run_stages(
             score[k] = 0
         for tree in range(np.uint64(stages[stage]), np.uint64(stages[stage + 1])):
             if nodes == 1:
-                _add_node(sums, at, offsets, weights, thresholds, outcomes, tree, scale, score)
+                _add_node(sums, at, offsets, trees, tree, scale, score)
             else:
-                _add_nodes(sums, at, offsets, weights, thresholds, outcomes, tree, scale, score)
+                _add_nodes(sums, at, offsets, trees, tree, scale, score)
         left = 0
         for k in range(_LANES):
             if rejected_by[k] == len(stage_thresholds):
@@ -211,11 +211,10 @@ def _run_stages(
 @inlined
 def _add_node(
     sums: NDArray[np.int32], at: np.uint64, offsets: NDArray[np.uint64],
-    weights: NDArray[np.float32], thresholds: NDArray[np.float32],
-    outcomes: NDArray[np.float32], tree: int, scale: NDArray[np.float32],
-    score: NDArray[np.float32],
+    trees: Trees, tree: int, scale: NDArray[np.float32], score: NDArray[np.float32],
 ) -> None:
     """Add what a tree of one node says of each window."""
+    weights, thresholds, outcomes, _, _ = trees
     threshold, below, above = thresholds[tree], outcomes[tree, _0], outcomes[tree, _2]
     if weights[tree, _2] == 0:
         for k in range(_LANES):
@@ -230,11 +229,10 @@ def _add_node(
 @inlined
 def _add_nodes(
     sums: NDArray[np.int32], at: np.uint64, offsets: NDArray[np.uint64],
-    weights: NDArray[np.float32], thresholds: NDArray[np.float32],
-    outcomes: NDArray[np.float32], tree: int, scale: NDArray[np.float32],
-    score: NDArray[np.float32],
+    trees: Trees, tree: int, scale: NDArray[np.float32], score: NDArray[np.float32],
 ) -> None:
     """Add what a tree of two nodes says of each window."""
+    weights, thresholds, outcomes, _, _ = trees
     first, last = _2 * tree, _2 * tree + _1
     first_threshold, last_threshold = thresholds[first], thresholds[last]
     o0, o1, o2, o3 = (

@@ -49,6 +49,6 @@ def test_one_shade_is_spread_to_no_noise(shade):
     assert np.ptp(equalize_contrast(image, ROI, image[IN_ROI].ravel())[IN_ROI]) == 0
 
 
-def test_a_part_smaller_than_a_tile_is_evened(dark_before_bright):
+def test_a_part_smaller_than_a_tile_is_equalized(dark_before_bright):
     after = equalize_contrast(dark_before_bright, (100, 80, 30, 25), NOTHING)
     assert after.shape == dark_before_bright.shape
