@@ -116,7 +116,7 @@ class _EventLoop:
         watched = subscriptions[Topic.PREVIEW] > 0
         if self._listeners.tick():
             self._drop_revoked()
-        self._hub.show(wanted=watched)
+        self._hub.want_previews(wanted=watched)
         outputs = self._hub.tick(now)
         self._observer.record_tick(now, outputs, subscriptions)
         self._send_all(outputs)

@@ -1,8 +1,8 @@
 """The hub without sockets: messages and the time in, messages out.
 
-Nothing here waits, sends or reads a clock, so every order of events can be tested. What is to be
-durable goes through the store before the message that says so is given out. The life of a capture
-is the table in `service.protocol.states`.
+Nothing here waits, sends or reads a clock, so every order of events can be tested. What a message
+says to be safe is in the store before the message is returned. The life of a capture is the table
+in `service.protocol.states`.
 """
 
 import math
@@ -46,20 +46,21 @@ from denseface.service.storage import (
 __all__ = ["Hub"]
 
 _VERSION = version("denseface")
+"""Of this package, as the status says it."""
 
 
 class Hub:
-    """Takes presses, keeps frames, hands out jobs, publishes outcomes.
+    """Takes presses, saves frames, sends jobs, publishes outcomes.
 
     Parameters
     ----------
-    store : what was accepted before is resumed
+    store : captures; what is unfinished in it is resumed
     settings : time-outs and limits
     recon : settings of every job accepted from now on
-    figures : what the status says of this process
+    figures : counts and latencies for the status
     rejections : counts what was refused
-    writer : writes the files; what it has ended is taken at each call
-    opened : since when sensors can reach it, seconds
+    writer : writes the files; each call takes what it has finished
+    opened : when sensors could reach the hub at last, seconds of the clock of `now`
     """
 
     def __init__(
@@ -86,18 +87,18 @@ class Hub:
     def receive(
         self, now: float, peer: bytes, packet: Packet, key: str = ""
     ) -> list[Output]:
-        """Take one message from a peer.
+        """Handle one message and return what to send.
 
         Parameters
         ----------
-        now : seconds, of a clock that only goes forward
-        peer : names the sender's connection
+        now : seconds, of a monotonic clock
+        peer : routing id of the sender's connection
         key : fingerprint of the sender's key; empty where it needed none
 
         Raises
         ------
         DamagedDatabaseError
-            The hub has to end: the next one mends the database.
+            The hub must end; the next one rebuilds the database.
         """
         outputs: list[Output] = []
         try:
@@ -114,23 +115,23 @@ class Hub:
         return outputs
 
     def written(self, now: float, *, wait: bool = False) -> list[Output]:
-        """Say what comes of the files that were written; raises as `receive`.
+        """Give written files their rows and return what to send; raises as `receive`.
 
         Parameters
         ----------
-        all_of_it : wait for those that are being written, and begin no other work
+        wait : until all that is being written has its row; no job is sent then
         """
         outputs: list[Output] = []
         try:
-            outputs.extend(self._settle(now) if wait else self._process_writes(now))
+            outputs.extend(self._finish_writes(now) if wait else self._process_writes(now))
         except DamagedDatabaseError:
             raise
         except ServiceError as error:
-            self._log.error("not kept", reason=str(error))
+            self._log.error("not saved", reason=str(error))
         return outputs
 
     def _process_writes(self, now: float) -> Iterator[Output]:
-        """Do what has become possible."""
+        """Take finished writes and send jobs, until neither brings anything."""
         written = self._writer.take_results()
         while True:
             yield from self._written(now, written)
@@ -145,14 +146,14 @@ class Hub:
         yield from self._jobs.written(
             now, [one for one in written if isinstance(one.pending.metadata, FaceMetadata)])
 
-    def _settle(self, now: float) -> Iterator[Output]:
+    def _finish_writes(self, now: float) -> Iterator[Output]:
         self._writer.wait()
         yield from self._written(now, self._writer.take_results())
 
     def tick(self, now: float) -> list[Output]:
-        """Do what is due: time-outs, silent peers, removals, status.
+        """Handle time-outs, silent peers, removals and the status; raises as `receive`.
 
-        To be called a few times a second; raises as `receive`.
+        To be called a few times a second.
         """
         outputs: list[Output] = []
         try:
@@ -173,17 +174,17 @@ class Hub:
         return outputs
 
     def loop_stalled(self, seconds: float) -> None:
-        """Take note of how late a tick is: the hub was stopped, or waited for its disk.
+        """Give peers the time by which a tick came late: what they said has not been read yet.
 
-        What was said meanwhile has not been heard yet.
+        The process was stopped, or waited for its disk.
         """
-        if seconds < self._settings.heartbeat_s:  # no more than liveness allows for
+        if seconds < self._settings.heartbeat_s:  # less than a silent peer is allowed
             return
         self._log.warning("event loop was stalled", seconds=round(seconds, 1))
         self._peers.postpone_timeouts(seconds)
 
     def unreachable(self, peer: bytes, reason: str = "unreachable") -> list[Output]:
-        """Take note that a message to a peer could not be delivered, nor could the next."""
+        """Remove a peer that cannot be reached any more."""
         return list(self._disconnected(peer, reason))
 
     def pressed_by(self, capture_id: str) -> str | None:
@@ -191,16 +192,16 @@ class Hub:
         try:
             stored = self._store.find(capture_id)
         except StoreError as error:
-            self._log.error("who pressed cannot be read", reason=str(error))
+            self._log.error("presser not read", reason=str(error))
             return None
         return stored.pressed_by if stored else None
 
-    def show(self, *, wanted: bool) -> None:
-        """Take note of whether somebody looks at the previews; they are asked for at each tick."""
+    def want_previews(self, *, wanted: bool) -> None:
+        """Say whether anybody subscribes to previews: then each tick may ask the sensor for one."""
         self._previews.wanted = wanted
 
     def peers(self) -> list[bytes]:
-        """Give the sensors and workers that are known."""
+        """Return the routing ids of all sensors and workers."""
         return [*self._peers.sensors, *self._peers.workers]
 
     def _receive(
@@ -218,7 +219,7 @@ class Hub:
             case messages.ListDead() | messages.RetryDead() | messages.DropDead() as message:
                 yield from self._maintenance.receive(peer, message)
             case messages.Purge() as message:
-                yield from self._settle(now)  # so that nothing of it appears afterwards
+                yield from self._finish_writes(now)  # no file of it appears afterwards
                 yield from self._maintenance.receive(peer, message)
             case messages.GetStatus(request=request):
                 yield send(peer, self._status(request))
@@ -248,7 +249,6 @@ class Hub:
                 yield from self._jobs.failed(peer, message)
 
     def _requeue_damaged(self, error: DamagedFaceError, kept_before: bool) -> None:
-        # One that is damaged as soon as it is written has used up an attempt.
         self._jobs.requeue_damaged(error.capture_id, str(error), reset_attempts=kept_before)
 
     def _has_room(self, kind: Literal["sensor", "worker"], peer: bytes, name: str) -> bool:

@@ -1,4 +1,4 @@
-"""The hub's second half: a kept frame becomes an outcome, whatever happens to the workers."""
+"""From a saved frame to an outcome, whatever happens to the workers."""
 
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -23,8 +23,9 @@ from denseface.service.storage import CaptureRow, WriteResult
 __all__ = ["Jobs"]
 
 _LOST = ("WorkerLost", "the worker that held it went away")
+"""Error and reason of a job whose worker is gone."""
 _RETRY_S = 1.0
-"""Time until what the disk refused is tried again, seconds."""
+"""Time after which the disk is tried again that refused something, seconds."""
 
 
 class Jobs:
@@ -33,7 +34,7 @@ class Jobs:
     def __init__(
         self, common: Common, publish: Callable[[str], Iterator[Output]], rejections: Rejections
     ) -> None:
-        """Take up what the store has unfinished; `publish` announces an outcome."""
+        """Queue what the store has unfinished; `publish` publishes a capture's outcome."""
         self._store = common.store
         self._captures = common.captures
         self._peers = common.peers
@@ -42,6 +43,7 @@ class Jobs:
         self._rejections = rejections
         self._queue = deque(common.store.unfinished())
         self._last_errors: dict[str, tuple[str, str]] = {}
+        """Error and reason of the last attempt that failed, for a dead letter."""
         self._unsaved_faces = UnsavedFaces(common.store, common.writer)
         self._paused_until = 0.0
         self._log = structlog.get_logger("hub")
@@ -59,12 +61,12 @@ class Jobs:
         return sum(len(worker.jobs) for worker in self._peers.workers.values())
 
     def add(self, capture_id: str) -> None:
-        """Queue a frame that was just kept."""
+        """Queue a capture that is ACCEPTED."""
         if capture_id not in self._queue:
             self._queue.append(capture_id)
 
     def forget(self, capture_ids: Collection[str]) -> None:
-        """Drop captures that were removed, from workers' hands too."""
+        """Drop captures that were removed, from the workers' jobs too."""
         self._queue = deque(one for one in self._queue if one not in capture_ids)
         for capture_id in capture_ids:
             self._last_errors.pop(capture_id, None)
@@ -73,7 +75,7 @@ class Jobs:
             worker.jobs = [one for one in worker.jobs if one not in capture_ids]
 
     def requeue_damaged(self, capture_id: str, reason: str, *, reset_attempts: bool = True) -> None:
-        """Take up a capture again whose face turned out to be damaged."""
+        """Have a damaged face made again; without `attempts_left`, attempts made go on counting."""
         with self._captures.transition(CaptureEvent.DAMAGED, capture_id) as state:
             self._store.reopen(capture_id, state, reset_attempts=reset_attempts)
         self._last_errors[capture_id] = "CorruptFileError", reason
@@ -81,9 +83,9 @@ class Jobs:
         self._log.warning("face to be made again", capture_id=capture_id, reason=reason)
 
     def dispatch(self, now: float) -> Iterator[Output]:
-        """Give frames to free workers, oldest first; give up what has no attempt left.
+        """Send frames to free workers, oldest first; give up what has no attempt left.
 
-        While the disk refuses what is to be kept, or many faces wait for it, nothing new is begun.
+        While the disk refuses writes, or many faces wait for it, no job is sent.
         """
         if now < self._paused_until:
             return
@@ -96,7 +98,7 @@ class Jobs:
     def _pause(self, now: float, reason: str) -> None:
         self._paused_until = now + _RETRY_S
         self._log.error(
-            "the disk refuses, work waits", reason=reason, unsaved=len(self._unsaved_faces))
+            "disk refuses writes, jobs wait", reason=reason, unsaved=len(self._unsaved_faces))
 
     def _dispatch(self, now: float) -> Iterator[Output]:
         while self._queue:
@@ -106,14 +108,14 @@ class Jobs:
                 self._queue.popleft()
             elif stored.attempts >= self._attempts:
                 yield from self._give_up(capture_id, *self._last_errors.get(capture_id, _LOST))
-            # What may have ended a worker is tried alone: no other frame is lost or blamed with it.
+            # A frame that may have killed a worker is tried alone: no other is lost with it.
             elif worker := self._peers.free_worker(alone=stored.attempts > 0):
                 yield from self._send_job(now, capture_id, stored, worker)
             else:
                 return
 
     def result(self, peer: bytes, message: messages.Result, packet: Packet) -> None:
-        """Begin to keep a face, unless this capture has one; `written` says what comes of it."""
+        """Begin to save a face, unless this capture has one; `written` is told what came of it."""
         failpoint("hub.result.received")
         if self._take_answer(peer, message, CaptureEvent.RESULT):
             try:
@@ -125,14 +127,14 @@ class Jobs:
                 self._captures.advance(message.capture_id, CaptureEvent.RESULT)
 
     def written(self, now: float, faces: Sequence[WriteResult]) -> Iterator[Output]:
-        """Announce faces that are safe, in order; those that the disk refused wait."""
-        # All of them have their rows before the first is announced.
+        """Give faces their rows, in order, and publish them; those that the disk refused wait."""
+        # All rows first: an error raised below loses none.
         for one, error in list(self._captures.save(CaptureEvent.FACE_SAVED, faces)):
             capture_id = one.pending.capture_id
             if error is None:
                 self._unsaved_faces.drop(capture_id)
                 self._log.info("done", capture_id=capture_id)
-                yield from self._announce(capture_id)
+                yield from self._publish_safely(capture_id)
                 continue
             if isinstance(error, StoreError):
                 self._pause(now, str(error))
@@ -142,14 +144,14 @@ class Jobs:
             if not isinstance(error, ServiceError):
                 raise error
 
-    def _announce(self, capture_id: str) -> Iterator[Output]:
+    def _publish_safely(self, capture_id: str) -> Iterator[Output]:
         try:
             yield from self._publish(capture_id)
-        except StoreError as error:  # subscribers will see the gap and ask for it
-            self._log.error("not announced", capture_id=capture_id, reason=str(error))
+        except StoreError as error:  # subscribers see the gap and ask for it
+            self._log.error("not published", capture_id=capture_id, reason=str(error))
 
     def failed(self, peer: bytes, message: messages.JobFailed) -> Iterator[Output]:
-        """Announce "no face", or try again."""
+        """Publish "no face", or try again."""
         event = CaptureEvent.REJECTED if message.final else CaptureEvent.LOST
         if not self._take_answer(peer, message, event):
             return
@@ -167,26 +169,23 @@ class Jobs:
             yield from self._publish(capture_id)
 
     def worker_lost(self, worker: WorkerPeer) -> None:
-        """Take back what a worker held that went away.
-
-        It was working on the first: the others were not begun.
-        """
+        """Queue again what a worker held that is gone; only its first job counts as an attempt."""
         self._hand_back(worker, worker.jobs[1:])
         while worker.jobs:
             self._take_back(worker.jobs.pop(), *_LOST)
 
     def worker_stopped(self, worker: WorkerPeer) -> None:
-        """Take back what a worker held that was told to stop."""
+        """Queue again what a worker held that was told to stop; none counts as an attempt."""
         self._hand_back(worker, list(worker.jobs))
 
     def _hand_back(self, worker: WorkerPeer, capture_ids: Sequence[str]) -> None:
-        """Put jobs back in the queue; as an attempt it does not count."""
+        """Queue jobs again; they count as no attempt."""
         for capture_id in reversed(capture_ids):
             worker.jobs.remove(capture_id)
             try:
                 self._store.undo_attempt(capture_id)
             except StoreError as error:
-                self._log.warning("attempt not taken back", reason=str(error))
+                self._log.warning("attempt still counted", reason=str(error))
             self._take_back(capture_id, "HandedBack", "the worker that held it was stopped",
                             CaptureEvent.HANDED_BACK)
 
@@ -223,7 +222,7 @@ class Jobs:
     def _take_back(
         self, capture_id: str, error: str, reason: str, event: CaptureEvent = CaptureEvent.LOST
     ) -> None:
-        """Put a capture back in the queue that a worker holds no more, unless another does."""
+        """Queue a capture again that left a worker's jobs, unless another worker has it too."""
         if self._holder(capture_id) is None:
             with suppress(StoreError):
                 if self._captures.allows(capture_id, event):
@@ -231,9 +230,9 @@ class Jobs:
         self._requeue(capture_id, error, reason)
 
     def _requeue(self, capture_id: str, error: str, reason: str) -> None:
-        """Put a capture back in the queue that no worker holds and that waits for a face.
+        """Put a capture at the head of the queue that waits for a face and is with no worker.
 
-        Where the store cannot be read it is put back, and `dispatch` looks again.
+        Where the store cannot be read it is queued as well: `dispatch` checks again.
         """
         with suppress(StoreError):
             if (self._captures.state(capture_id) is not CaptureState.ACCEPTED
@@ -248,7 +247,7 @@ class Jobs:
     def _take_answer(
         self, peer: bytes, answer: messages.Result | messages.JobFailed, event: CaptureEvent
     ) -> bool:
-        """Say whether an answer is of use; whoever held the job holds it no more."""
+        """Take an answered job from its worker and say whether the answer is expected."""
         capture_id = answer.capture_id
         useful = self._is_expected(answer, event)
         worker = self._peers.workers.get(peer)

@@ -1,4 +1,4 @@
-"""What is kept for how long, and what an operator does about it."""
+"""Retention, dead letters, purges."""
 
 from collections.abc import Iterator, Sequence
 
@@ -17,16 +17,17 @@ from denseface.service.protocol.states import CaptureEvent, CaptureState
 __all__ = ["Maintenance"]
 
 _BATCH = 20
-"""Captures removed at once: more would keep the hub from its peers for too long."""
+"""Captures removed in one go: more would stall the event loop."""
 _PAGE = 50
+"""Dead letters in one answer, as `DeadLetters.letters` allows."""
 _SWEEP_S = 600.0
-"""Longest time between two looks for what is too old, seconds."""
+"""Longest time between two sweeps for what is too old, seconds."""
 
 _Request = messages.ListDead | messages.RetryDead | messages.DropDead | messages.Purge
 
 
 class Maintenance:
-    """Retention, dead letters, purges."""
+    """Removes what is too old, and does what an operator asks for."""
 
     def __init__(
         self, common: Common, presses: Presses, jobs: Jobs, outcomes: Outcomes, counters: Counters
@@ -65,7 +66,7 @@ class Maintenance:
             self._due = now
 
     def receive(self, peer: bytes, message: _Request) -> Iterator[Output]:
-        """Do what an operator asks for."""
+        """Answer an operator."""
         match message:
             case messages.ListDead(request=request, after=after):
                 yield send(peer, messages.DeadLetters(
@@ -87,7 +88,7 @@ class Maintenance:
         elif not self._captures.allows(capture_id, CaptureEvent.RETRIED):
             yield _no_dead_letter(peer, message, stored.state)
         else:
-            self._store.frame(capture_id)  # without it, the dead letter stays as it is
+            self._store.frame(capture_id)  # StoreError where it is damaged: the dead letter stays
             with self._captures.transition(CaptureEvent.RETRIED, capture_id) as state:
                 self._store.reopen(capture_id, state, reset_attempts=True)
             self._jobs.add(capture_id)

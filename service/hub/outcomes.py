@@ -1,4 +1,4 @@
-"""The hub's last part: outcomes are published, and given to whoever asks."""
+"""Outcomes are published, and sent to whoever asks for them."""
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
@@ -13,8 +13,9 @@ from denseface.service.storage import FolderStore
 __all__ = ["Outcomes"]
 
 _MAX_WAITERS = 1000
+"""Requests that may wait for an outcome; beyond, they are answered at once."""
 _MAX_WAITERS_PER_CLIENT = 100
-"""So that nobody takes all the places."""
+"""As `_MAX_WAITERS`, of one client."""
 
 
 @dataclass(frozen=True)
@@ -24,15 +25,17 @@ class _Waiter:
 
 
 class Outcomes:
-    """What ended, and who waits for what has not."""
+    """Outcomes, and the requests that wait for one."""
 
     def __init__(
         self, store: FolderStore, requeue_damaged: Callable[[DamagedFaceError, bool], None]
     ) -> None:
-        """Publish and give; `requeue_damaged` has a damaged face made again.
+        """Read outcomes from a store.
 
-        It is told True where the face was kept before, False where it is damaged as soon as it was
-        written.
+        Parameters
+        ----------
+        requeue_damaged : has a damaged face made again; its flag is False where the face was
+            damaged as soon as it was written, which counts as an attempt
         """
         self._store = store
         self._requeue_damaged = requeue_damaged
@@ -40,7 +43,7 @@ class Outcomes:
         """By client and request."""
 
     def publish(self, capture_id: str) -> Iterator[Output]:
-        """Publish the outcome of a capture and answer those who wait for it."""
+        """Publish the outcome of a capture and answer the requests that wait for it."""
         try:
             packet = self._store.outcome(capture_id)
         except DamagedFaceError as error:
@@ -56,7 +59,7 @@ class Outcomes:
         return len(self._waiters) < _MAX_WAITERS and own < _MAX_WAITERS_PER_CLIENT
 
     def removed(self, capture_ids: Collection[str]) -> Iterator[Output]:
-        """Answer those who wait for captures that are gone."""
+        """Answer the requests that wait for captures that were removed."""
         for peer, request, capture_id in self._take_waiters(capture_ids):
             yield send(peer, messages.CaptureUnknown(request=request, capture_id=capture_id))
 
@@ -68,7 +71,7 @@ class Outcomes:
         return waiting
 
     def get_face(self, now: float, peer: bytes, message: messages.GetFace) -> Iterator[Output]:
-        """Give an outcome, or note that someone waits for it."""
+        """Send an outcome, or let the request wait for it."""
         capture_id, request = message.capture_id, message.request
         try:
             packet = self._store.outcome(capture_id)
@@ -87,7 +90,7 @@ class Outcomes:
             yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
 
     def get_next(self, peer: bytes, message: messages.GetNext) -> Iterator[Output]:
-        """Give the first outcome after a sequence number that is whole."""
+        """Send the first undamaged outcome after a sequence number."""
         if packet := self._next(message.after):
             yield _answer(peer, message.request, packet)
         else:
@@ -103,7 +106,7 @@ class Outcomes:
                 self._requeue_damaged(error, True)
 
     def find_start(self, peer: bytes, message: messages.FindStart) -> Iterator[Output]:
-        """Give the number after which the outcomes come that are asked for."""
+        """Send the sequence number before the first outcome that is asked for."""
         if message.since is not None:
             sequence = self._store.sequence_before_time(message.since)
         else:
@@ -112,7 +115,7 @@ class Outcomes:
             request=message.request, epoch=self._store.epoch, sequence=sequence))
 
     def tick(self, now: float) -> Iterator[Output]:
-        """Answer those who waited long enough."""
+        """Answer the requests whose wait is over."""
         for peer, request in [key for key, one in self._waiters.items() if now >= one.deadline]:
             waiter = self._waiters.pop((peer, request))
             yield send(peer, messages.CapturePending(

@@ -1,4 +1,4 @@
-"""The hub's first half: a press becomes a frame that is safe on the disk, or is refused."""
+"""From a press to a frame that is safe on the disk, or to a refusal."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -21,9 +21,9 @@ __all__ = ["Presses", "settings_hash"]
 
 _MIB = 2**20
 _MAX_REFUSALS = 1000
+"""Refusals that are remembered for a repeat of their request."""
 _MAX_SAVING = 32
-"""Frames that may wait for the disk, which are in memory meanwhile; beyond it a press is refused.
-"""
+"""Frames in memory that are being written; beyond, presses are refused."""
 
 
 def settings_hash(settings: Settings) -> str:
@@ -33,7 +33,7 @@ def settings_hash(settings: Settings) -> str:
 
 @dataclass
 class _Press:
-    """A press whose frame is not yet on the disk, so it is lost with the hub."""
+    """A capture whose frame is not yet on the disk."""
 
     sensor: bytes
     deadline: float
@@ -42,18 +42,22 @@ class _Press:
     pressers: dict[bytes, int] = field(default_factory=dict)
     """The last request of each client that pressed this id."""
     frame_sender: bytes | None = None
-    """The sensor whose frame is being written; None where none came."""
+    """The sensor whose frame is being written; None before it came."""
 
 
 class Presses:
-    """Presses that wait for their frame, or for their frame to be safe."""
+    """Captures whose frame is awaited or being written."""
 
     def __init__(
         self, common: Common, recon: Settings, accepted: Callable[[str], None], sensors_due: float
     ) -> None:
-        """Take presses; `accepted` is told of each frame that is safe.
+        """Take presses.
 
-        Until the time `sensors_due`, sensors may not have had time to say that they are there.
+        Parameters
+        ----------
+        recon : settings of their jobs
+        accepted : called with each capture whose frame is safe
+        sensors_due : until then a missing sensor may just not have connected yet, seconds
         """
         self._store = common.store
         self._captures = common.captures
@@ -79,7 +83,7 @@ class Presses:
         """Ask a sensor for a frame, unless this id is known already."""
         capture_id, request = message.capture_id, message.request
         if refused := self._refused.get((peer, capture_id, request)):
-            # A repeat that was under way when the client had its answer: it has told its user.
+            # A repeat that crossed its answer: the client has told its user already.
             yield send(peer, refused)
             return
         if press := self._presses.get(capture_id):
@@ -120,7 +124,7 @@ class Presses:
         return None
 
     def frame(self, peer: bytes, message: messages.Frame, packet: Packet) -> Iterator[Output]:
-        """Begin to save a frame; what comes of it is said by `written`."""
+        """Begin to save a frame; `written` is told what came of it."""
         failpoint("hub.frame.received")
         capture_id = message.capture_id
         state = self._captures.state(capture_id)
@@ -141,7 +145,7 @@ class Presses:
         self._writer.start(pending)
 
     def written(self, frames: Sequence[WriteResult]) -> Iterator[Output]:
-        """Say that frames are safe, or not: to the sensor and to all who pressed."""
+        """Give frames their rows, and answer their sensors and all who pressed."""
         for one, error in self._captures.save(CaptureEvent.FRAME_SAVED, frames):
             if error is None:
                 yield from self._saved(one.pending.capture_id)
@@ -175,7 +179,7 @@ class Presses:
         self, capture_id: str, reason: messages.PressReason, why: str,
         event: CaptureEvent = CaptureEvent.REFUSED,
     ) -> Iterator[Output]:
-        """Tell all who pressed that there is no capture."""
+        """End a press without a capture and tell all who pressed."""
         if press := self._presses.pop(capture_id, None):
             self._captures.advance(capture_id, event)
             self._log.warning("press refused", capture_id=capture_id, reason=why)
@@ -188,20 +192,20 @@ class Presses:
         return send(peer, refused)
 
     def purge(self, capture_id: str | None) -> Iterator[Output]:
-        """Refuse one press, or all where None, whose frame is no longer wanted."""
+        """Refuse one press whose frame is awaited, or all where None."""
         for waiting in [capture_id] if capture_id else list(self._presses):
             yield from self._refuse(
                 waiting, "purged", "purged by an operator", CaptureEvent.PURGED)
 
     def sensor_gone(self, peer: bytes, reason: str) -> Iterator[Output]:
-        """Refuse what a sensor that went away was asked for."""
+        """Refuse the presses that a sensor was asked for."""
         for capture_id in [key for key, press in self._presses.items()
                            if press.sensor == peer and press.frame_sender is None]:
             yield from self._refuse(
                 capture_id, "sensor_gone", f"the sensor went away ({reason})")
 
     def tick(self, now: float) -> Iterator[Output]:
-        """Refuse what took too long."""
+        """Refuse presses whose frame is late."""
         late = [key for key, press in self._presses.items()
                 if now >= press.deadline and press.frame_sender is None]
         for capture_id in late:

@@ -1,7 +1,7 @@
-"""Previews: small pictures of what the sensor sees, while somebody looks.
+"""Previews: small pictures of what the sensor sees, while anybody subscribes.
 
-The hub asks for one at a time and no sooner than the last one came, so that a preview never waits
-in a queue; a press goes first. Nothing of it is kept.
+The hub asks for the next one when the last has come, so that none waits in a queue; a press goes
+first. None is stored.
 """
 
 import secrets
@@ -24,7 +24,7 @@ class Previews:
 
     Parameters
     ----------
-    patience_s : time after which one that did not come is asked for again, seconds
+    timeout_s : after which a preview that did not come is asked for again, seconds
     """
 
     def __init__(self, peers: Peers, timeout_s: float) -> None:
@@ -33,13 +33,13 @@ class Previews:
         self._epoch = secrets.token_hex(8)
         self._sequence = 0
         self._asked: bytes | None = None
-        """The sensor that owes one."""
+        """The sensor that was asked and has not sent one."""
         self._asked_at = float("-inf")
         self.wanted = False
-        """Somebody looks."""
+        """Anybody subscribes."""
 
     def ask(self, now: float, *, busy: bool) -> Iterator[Output]:
-        """Ask for one where it is time to; not while a press waits for its frame."""
+        """Ask for a preview where one is due; not while a press waits (`busy`)."""
         sensor = self._peers.sensor()
         pause = PREVIEW_PERIOD_S if self._asked is None else self._timeout_s
         if not self.wanted or busy or sensor is None or now - self._asked_at < pause:
@@ -50,7 +50,7 @@ class Previews:
     def receive(
         self, peer: bytes, message: messages.PreviewFrame, packet: Packet
     ) -> Iterator[Output]:
-        """Publish one that was asked for."""
+        """Publish a preview that was asked for."""
         if peer != self._asked:
             return
         self._asked = None

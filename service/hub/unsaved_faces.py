@@ -1,4 +1,4 @@
-"""Faces that came and are not yet safe: being written, or refused by the disk."""
+"""Faces in memory that are not safe: being written, or refused by the disk."""
 
 from denseface.service.errors import StoreError
 from denseface.service.protocol.wire import Packet
@@ -24,13 +24,13 @@ class UnsavedFaces:
         return len(self._pending)
 
     def save(self, result: Packet) -> None:
-        """Begin to write a face; StoreError where it is of no use."""
+        """Begin to write a face; StoreError where its capture waits for none."""
         pending = self._store.prepare_face(result)
         self._pending[pending.capture_id] = pending
         self._writer.start(pending)
 
     def retry_refused(self) -> bool:
-        """Begin anew to write what the disk refused; True where there is room for more faces.
+        """Write again what the disk refused; True where there is room for more faces.
 
         Raises
         ------

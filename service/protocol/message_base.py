@@ -1,4 +1,4 @@
-"""What messages are made of."""
+"""What the messages of `service.protocol.messages` are made of."""
 
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -14,15 +14,21 @@ CaptureId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
 """Chosen by whoever pressed; also part of file names, hence no dots and no slashes."""
 
 Name = Annotated[str, Field(max_length=200)]
+"""Of an error, a sensor or a stage; also a time where it is only shown."""
 PeerName = Annotated[str, Field(pattern=r"^[!-~]{1,100}$")]
 """Of a sensor or worker: a machine's name and a process's number."""
 Names = Annotated[tuple[Name, ...], FailFast()]
-"""One complaint is enough: each of a hundred thousand would cost a thousand bytes of memory."""
+"""Validation stops at the first error: each of 100,000 would cost a thousand bytes of memory."""
 Text = Annotated[str, Field(max_length=4000)]
+"""Of a person or an error message."""
 Token = Annotated[str, Field(pattern=r"^[0-9a-f]{1,64}$")]
+"""Hexadecimal name of settings or of a store."""
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+"""SHA-256, hexadecimal."""
 Number = Annotated[int, Field(ge=0, lt=2**63)]
+"""A count or a number in a sequence; SQLite and other languages have it in 64 bits."""
 Seconds = Annotated[float, Field(ge=0, le=3600)]
+"""How long a request may wait."""
 
 
 def _utc(moment: datetime) -> datetime:
@@ -33,40 +39,41 @@ def _utc(moment: datetime) -> datetime:
 
 
 Moment = Annotated[AwareDatetime, AfterValidator(_utc)]
+"""A time with a zone, kept in UTC."""
 
 
 class BaseMessage(BaseModel):
-    """What all have in common."""
+    """What all messages have in common."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     version: Literal[2] = 2
-    if TYPE_CHECKING:  # each kind has its own, behind the fields that it shares with others
+    if TYPE_CHECKING:  # a field of each kind, behind those that it inherits
         kind: str
 
     @property
     def payload(self) -> Payload | None:
-        """What says which arrays follow this header."""
+        """The part of this header that describes the arrays behind it."""
         return None
 
 
 class ToHub(BaseMessage):
-    """What the hub is told."""
+    """A message that the hub receives."""
 
 
 class FromHub(BaseMessage):
-    """What the hub says."""
+    """A message that the hub sends."""
 
 
 class BaseRequest(ToHub):
-    """A client asks."""
+    """A client's request."""
 
     request: Number
     """Chosen by the client, repeated in the answer."""
 
 
 class BaseAnswer(FromHub):
-    """The hub answers."""
+    """The hub's answer."""
 
     request: Number = 0
     """The request answered; 0 where nobody asked: a publication."""

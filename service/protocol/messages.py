@@ -64,7 +64,7 @@ from denseface.service.protocol.status import Status as Status
 
 PressReason = Literal[
     "no_sensor", "sensor", "sensor_gone", "timeout", "queue", "disk", "purged"]
-"""Why there is no capture: also what the metrics count by."""
+"""Why there is no capture; a label of the metric of refused presses."""
 
 
 class _WithFrame(BaseMessage):
@@ -116,11 +116,11 @@ class GetNext(BaseRequest):
 
 
 class FindStart(BaseRequest):
-    """Say after which number to start, to be given what is asked for here."""
+    """Give the sequence number after which the outcomes come that are asked for."""
 
     kind: Literal["find_start"] = "find_start"
     last: Annotated[int, Field(ge=1, lt=2**31)] | None = None
-    """The last so many outcomes that are kept."""
+    """The last so many outcomes."""
     since: Moment | None = None
     """Outcomes of this time or later."""
 
@@ -132,7 +132,7 @@ class FindStart(BaseRequest):
 
 
 class GetStatus(BaseRequest):
-    """Say who is there and what was done."""
+    """Give the status."""
 
     kind: Literal["get_status"] = "get_status"
 
@@ -190,14 +190,14 @@ class StartAt(BaseAnswer):
     kind: Literal["start_at"] = "start_at"
     epoch: Token
     sequence: Number
-    """What is asked for comes after this number."""
+    """The number before the first outcome asked for."""
 
 
 class _Outcome(BaseAnswer):
     epoch: Token
-    """The store that counts `sequence`; another one after the data folder was replaced."""
+    """Names the store that numbers outcomes; another one after the data folder was replaced."""
     sequence: Number
-    """Number of this outcome; one that is missing was removed or withdrawn."""
+    """Number of this outcome; a number that is missing was removed or withdrawn."""
     capture_id: CaptureId
 
 
@@ -214,17 +214,17 @@ class CaptureFailed(_Outcome):
     error: Name
     message: Text
     dead: bool
-    """Given up after repeated attempts, with the frame kept."""
+    """Given up after repeated attempts; the frame is kept."""
 
 
 class Preview(_WithPreview, FromHub):
-    """What the sensor sees: published on topic `preview` and not kept."""
+    """What the sensor sees: published on topic `preview` and not stored."""
 
     kind: Literal["preview"] = "preview"
     epoch: Token
-    """The hub's process that counts `sequence`."""
+    """Names the hub's process, which numbers previews."""
     sequence: Number
-    """A number that is missing was not delivered, and cannot be asked for."""
+    """A number that is missing was not delivered and cannot be asked for."""
 
 
 # --- sensor and worker to hub
@@ -255,7 +255,7 @@ class Heartbeat(ToHub):
 
 
 class Goodbye(ToHub):
-    """A sensor or worker leaves in order; a job that it did not answer is handed back."""
+    """A sensor or worker disconnects; a job that it did not answer is handed back."""
 
     kind: Literal["goodbye"] = "goodbye"
 
@@ -308,13 +308,13 @@ class JobFailed(ToHub):
 # --- hub to sensor and worker
 
 class Announce(FromHub):
-    """The hub does not know you: say that you are ready."""
+    """The hub does not know the peer, which is to say that it is ready."""
 
     kind: Literal["announce"] = "announce"
 
 
 class Denied(FromHub):
-    """Your key has not the role for what you said."""
+    """The key has not the role for the message, which was no request."""
 
     kind: Literal["denied"] = "denied"
     message: Text
@@ -328,20 +328,20 @@ class Take(FromHub):
 
 
 class TakePreview(FromHub):
-    """Send a preview of what you see, when no frame is to be taken; once."""
+    """Send one preview, when no frame is to be taken."""
 
     kind: Literal["take_preview"] = "take_preview"
 
 
 class FrameAccepted(FromHub):
-    """The frame is safe: forget it."""
+    """The frame is safe: the sensor may forget it."""
 
     kind: Literal["frame_accepted"] = "frame_accepted"
     capture_id: CaptureId
 
 
 class FrameRefused(FromHub):
-    """Nobody waits for this frame, or it cannot be kept: forget it."""
+    """Nobody waits for this frame, or it cannot be saved: the sensor may forget it."""
 
     kind: Literal["frame_refused"] = "frame_refused"
     capture_id: CaptureId
@@ -357,7 +357,7 @@ class Job(_WithFrame, FromHub):
     settings: Settings
     settings_hash: Token
     frame_sha256: Digest
-    """Of the frame as the hub keeps it."""
+    """Of the frame's file: the answer repeats it."""
 
 
 TO_HUB: dict[type[ToHub], frozenset[Role]] = {
@@ -380,10 +380,10 @@ TO_HUB: dict[type[ToHub], frozenset[Role]] = {
     Result: frozenset({Role.WORKER}),
     JobFailed: frozenset({Role.WORKER}),
 }
-"""All that may be said to the hub: kind -> roles, of which a key needs one."""
+"""Every message to the hub and the roles of which a key needs one to send it."""
 
 FROM_HUB: tuple[type[FromHub], ...] = (
     PressAccepted, PressRefused, CapturePending, CaptureUnknown, RequestFailed, NothingNewer,
     StartAt, DeadLetters, Removed, FaceDone, CaptureFailed, Status, Preview, Announce, Denied, Take,
     TakePreview, FrameAccepted, FrameRefused, Job)
-"""All that the hub may say."""
+"""Every message that the hub sends."""

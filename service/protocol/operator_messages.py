@@ -1,4 +1,4 @@
-"""What an operator says to the hub, and is told; part of `service.protocol.messages`."""
+"""Messages of an operator and their answers; part of `service.protocol.messages`."""
 
 from typing import Annotated, Literal, Self
 
@@ -63,7 +63,7 @@ class DeadLetter(BaseModel):
     capture_id: CaptureId
     error: Name
     message: Annotated[str, Field(max_length=300)]
-    """The beginning of it."""
+    """Its first characters."""
     attempts: Number
     accepted_at: Name
     """UTC, ISO 8601."""
@@ -85,4 +85,4 @@ class Removed(BaseAnswer):
     removed: Number
     """Captures removed now."""
     left: bool
-    """There are more that were asked for."""
+    """More are to be removed: repeat the request."""

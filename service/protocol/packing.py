@@ -1,8 +1,8 @@
 """A dense cloud in a third of its bytes.
 
-What follows from the rest is left out: x and y from a point's place on the grid, a normal's length
-and its side. Normals are kept to 0.003 degrees and `sigma` to 0.05 %, far finer than either is
-known; points, colours and places as they are.
+Left out is what follows from the rest: x and y, which a point's cell gives, and a normal's length
+and z. Normals keep 0.003 degrees and `sigma` 0.05 %, far finer than either is known; points,
+colours and cells are exact.
 """
 
 from dataclasses import dataclass
@@ -15,20 +15,20 @@ from denseface.recon.face import DenseCloud
 __all__ = ["PackedCloud", "pack", "unpack", "warm_packing"]
 
 _UNIT = 32767
-"""What stands for a normal's component of 1."""
+"""Stands for 1 in a normal's component."""
 _SIGMA_MM = 1e-4, 65e3
-"""What a float16 holds with all its digits."""
+"""Least and greatest sigma, mm: the range of a normalised float16."""
 
 
 @dataclass(frozen=True, eq=False)
 class PackedCloud:
-    """A `DenseCloud` as it is sent and kept.
+    """A `DenseCloud` as it is sent and stored; depth camera frame.
 
     Attributes
     ----------
     support : (rows, ceil(columns / 8)) uint8, one bit for each place on the grid, the highest
-        first: 1 where there is a point. Points are in this order.
-    x, y : (columns,), (rows,) float32, mm; of a column or row without points any number
+        first: 1 where there is a point. Points are in this order, row by row.
+    x, y : (columns,), (rows,) float32, mm; any number in a column or row without points
     z : (n,) float32, mm
     colors : (n, 3) uint8, RGB
     normals : (n, 2) int16, x and y of the unit normal, times 32767; z is negative
@@ -56,7 +56,7 @@ class PackedCloud:
         for name in ("x", "y", "z"):
             if not np.isfinite(getattr(self, name)).all():
                 raise ValueError(f"{name} must be finite")
-        bits = self.sigma.view(np.uint16)  # in the order of the numbers, infinity above them all
+        bits = self.sigma.view(np.uint16)  # ordered like the numbers, infinity above them
         if len(bits) and not 0 < bits.min() <= bits.max() < _INFINITE:
             raise ValueError("sigma must be positive and finite")
         beyond = -self.grid_shape[1] % 8
@@ -68,6 +68,7 @@ class PackedCloud:
 
 
 _INFINITE = int(np.array(np.inf, np.float16).view(np.uint16))
+"""The bits of infinity as a float16."""
 
 
 def pack(cloud: DenseCloud) -> PackedCloud:
@@ -79,7 +80,7 @@ def pack(cloud: DenseCloud) -> PackedCloud:
         Where a point is not at its place on a grid, they are not sorted, a normal points away from
         the camera, or sigma is beyond what 16 bits hold in full (0.0001 to 65,000 mm).
     """
-    # numba takes most of a second: who unpacks shall not wait
+    # Importing numba takes most of a second, which a reader of faces need not wait for.
     from denseface.service.protocol import _packing_kernels
 
     rows, columns = cloud.grid_shape
@@ -91,39 +92,39 @@ def pack(cloud: DenseCloud) -> PackedCloud:
     least, most = _SIGMA_MM
     if len(cloud) and not least <= cloud.sigma.min() <= cloud.sigma.max() <= most:
         raise ValueError(f"sigma must be within {least} and {most:.0f} mm")
-    sigma = _packing_kernels.halved(cloud.sigma.view(np.uint32)).view(np.float16)
+    sigma = _packing_kernels.to_float16_bits(cloud.sigma.view(np.uint32)).view(np.float16)
     return PackedCloud(support, x, y, z, cloud.colors, normals, sigma,
                        (int(rows), int(columns)), float(cloud.grid_step_mm))
 
 
 def unpack(packed: PackedCloud) -> DenseCloud:
-    """Give the cloud back, its normals of unit length again."""
+    """Restore a cloud, its normals of unit length again."""
     rows, columns = packed.grid_shape
     n = len(packed.z)
-    on = np.unpackbits(packed.support, axis=1, count=columns).view(np.bool_)
-    each = np.bitwise_count(packed.support).sum(axis=1, dtype=np.intp)
+    occupied = np.unpackbits(packed.support, axis=1, count=columns).view(np.bool_)
+    points_per_row = np.bitwise_count(packed.support).sum(axis=1, dtype=np.intp)
     cells = np.empty((n, 2), np.int32)
-    cells[:, 0] = np.repeat(np.arange(rows, dtype=np.int32), each)
-    cells[:, 1] = np.broadcast_to(np.arange(columns, dtype=np.int32), on.shape)[on]
+    cells[:, 0] = np.repeat(np.arange(rows, dtype=np.int32), points_per_row)
+    cells[:, 1] = np.broadcast_to(np.arange(columns, dtype=np.int32), occupied.shape)[occupied]
     points = np.empty((n, 3), np.float32)
-    points[:, 0] = np.broadcast_to(packed.x, on.shape)[on]
-    points[:, 1] = np.repeat(packed.y, each)
+    points[:, 0] = np.broadcast_to(packed.x, occupied.shape)[occupied]
+    points[:, 1] = np.repeat(packed.y, points_per_row)
     points[:, 2] = packed.z
-    across = packed.normals * np.float32(1 / _UNIT)
-    rest = 1 - across[:, 0] ** 2 - across[:, 1] ** 2
-    beyond = rest < 0  # rounded up, at right angles to the view
-    if beyond.any():
-        across[beyond] /= np.sqrt(1 - rest[beyond])[:, None]
-        rest[beyond] = 0
+    tilts = packed.normals * np.float32(1 / _UNIT)
+    squared_z = 1 - tilts[:, 0] ** 2 - tilts[:, 1] ** 2
+    too_long = squared_z < 0  # x and y were rounded up
+    if too_long.any():
+        tilts[too_long] /= np.sqrt(1 - squared_z[too_long])[:, None]
+        squared_z[too_long] = 0
     normals = np.empty((n, 3), np.float32)
-    normals[:, :2] = across
-    normals[:, 2] = -np.sqrt(rest)
+    normals[:, :2] = tilts
+    normals[:, 2] = -np.sqrt(squared_z)
     return DenseCloud(points, packed.colors, normals, packed.sigma.astype(np.float32), cells,
                       packed.grid_shape, packed.grid_step_mm)
 
 
 def warm_packing() -> None:
-    """Load or compile what `pack` runs, which the first face would otherwise wait for."""
+    """Load or compile the kernels of `pack`, for which the first face would wait otherwise."""
     one = np.zeros(1, np.float32)
     pack(DenseCloud(
         np.zeros((1, 3), np.float32), np.zeros((1, 3), np.uint8),

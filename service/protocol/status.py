@@ -1,4 +1,4 @@
-"""The message that says how the service is."""
+"""The status of the service; part of `service.protocol.messages`."""
 
 from typing import Annotated, Literal
 
@@ -25,8 +25,8 @@ class Latency(BaseModel):
 class Status(BaseAnswer):
     """Published on topic `status` at every heartbeat.
 
-    The one message that may gain fields within a version: fields that a reader does not know, it
-    passes over; what is missing from an older hub has its default.
+    The one message that may gain fields within a version: a reader ignores fields that it does not
+    know, and those that an older hub does not send have their default.
     """
 
     model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)

@@ -1,8 +1,8 @@
 """How a message is written on the wire.
 
 A message is a list of buffers: a JSON header (one of `service.protocol.messages`), then the raw
-arrays that the header describes. `encode` and `decode_*` are pure functions;
-`docs/wire.md` says the same in prose.
+arrays that the header describes. `encode` and `decode_*` are pure functions; `docs/wire.md`
+describes the format.
 """
 
 from collections.abc import Iterable, Sequence
@@ -19,12 +19,15 @@ from denseface.service.protocol.messages import FROM_HUB, TO_HUB
 from denseface.service.protocol.payload import Arrays
 
 __all__ = ["MAX_HEADER_BYTES", "MAX_HEADER_BYTES_TO_HUB", "MAX_PARTS", "Buffer", "Packet",
-           "decode_from_hub", "decode_kept", "decode_to_hub", "encode"]
+           "decode_from_hub", "decode_stored", "decode_to_hub", "encode"]
 
 MAX_HEADER_BYTES = 256 * 1024
+"""Longest header, from the hub or stored, bytes."""
 MAX_HEADER_BYTES_TO_HUB = 64 * 1024
-"""A quarter: what the hub takes it must be able to write, and `1e15` is written with 18 bytes."""
+"""Longest header to the hub, bytes. A quarter, as the hub may write a number longer: `1e15` with 18
+bytes."""
 MAX_PARTS = 1 + 16
+"""Header and arrays of one message."""
 
 Buffer = bytes | memoryview
 """One part of a message."""
@@ -43,7 +46,7 @@ _FROM_HUB = _reader(FROM_HUB)
 
 @dataclass(frozen=True)
 class Packet:
-    """A message and the arrays that its header announces."""
+    """A message and the arrays that its header describes."""
 
     message: BaseMessage
     arrays: Arrays = field(default_factory=dict)
@@ -55,7 +58,7 @@ def encode(packet: Packet) -> list[Buffer]:
     Raises
     ------
     LocalProtocolError
-        Where the arrays are not those that the header states, or the header is too long.
+        Where the arrays are not those that the header describes, or the header is too long.
     """
     message, arrays = packet.message, packet.arrays
     header = message.model_dump_json().encode()
@@ -90,13 +93,13 @@ def decode_to_hub(parts: Sequence[Buffer]) -> Packet:
     Raises
     ------
     RemoteProtocolError
-        Where a limit, a field, a dtype, a shape or a size is not as it must be.
+        Where a limit is exceeded, or a field, dtype, shape or size is wrong.
     """
     return _decode(parts, _TO_HUB, MAX_HEADER_BYTES_TO_HUB)
 
 
-def decode_kept(parts: Sequence[Buffer]) -> Packet:
-    """Read again what `encode` wrote of a message that the hub received; as `decode_to_hub`."""
+def decode_stored(parts: Sequence[Buffer]) -> Packet:
+    """Read a message to the hub that was stored; otherwise as `decode_to_hub`."""
     return _decode(parts, _TO_HUB, MAX_HEADER_BYTES)
 
 
@@ -145,5 +148,5 @@ def _header(header: bytes, reader: TypeAdapter[_MessageT]) -> _MessageT:
 
 
 def _printable(text: str) -> str:
-    """Escape what could forge a line of a log or command a terminal."""
+    """Escape line breaks and control characters, for logs and terminals."""
     return "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from denseface.service.errors import CorruptFileError, ProtocolError
 from denseface.service.protocol.messages import Frame, Result
 from denseface.service.protocol.payload import Arrays
-from denseface.service.protocol.wire import Packet, decode_kept, encode
+from denseface.service.protocol.wire import Packet, decode_stored, encode
 from denseface.service.storage._record_file import read_parts, write_parts
 
 __all__ = [
@@ -135,7 +135,7 @@ def _read(
     parts, found = read_parts(path, checksum)
     try:
         metadata = kind.model_validate_json(bytes(parts[0]) if parts else b"")
-        return decode_kept(parts[1:]), metadata, found
+        return decode_stored(parts[1:]), metadata, found
     except (ProtocolError, ValidationError) as error:
         # The checksum is right: another version wrote it.
         raise CorruptFileError(f"{path}: {error}") from error

@@ -10,7 +10,7 @@ from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.wire import (
     Packet,
     decode_from_hub,
-    decode_kept,
+    decode_stored,
     decode_to_hub,
     encode,
 )
@@ -21,7 +21,7 @@ __all__ = ["DECODERS", "Cost", "UnexpectedError", "check"]
 Decoder = Callable[[Parts], Packet]
 DECODERS: tuple[Decoder, ...] = (decode_to_hub, decode_from_hub)
 
-_AGAIN = {decode_to_hub: decode_kept, decode_from_hub: decode_from_hub}
+_AGAIN = {decode_to_hub: decode_stored, decode_from_hub: decode_from_hub}
 """How each end reads what it took before: the hub its files, others nothing else."""
 _STATUS, _RESET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 _LONGEST_REASON = 1000

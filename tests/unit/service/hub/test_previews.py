@@ -38,7 +38,7 @@ def test_nobody_looks_and_nothing_is_asked_for(bench):
 
 
 def test_one_is_asked_for_when_the_one_before_has_come(bench):
-    bench.hub.show(wanted=True)
+    bench.hub.want_previews(wanted=True)
     assert kinds(bench.wait(0.2)) == [(SENSOR, "take_preview")]
     assert bench.wait(0.05) == []
     (first,) = previews(bench)
@@ -51,21 +51,21 @@ def test_one_is_asked_for_when_the_one_before_has_come(bench):
 
 
 def test_one_that_is_lost_is_asked_for_again(bench):
-    bench.hub.show(wanted=True)
+    bench.hub.want_previews(wanted=True)
     bench.wait(0.2)
     bench.say(SENSOR, messages.Heartbeat())
     assert kinds(bench.wait(1.0)) == [(SENSOR, "take_preview")]
 
 
 def test_only_the_sensor_that_was_asked_is_believed(bench):
-    bench.hub.show(wanted=True)
+    bench.hub.want_previews(wanted=True)
     bench.wait(0.2)
     assert previews(bench, OTHER) == []
     assert len(previews(bench)) == 1
 
 
 def test_no_preview_while_a_press_waits_for_its_frame(bench):
-    bench.hub.show(wanted=True)
+    bench.hub.want_previews(wanted=True)
     bench.press()
     assert bench.wait(0.2) == []
     bench.frame()
@@ -73,16 +73,16 @@ def test_no_preview_while_a_press_waits_for_its_frame(bench):
 
 
 def test_who_looks_no_more_gets_no_more(bench):
-    bench.hub.show(wanted=True)
+    bench.hub.want_previews(wanted=True)
     bench.wait(0.2)
-    bench.hub.show(wanted=False)
+    bench.hub.want_previews(wanted=False)
     assert previews(bench) == []
     assert bench.wait(0.2) == []
 
 
 def test_nothing_of_a_preview_is_kept(bench, tmp_path):
     before = sorted(tmp_path.rglob("*"))
-    bench.hub.show(wanted=True)
+    bench.hub.want_previews(wanted=True)
     bench.wait(0.2)
     assert len(previews(bench)) == 1
     assert sorted(tmp_path.rglob("*")) == before

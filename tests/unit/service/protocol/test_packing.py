@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from denseface.recon.face import DenseCloud
-from denseface.service.protocol._packing_kernels import halved
+from denseface.service.protocol._packing_kernels import to_float16_bits
 from denseface.service.protocol.packing import pack, unpack
 
 
@@ -119,7 +119,7 @@ def test_an_error_beyond_sixteen_bits_is_refused(sigma):
 def test_errors_are_rounded_as_numpy_rounds_them(values):
     sigma = np.array(values, np.float32)
     np.testing.assert_array_equal(
-        halved(sigma.view(np.uint32)).view(np.float16), sigma.astype(np.float16))
+        to_float16_bits(sigma.view(np.uint32)).view(np.float16), sigma.astype(np.float16))
 
 
 @pytest.mark.parametrize(("name", "value", "words"), [
