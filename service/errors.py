@@ -46,7 +46,7 @@ class ProtocolError(ServiceError, ValueError):
 
 
 class LocalProtocolError(ProtocolError):
-    """We tried to send a message that it may not send."""
+    """We tried to send a message that may not be sent."""
 
 
 class RemoteProtocolError(ProtocolError):
@@ -113,7 +113,7 @@ class StoreError(ServiceError, OSError):
 
 
 class DiskFullError(StoreError):
-    """There is no room for what was to be kept."""
+    """The disk is full."""
 
 
 class CorruptFileError(StoreError):
@@ -121,7 +121,7 @@ class CorruptFileError(StoreError):
 
 
 class DamagedFaceError(CorruptFileError):
-    """A face that was kept cannot be read any more: it is to be made again.
+    """The file of a face is damaged: the face must be computed again.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class DamagedFaceError(CorruptFileError):
 
 
 class DamagedDatabaseError(ServiceError, OSError):
-    """The database is malformed: the hub has to end, the next one rebuilds it from the files."""
+    """The database is malformed: the hub ends, and the next one rebuilds it from the files."""
 
 
 class SettingsError(ServiceError, ValueError):
@@ -150,7 +150,7 @@ class KeyFileError(SettingsError):
 
 
 class AuthenticatorStoppedError(ServiceError, RuntimeError):
-    """The part of the hub that decides who may connect ended: so must the hub."""
+    """The hub's authenticator stopped, and so must the hub."""
 
 
 class KeyRefusedError(ServiceError, PermissionError):

@@ -1,4 +1,4 @@
-"""Settings of the service: where it listens, where it keeps things, how long it waits."""
+"""Settings of the service: addresses, folders, limits and time-outs."""
 
 import os
 import tempfile
@@ -37,7 +37,7 @@ def runtime_folder() -> Path:
 
 
 def default_address() -> str:
-    """Where the hub of this user listens: a socket file that nobody else can open."""
+    """Give the address of this user's hub: a socket file that no other user can open."""
     return f"ipc://{runtime_folder() / 'hub'}"
 
 
@@ -49,21 +49,21 @@ class ServiceSettings(BaseModel):
     address: str = Field(default_factory=default_address)
     """The hub's address: `ipc://PATH` or `tcp://HOST:PORT`."""
     listen: Annotated[tuple[str, ...], Field(max_length=16)] = ()
-    """Where the hub listens too, for those with a key: `tcp://HOST:PORT`, several with commas."""
+    """More addresses of the hub, for peers with a key: `tcp://HOST:PORT`, several with commas."""
     keys: Path = Field(default_factory=lambda: platformdirs.user_config_path("denseface") / "keys")
     """Folder of the keys and of the hub's allow-list."""
     key: Path | None = None
-    """File of one's own secret key."""
+    """File of this process's own secret key."""
     hub_key: Path | None = None
     """File of the hub's public key."""
     memory_mb: Annotated[int, Field(ge=64, le=2**20)] = 2048
-    """Memory of the hub, in MiB, beyond which it cuts all connections from other machines."""
+    """Memory of the hub, MiB, beyond which it disconnects all other machines."""
     data: Path = Field(default_factory=lambda: platformdirs.user_data_path("denseface"))
     """Folder of frames, faces and their database; created with mode 0700."""
     heartbeat_s: _Seconds = 1.0
     """Time between two heartbeats, seconds."""
     liveness: Annotated[int, Field(ge=2, le=100)] = 3
-    """Heartbeats missed until a peer counts as gone."""
+    """Missed heartbeats after which a peer counts as gone."""
     attempts: Annotated[int, Field(ge=1, le=100)] = 3
     """Times that a frame is tried before it becomes a dead letter."""
     take_timeout_s: _Seconds = 10.0
@@ -75,7 +75,7 @@ class ServiceSettings(BaseModel):
     retention: Annotated[float | None, BeforeValidator(parse_retention)] = 86400.0
     """Time after its outcome when a capture is removed, seconds; None for never."""
     reserve_mib: Annotated[int, Field(ge=0, le=2**30)] = 256
-    """Room that is to stay free on the disk, MiB; with less a press is refused."""
+    """Free space of the disk, MiB, below which presses are refused."""
     metrics: Annotated[tuple[str, int] | None, BeforeValidator(parse_loopback_address)] = None
     """Host and port of `/metrics` and `/healthz`, on this machine alone; None for neither."""
     resend_s: _Seconds = 2.0
@@ -93,7 +93,9 @@ class ServiceSettings(BaseModel):
 
     @classmethod
     def of(cls, environment: Mapping[str, str], **flags: Any) -> Self:
-        """Put flags over environment over defaults; a flag of None is not given.
+        """Take each setting from its flag, else the environment, else its default.
+
+        A flag of None is not given.
 
         Raises
         ------

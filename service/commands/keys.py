@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _new(args: argparse.Namespace, folder: Path) -> None:
-    from denseface.service.security.keys import new_pair, read_public
+    from denseface.service.security import new_pair, read_public
 
     secret, public = new_pair(folder, args.name)
     print(f"{secret}  stays where it is used\n{public}  goes to the other side: "
@@ -51,22 +51,21 @@ def _new(args: argparse.Namespace, folder: Path) -> None:
 
 def _allow(args: argparse.Namespace, folder: Path) -> None:
     from denseface.service.protocol.roles import Role
-    from denseface.service.security.allow_list import allow
-    from denseface.service.security.keys import read_public
+    from denseface.service.security import allow, read_public
 
     one = allow(folder, args.name, read_public(args.public), frozenset(map(Role, args.roles)))
     print(f"{one.name} ({one.fingerprint}) may come in as {', '.join(sorted(one.roles))}")
 
 
 def _revoke(args: argparse.Namespace, folder: Path) -> None:
-    from denseface.service.security.allow_list import revoke
+    from denseface.service.security import revoke
 
     revoke(folder, args.name)
     print(f"{args.name} may come in no more")
 
 
 def _list(args: argparse.Namespace, folder: Path) -> None:  # noqa: ARG001
-    from denseface.service.security.allow_list import AllowList
+    from denseface.service.security import AllowList
 
     for one in sorted(AllowList(folder), key=lambda one: one.name):
         print(f"{one.name:20} {one.fingerprint}  {', '.join(sorted(one.roles))}")

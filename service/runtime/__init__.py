@@ -1,1 +1,4 @@
-"""A process's plumbing: logging, signals, threads, limits, files; knows no messages."""
+"""A process's plumbing: logging, signals, threads, files, limits.
+
+Imported by module: what only parses a setting needs no logging.
+"""

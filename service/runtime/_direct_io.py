@@ -1,8 +1,7 @@
 """Writing past the page cache.
 
-Frames and faces go out from memory and are hardly ever read from their files. To find and fill the
-2,000 pages of cache for both takes the kernel two to eight milliseconds, as much as all else that
-the hub does.
+Frames and faces are sent from memory and hardly ever read from their files, while allocating and
+filling their 2,000 pages of cache takes the kernel as long as all else that the hub does for them.
 """
 
 import errno
@@ -15,17 +14,18 @@ from collections.abc import Sequence
 __all__ = ["write_direct"]
 
 _BLOCK = 4096
-"""Of memory, file and size: no disk has larger ones."""
-_LEAST = 2**20
-"""Bytes; less is as quick through the cache."""
-_REFUSED = (errno.EINVAL, errno.EOPNOTSUPP)
+"""Alignment of memory, offset and size, bytes; a multiple of every disk's."""
+_MIN_BYTES = 2**20
+"""Smaller files are as quick through the cache."""
+_UNSUPPORTED = (errno.EINVAL, errno.EOPNOTSUPP)
+"""Errors of a file system without O_DIRECT."""
 
 
 class _Buffer(threading.local):
-    """Memory that begins at a page, kept for the next file of the same thread."""
+    """Page-aligned memory, one for each thread, used again for the next file."""
 
     def __init__(self) -> None:
-        self._memory = mmap.mmap(-1, _LEAST)
+        self._memory = mmap.mmap(-1, _MIN_BYTES)
 
     def filled(self, chunks: Sequence[bytes | memoryview], size: int) -> memoryview:
         if len(self._memory) < size:
@@ -41,15 +41,15 @@ _buffer = _Buffer()
 
 
 def write_direct(descriptor: int, chunks: Sequence[bytes | memoryview]) -> bool:
-    """Write all of a new file; False where it is small or this file system has no such way.
+    """Write all of a new file; False where it is small or the file system cannot.
 
     Raises
     ------
     OSError
-        As from the system, where there is no room or the disk fails.
+        As from the system, where the disk is full or fails.
     """
     size = sum(map(len, chunks))
-    if size < _LEAST:
+    if size < _MIN_BYTES:
         return False
     flags = fcntl.fcntl(descriptor, fcntl.F_GETFL)
     try:
@@ -58,7 +58,7 @@ def write_direct(descriptor: int, chunks: Sequence[bytes | memoryview]) -> bool:
         while left:
             left = left[os.write(descriptor, left):]
     except OSError as error:
-        if error.errno not in _REFUSED:
+        if error.errno not in _UNSUPPORTED:
             raise
         fcntl.fcntl(descriptor, fcntl.F_SETFL, flags)
         os.lseek(descriptor, 0, os.SEEK_SET)

@@ -1,9 +1,9 @@
-"""Places where a test lets a process die, hang or find its disk full. For tests alone.
+"""Places where a test makes a process die, hang or find its disk full. For tests alone.
 
-Nothing happens at any of them unless the environment asks for it.
-`DENSEFACE_FAILPOINTS` is a list with commas of `NAME=ACTION`, or `NAME=ACTION@N` for the N-th time
-alone. `DENSEFACE_FAILPOINTS_TOKENS` may name a folder: then a failpoint acts only where a file of
-its name is there, which it removes first, so it acts once, whoever starts the process again.
+They do nothing unless the environment asks for it.
+`DENSEFACE_FAILPOINTS` is a comma-separated list of `NAME=ACTION`, or `NAME=ACTION@N` for the N-th
+pass alone. `DENSEFACE_FAILPOINTS_TOKENS` may name a folder: then a failpoint acts only where a file
+of its name is there, which it removes first: it acts once, even if the process is started again.
 """
 
 import errno
@@ -22,7 +22,9 @@ __all__ = ["ACTIONS", "FAILPOINTS_VARIABLE", "FAILPOINT_NAMES", "TOKENS_VARIABLE
            "failpoint"]
 
 FAILPOINTS_VARIABLE = "DENSEFACE_FAILPOINTS"
+"""Environment variable with the failpoints and their actions."""
 TOKENS_VARIABLE = "DENSEFACE_FAILPOINTS_TOKENS"
+"""Environment variable with the folder of tokens."""
 
 FAILPOINT_NAMES = (
     "hub.take.sent", "capture.take.received", "capture.frame.taken", "capture.frame.sent",
@@ -36,9 +38,9 @@ FAILPOINT_NAMES = (
 """Every step of a capture's life, in order."""
 
 ACTIONS = ("kill", "stop", "hang", "raise:ENOSPC", "raise:EIO")
-"""SIGKILL or SIGSTOP to this process; the thread waits for ever; an OSError as from the disk."""
+"""SIGKILL or SIGSTOP to this process; the thread waits for ever; an OSError like the disk's."""
 
-_DISK = ("written", "synced", "renamed")
+_AT_DISK = ("written", "synced", "renamed")
 """Last word of the failpoints that may raise."""
 
 
@@ -46,7 +48,7 @@ _DISK = ("written", "synced", "renamed")
 class _Failpoint:
     action: str
     only: int | None
-    """Which time alone; where None, each time."""
+    """Number of the pass at which it acts; None for each."""
     passed: int = 0
 
 
@@ -56,7 +58,7 @@ _lock = threading.Lock()
 
 
 def arm(environment: Mapping[str, str]) -> None:
-    """Read the environment once, at the start of a process, and warn where something is set.
+    """Set the failpoints that the environment names, with a warning; at the start of a process.
 
     Raises
     ------
@@ -75,7 +77,7 @@ def arm(environment: Mapping[str, str]) -> None:
             raise SettingsError(f"{FAILPOINTS_VARIABLE}: no failpoint {name!r}, expected one of "
                                 f"{', '.join(FAILPOINT_NAMES)}")
         possible = [one for one in ACTIONS
-                    if not one.startswith("raise") or name.endswith(_DISK)]
+                    if not one.startswith("raise") or name.endswith(_AT_DISK)]
         if action not in possible:
             raise SettingsError(f"{FAILPOINTS_VARIABLE}: {name} cannot {action!r}, expected one of "
                                 f"{', '.join(possible)}")
@@ -90,24 +92,24 @@ def arm(environment: Mapping[str, str]) -> None:
 
 
 def failpoint(name: str) -> None:
-    """Do nothing, unless a test wants this process to fail here.
+    """Do nothing, unless `arm` set this failpoint.
 
     Raises
     ------
     OSError
-        Where that is how it is to fail.
+        Where its action is to raise.
     """
     if _armed:
-        _pass(name)
+        _reach(name)
 
 
-def _pass(name: str) -> None:
+def _reach(name: str) -> None:
     armed = _armed.get(name)
     if armed is None:
         return
     with _lock:
         armed.passed += 1
-        if armed.only not in (None, armed.passed) or not _spend(name):
+        if armed.only not in (None, armed.passed) or not _use_token(name):
             return
     match armed.action.split(":"):
         case ["kill"]:
@@ -121,7 +123,7 @@ def _pass(name: str) -> None:
             raise OSError(number, os.strerror(number), f"failpoint {name}")
 
 
-def _spend(name: str) -> bool:
+def _use_token(name: str) -> bool:
     for folder in _tokens:
         try:
             (folder / name).unlink()

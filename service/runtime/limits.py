@@ -31,22 +31,27 @@ _GROWTH = 1.25
 
 
 class MemoryWatch:
-    """Says when the memory in use goes beyond a limit, once for each time that it does."""
+    """Tells when the memory in use exceeds a limit, once each time.
+
+    Parameters
+    ----------
+    limit : bytes
+    """
 
     def __init__(self, limit: int) -> None:
-        self._statm = os.open(_STATM, os.O_RDONLY)  # kept: one may not be had later
+        self._statm = os.open(_STATM, os.O_RDONLY)  # later there may be no descriptor
         self._limit = self._ceiling = limit
         self._cut = False
 
     def over_limit(self) -> int:
-        """Give the bytes in use where they are too many, else 0."""
+        """Give the bytes in use where they exceed the limit, else 0."""
         used = self._used()
         if used > self._limit:
-            # What was freed stays with the process, and libzmq frees some time after a cut.
+            # Freed memory stays with the process, and libzmq frees some time after a cut.
             self._trim()
             used = self._used()
         if self._cut:
-            # What is left may be in use for long: only what grows from here is new.
+            # What is still in use after a cut may be for long: only growth beyond it counts.
             self._cut = False
             self._ceiling = max(self._limit, int(used * _GROWTH))
         elif used < self._limit:
@@ -57,7 +62,7 @@ class MemoryWatch:
         return used
 
     def close(self) -> None:
-        """Watch no more."""
+        """Close the descriptor."""
         os.close(self._statm)
 
     def _used(self) -> int:
@@ -65,14 +70,14 @@ class MemoryWatch:
 
     @staticmethod
     def _trim() -> None:
-        """Give freed memory back to the system, where the C library can."""
+        """Return freed memory to the system, where the C library can."""
         trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
         if trim is not None:
             trim(0)
 
 
 class DescriptorWatch:
-    """Has the system give this process as many as it may have."""
+    """Raises the limit of this process as far as allowed, and tells when it is nearly reached."""
 
     def __init__(self) -> None:
         soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -83,7 +88,7 @@ class DescriptorWatch:
             resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
 
     def over_limit(self) -> int:
-        """Give the number of descriptors in use where too few are left, else 0."""
+        """Give the descriptors in use where too few are left, else 0."""
         limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
         try:
             used = sum(1 for _ in _OPEN_DESCRIPTORS.iterdir())

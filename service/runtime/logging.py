@@ -15,20 +15,21 @@ __all__ = ["LogFormat", "configure"]
 LogFormat = Literal["text", "json"]
 
 
-def configure(how: LogFormat, process: str) -> None:
-    """Send every event of this process to stderr, with its name.
+def configure(log_format: LogFormat, process: str) -> None:
+    """Send every event of this process to stderr, with the process's name.
 
-    As JSON, also what Python itself and the libraries have to say comes as events: warnings, the
-    standard library's logging, errors that nobody catches.
+    In JSON, what Python and the libraries report becomes events too: warnings, records of the
+    standard library's logging, exceptions that nobody catches.
     """
     renderers: list[structlog.typing.Processor]
-    if how == "json":
+    if log_format == "json":
         renderers = [structlog.processors.format_exc_info, _finite,
                      structlog.processors.JSONRenderer()]
     else:
-        renderers = [_colored() if sys.stderr.isatty() else _plain]
+        renderers = [structlog.dev.ConsoleRenderer(
+            colors=sys.stderr.isatty(), exception_formatter=structlog.dev.plain_traceback)]
 
-    def name(
+    def add_process(
         _: Any, __: str, event: structlog.typing.EventDict
     ) -> structlog.typing.EventDict:
         event["process"] = process
@@ -36,7 +37,7 @@ def configure(how: LogFormat, process: str) -> None:
 
     structlog.configure(
         processors=[
-            name,
+            add_process,
             structlog.processors.add_log_level,
             structlog.processors.TimeStamper(fmt="iso", utc=True),
             _without_data,
@@ -46,36 +47,14 @@ def configure(how: LogFormat, process: str) -> None:
         logger_factory=structlog.WriteLoggerFactory(file=sys.stderr),
         cache_logger_on_first_use=True,
     )
-    if how == "json":
-        _catch_the_rest()
-
-
-def _colored(*, colors: bool = True) -> structlog.dev.ConsoleRenderer:
-    return structlog.dev.ConsoleRenderer(
-        colors=colors, exception_formatter=structlog.dev.plain_traceback)
-
-
-_console = _colored(colors=False)
-_QUOTED = frozenset(" \t=\r\n\"'")
-
-
-def _plain(logger: Any, name: str, event: structlog.typing.EventDict) -> str:
-    """Write a line as `_console` does, in a quarter of its time: of a capture there are seven."""
-    if not event.keys().isdisjoint(("exc_info", "exception", "stack")):
-        return _console(logger, name, event)
-    stamp, level, what = event.pop("timestamp"), event.pop("level"), event.pop("event")
-    shown = [f"{key}={_quoted(value)}" for key, value in sorted(event.items())]
-    return " ".join((stamp, f"[{level:<9}]", f"{what!s:<30}", *shown)).rstrip(" ")
-
-
-def _quoted(value: Any) -> str:
-    return value if isinstance(value, str) and _QUOTED.isdisjoint(value) else repr(value)
+    if log_format == "json":
+        _forward_others()
 
 
 def _without_data(
     _: Any, __: str, event: structlog.typing.EventDict
 ) -> structlog.typing.EventDict:
-    """Put sizes in the place of arrays and bytes: a log may go where faces may not."""
+    """Replace arrays and bytes by their sizes: who may read a log may not see faces."""
     return {key: value if key == "exc_info" else _size(value) for key, value in event.items()}
 
 
@@ -95,20 +74,20 @@ def _size(value: Any) -> Any:
 def _finite(
     _: Any, __: str, event: structlog.typing.EventDict
 ) -> structlog.typing.EventDict:
-    """JSON has no word for what is not finite."""
+    """Replace numbers that are not finite by text: JSON has none."""
     return {key: str(value) if isinstance(value, float) and not math.isfinite(value) else value
             for key, value in event.items()}
 
 
 class _Forward(logging.Handler):
-    """Hands on what a library logs."""
+    """Makes events of the records that libraries log."""
 
     def emit(self, record: logging.LogRecord) -> None:
         structlog.get_logger(record.name).log(
             record.levelno, record.getMessage(), logger=record.name, exc_info=record.exc_info)
 
 
-def _catch_the_rest() -> None:
+def _forward_others() -> None:
     log = structlog.get_logger("python")
 
     def warning(

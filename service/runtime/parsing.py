@@ -10,13 +10,11 @@ __all__ = ["parse_loopback_address", "parse_retention", "parse_time"]
 _UNITS = {"s": 1, "m": 60, "h": 3600, "d": 86400}
 """Letter -> seconds."""
 _SHORTEST_S = 1.0
-"""Shortest retention, seconds."""
+"""Shortest retention, seconds: 0 may mean "keep nothing" or "no limit"."""
 
 
 def parse_retention(given: object) -> float | None:
     """Read a retention, seconds; None for `off`.
-
-    Zero is refused: some mean "keep nothing" by it, others "no limit".
 
     Raises
     ------

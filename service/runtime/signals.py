@@ -1,4 +1,4 @@
-"""SIGINT and SIGTERM as something that a poll can wait for, and dying with one's parent."""
+"""SIGINT and SIGTERM for a poll, and a process that ends with its parent."""
 
 import ctypes
 import os
@@ -14,6 +14,7 @@ PARENT_VARIABLE = "DENSEFACE_PARENT"
 """Process id of the supervisor that started this process."""
 
 _PR_SET_PDEATHSIG = 1
+"""See prctl(2)."""
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -22,7 +23,7 @@ class StopSignal:
 
     Parameters
     ----------
-    also : further signals that wake a poll but do not stop, such as SIGCHLD
+    also : signals that only wake the poll, such as SIGCHLD
     """
 
     def __init__(self, *also: signal.Signals) -> None:
@@ -52,7 +53,7 @@ class StopSignal:
         return self._wake.fileno()
 
     def drain(self) -> None:
-        """Forget what woke the poll."""
+        """Make the descriptor unreadable."""
         self._wake.drain()
 
     @property
@@ -66,7 +67,7 @@ class StopSignal:
 
 
 def die_with_parent() -> None:
-    """Have the kernel send SIGTERM when the supervisor dies, however it dies.
+    """Have the kernel send SIGTERM when the supervisor dies.
 
     Does nothing in a process that no supervisor started.
     """
@@ -74,5 +75,5 @@ def die_with_parent() -> None:
     if not parent:
         return
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
-    if str(os.getppid()) != parent:  # it died before the line above
+    if str(os.getppid()) != parent:  # it died before prctl
         raise SystemExit(1)

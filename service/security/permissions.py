@@ -1,7 +1,7 @@
-"""Which role may say and read what: the tables of messages and of topics, and what they decide.
+"""Which role may send what and subscribe to what, by the tables of messages and topics.
 
-It is decided before a message reaches the hub's state machine. Whoever comes in by the local door
-has every role.
+They are asked before a message reaches the hub's state machine. A peer of the local listener has
+every role.
 """
 
 from denseface.service.protocol.message_base import BaseMessage
@@ -15,14 +15,14 @@ ALL_ROLES = frozenset(Role)
 
 ROLES_BY_KIND: dict[str, frozenset[Role]] = {
     kind.model_fields["kind"].default: roles for kind, roles in TO_HUB.items()}
-"""Kind of message -> roles of which one is needed. A kind that is not here is for nobody."""
+"""Kind of message -> roles of which one is needed; nobody may send other kinds."""
 
 ROLES_BY_TOPIC: dict[Topic, frozenset[Role]] = dict.fromkeys(Topic, frozenset({Role.SUBSCRIBER}))
 """Topic -> roles of which one is needed."""
 
 
 def missing_role(roles: frozenset[Role], message: BaseMessage, *, own: bool = False) -> str | None:
-    """Say what a key lacks to say this, None where it may.
+    """Say which role is missing to send a message, None where none is.
 
     Parameters
     ----------

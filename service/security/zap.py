@@ -1,7 +1,7 @@
-"""Decides which keys may connect: ZeroMQ's authentication protocol (RFC 27), in the hub's own loop.
+"""ZeroMQ's authentication protocol (ZAP, RFC 27), answered in the hub's own loop.
 
-There is no thread that could die unseen: the hub and its authenticator live and end together. And
-while no authenticator answers, `ZAP_ENFORCE_DOMAIN` makes libzmq refuse every connection.
+No thread of its own can die unnoticed. While nobody answers, `ZAP_ENFORCE_DOMAIN` makes libzmq
+refuse every connection.
 """
 
 from collections.abc import Callable
@@ -10,16 +10,17 @@ import zmq
 import zmq.utils.z85
 
 from denseface.service.monitoring import Rejections
-from denseface.service.security.allow_list import AllowedKey, AllowList
+from denseface.service.security._allow_list import AllowedKey, AllowList
 
 __all__ = ["MESSAGES_DOMAIN", "PUBLICATIONS_DOMAIN", "Authenticator"]
 
 MESSAGES_DOMAIN, PUBLICATIONS_DOMAIN = b"denseface", b"denseface.topics"
-"""Of the sockets for messages and of those for publications."""
+"""ZAP domains of the sockets for messages and of those for publications."""
 
 _ENDPOINT = "inproc://zeromq.zap.01"
 _VERSION = b"1.0"
-_BURST = 64
+_MAX_BURST = 64
+"""Requests answered before the loop looks at other sockets."""
 
 
 class Authenticator:
@@ -27,7 +28,7 @@ class Authenticator:
 
     Parameters
     ----------
-    admits : says whether an allowed key may connect to the sockets of a domain
+    is_permitted : whether an allowed key may connect to the sockets of a domain
     """
 
     def __init__(
@@ -37,26 +38,26 @@ class Authenticator:
         self._allow_list = allow_list
         self._rejections = rejections
         self._is_permitted = is_permitted
-        # A ROUTER: one question that goes wrong does not block the next, as with a REP.
+        # A ROUTER, for a REP that failed to answer could receive no further request.
         self.socket = context.socket(zmq.ROUTER)
         self.socket.set(zmq.LINGER, 0)
         self.socket.bind(_ENDPOINT)
 
     def answer(self) -> None:
-        """Answer what was asked."""
-        for _ in range(_BURST):
+        """Answer the requests that are waiting."""
+        for _ in range(_MAX_BURST):
             try:
-                asked = self.socket.recv_multipart(zmq.DONTWAIT)
+                parts = self.socket.recv_multipart(zmq.DONTWAIT)
             except zmq.Again:
                 return
-            envelope, request = asked[:2], asked[2:]
+            envelope, request = parts[:2], parts[2:]
             user = self._user(request)
             status = [b"200", b"OK", user.public.encode()] if user else [b"400", b"refused", b""]
             number = request[1] if len(request) > 1 else b""
             self.socket.send_multipart([*envelope, _VERSION, number, *status, b""])
 
     def close(self) -> None:
-        """Let nobody in any more."""
+        """Close the socket: libzmq refuses every new connection."""
         self.socket.close()
 
     def _user(self, request: list[bytes]) -> AllowedKey | None:

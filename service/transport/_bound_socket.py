@@ -7,8 +7,7 @@ import zmq
 
 from denseface.service.errors import AddressError
 from denseface.service.monitoring import Rejections
-from denseface.service.security.allow_list import AllowList
-from denseface.service.security.keys import KeyPair
+from denseface.service.security import AllowList, KeyPair
 from denseface.service.transport.handshakes import HandshakeMonitor
 
 __all__ = ["BoundSocket", "ServerCredentials"]

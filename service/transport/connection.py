@@ -11,7 +11,7 @@ from zmq.utils.monitor import parse_monitor_message
 
 from denseface.service.errors import KeyFileError, KeyRefusedError
 from denseface.service.protocol.wire import Packet, decode_from_hub
-from denseface.service.security.keys import KeyPair, read_pair, read_public
+from denseface.service.security import KeyPair, read_pair, read_public
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.sockets import open_socket
 

@@ -14,7 +14,7 @@ from denseface.service.monitoring import Rejections
 from denseface.service.protocol.payload import MAX_PAYLOAD_BYTES
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import MAX_HEADER_BYTES, MAX_PARTS, Buffer
-from denseface.service.security.allow_list import AllowedKey
+from denseface.service.security import AllowedKey
 from denseface.service.security.permissions import ALL_ROLES, ROLES_BY_TOPIC
 from denseface.service.security.zap import MESSAGES_DOMAIN, PUBLICATIONS_DOMAIN
 from denseface.service.transport._bound_socket import BoundSocket, ServerCredentials

@@ -11,8 +11,7 @@ from denseface.service.monitoring import Rejections
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Buffer
 from denseface.service.runtime.limits import DescriptorWatch, MemoryWatch
-from denseface.service.security.allow_list import AllowedKey, AllowList
-from denseface.service.security.keys import HUB_NAME, read_pair
+from denseface.service.security import HUB_NAME, AllowedKey, AllowList, read_pair
 from denseface.service.security.permissions import ROLES_BY_TOPIC
 from denseface.service.security.zap import PUBLICATIONS_DOMAIN, Authenticator
 from denseface.service.settings import ServiceSettings

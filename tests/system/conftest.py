@@ -4,7 +4,7 @@ import pytest
 
 from denseface.service.client import Client
 from denseface.service.errors import UnknownCaptureError
-from denseface.service.security.keys import read_pair
+from denseface.service.security import read_pair
 from tests.system.guarded import Peer, guarded_hub, press_through
 from tests.waiting import until
 

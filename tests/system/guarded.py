@@ -19,8 +19,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.roles import Role
 from denseface.service.protocol.wire import Packet, decode_from_hub, encode
-from denseface.service.security.allow_list import allow
-from denseface.service.security.keys import KeyPair, new_pair, read_pair, read_public
+from denseface.service.security import KeyPair, allow, new_pair, read_pair, read_public
 from denseface.service.transport.addresses import publications_of
 from tests.ports import free_port
 from tests.system.running import REPOSITORY

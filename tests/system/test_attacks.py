@@ -18,8 +18,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.payload import MAX_ARRAY_BYTES
 from denseface.service.protocol.roles import Role
 from denseface.service.protocol.wire import Packet, encode
-from denseface.service.security.allow_list import allow, revoke
-from denseface.service.security.keys import KeyPair, new_pair, read_pair, read_public
+from denseface.service.security import KeyPair, allow, new_pair, read_pair, read_public, revoke
 from denseface.service.transport.addresses import publications_of
 from tests.ports import free_port
 from tests.system.guarded import (

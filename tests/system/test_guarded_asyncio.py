@@ -9,7 +9,7 @@ import pytest
 from denseface.service.client import AsyncClient
 from denseface.service.errors import KeyRefusedError, RequestFailedError
 from denseface.service.protocol.roles import Role
-from denseface.service.security.allow_list import revoke
+from denseface.service.security import revoke
 from tests.system.guarded import guarded_hub, press_through
 from tests.unit.service.faces import small_face
 

@@ -16,8 +16,7 @@ import pytest
 from denseface.service.client import Client
 from denseface.service.export import load_face
 from denseface.service.protocol.roles import Role
-from denseface.service.security.allow_list import allow
-from denseface.service.security.keys import new_pair, read_public
+from denseface.service.security import allow, new_pair, read_public
 from tests.ports import free_port
 from tests.system.running import PACE, RECORDINGS, REPOSITORY
 from tests.waiting import until

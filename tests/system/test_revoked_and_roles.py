@@ -14,7 +14,7 @@ from denseface.service.errors import ClientTimeoutError, KeyRefusedError
 from denseface.service.protocol import messages
 from denseface.service.protocol.roles import Role
 from denseface.service.protocol.wire import Packet, encode
-from denseface.service.security.allow_list import revoke
+from denseface.service.security import revoke
 from tests.system.guarded import (
     FACE,
     FACE_ARRAYS,

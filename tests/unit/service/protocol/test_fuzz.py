@@ -17,7 +17,7 @@ from denseface.service.errors import (
 )
 from denseface.service.protocol import messages
 from denseface.service.protocol.wire import decode_from_hub, decode_to_hub
-from denseface.service.security.keys import new_pair, read_pair, read_public
+from denseface.service.security import new_pair, read_pair, read_public
 from denseface.service.storage._record_file import read_parts
 from tests.fuzzing.corpus import encoded, pack, packets, unpack
 from tests.fuzzing.mutate import mutate

@@ -3,6 +3,7 @@
 import json
 import logging
 import math
+import re
 import subprocess
 import sys
 import threading
@@ -10,11 +11,8 @@ import threading
 import numpy as np
 import pytest
 import structlog
-from hypothesis import given
-from hypothesis import strategies as st
-from structlog.dev import ConsoleRenderer
 
-from denseface.service.runtime.logging import _plain, configure
+from denseface.service.runtime.logging import configure
 
 
 def lines(text):
@@ -42,19 +40,10 @@ def test_arrays_and_bytes_are_never_written(how, capsys):
         "taken", image=image, raw=image.tobytes(), view=memoryview(image), both=[image, b"secret"],
         inside={"color": image, "n": 3}, scalar=np.uint8(7))
     text = capsys.readouterr().err
-    assert "123" not in text
+    assert "123" not in re.sub(r"\d{4}-\S+Z", "", text)  # but in the time, perhaps
     assert "secret" not in text
     assert "uint8 [4, 5, 3]" in text
     assert "60 bytes" in text
-
-
-@given(st.text(), st.sampled_from(["info", "warning", "error", "critical"]), st.dictionaries(
-    st.from_regex("[a-z_]+", fullmatch=True).filter(lambda key: key not in {
-        "timestamp", "level", "event", "logger", "logger_name", "stack", "exception", "exc_info"}),
-    st.text() | st.integers() | st.floats() | st.none() | st.booleans() | st.lists(st.text())))
-def test_a_line_is_as_structlog_writes_it(event, level, values):
-    entry = values | {"timestamp": "2026-01-31T12:00:00Z", "level": level, "event": event}
-    assert _plain(None, "", entry.copy()) == ConsoleRenderer(colors=False)(None, "", entry.copy())
 
 
 def test_an_error_in_text_has_its_traceback(capsys):

@@ -9,8 +9,15 @@ import pytest
 from denseface.service.cli import main
 from denseface.service.errors import KeyFileError
 from denseface.service.protocol.roles import Role
-from denseface.service.security.allow_list import AllowList, allow, revoke
-from denseface.service.security.keys import KeyPair, new_pair, read_pair, read_public
+from denseface.service.security import (
+    AllowList,
+    KeyPair,
+    allow,
+    new_pair,
+    read_pair,
+    read_public,
+    revoke,
+)
 
 ROLES = frozenset({Role.WORKER})
 
@@ -78,19 +85,20 @@ def test_a_folder_is_no_key(tmp_path):
 
 
 def test_the_list_is_live(keys):
-    ring = AllowList(keys)
-    assert (len(ring), ring.refresh()) == (0, False)
+    allow_list = AllowList(keys)
+    assert (len(allow_list), allow_list.refresh()) == (0, False)
     one = allow(keys, "a", KeyPair.generate().public, ROLES)
-    assert ring.refresh()
-    assert not ring.refresh()
-    assert ring.get(one.public) == one
-    assert ring.has_token(one.token)
+    assert allow_list.refresh()
+    assert not allow_list.refresh()
+    assert allow_list.get(one.public) == one
+    assert allow_list.has_token(one.token)
     more = allow(keys, "a", one.public, ROLES | {Role.PRESSER})
-    assert ring.refresh()
-    assert (ring.has_token(one.token), ring.has_token(more.token)) == (False, True)
+    assert allow_list.refresh()
+    assert (allow_list.has_token(one.token), allow_list.has_token(more.token)) == (False, True)
     revoke(keys, "a")
-    assert ring.refresh()
-    assert (ring.get(one.public), ring.has_token(more.token), len(ring)) == (None, False, 0)
+    assert allow_list.refresh()
+    assert allow_list.get(one.public) is None
+    assert (allow_list.has_token(more.token), len(allow_list)) == (False, 0)
     with pytest.raises(KeyFileError, match="no key of that name"):
         revoke(keys, "a")
 
@@ -115,26 +123,26 @@ def test_a_name_and_a_key_belong_together(keys):
 ])
 def test_a_damaged_file_keeps_its_key_out_and_no_other(keys, damage):
     one, other = (allow(keys, name, KeyPair.generate().public, ROLES) for name in "ab")
-    ring = AllowList(keys)
-    assert len(ring) == 2
+    allow_list = AllowList(keys)
+    assert len(allow_list) == 2
     damage(keys / "allowed" / "a")
-    assert ring.refresh()
-    assert (ring.get(one.public), ring.get(other.public)) == (None, other)
+    assert allow_list.refresh()
+    assert (allow_list.get(one.public), allow_list.get(other.public)) == (None, other)
 
 
 def test_a_folder_that_went_lets_nobody_in(keys):
     one = allow(keys, "a", KeyPair.generate().public, ROLES)
-    ring = AllowList(keys)
+    allow_list = AllowList(keys)
     (keys / "allowed").rename(keys / "gone")
-    assert ring.refresh()
-    assert not ring.has_token(one.token)
+    assert allow_list.refresh()
+    assert not allow_list.has_token(one.token)
 
 
 @pytest.mark.parametrize("where", [
-    "pathlib.Path.iterdir", "denseface.service.security.allow_list.read_private_text"])
+    "pathlib.Path.iterdir", "denseface.service.security._allow_list.read_private_text"])
 def test_a_want_of_descriptors_revokes_nobody(keys, monkeypatch, where):
     one = allow(keys, "a", KeyPair.generate().public, ROLES)
-    ring = AllowList(keys)
+    allow_list = AllowList(keys)
 
     def none_left(*_):
         error = OSError(errno.EMFILE, "Too many open files")
@@ -148,11 +156,11 @@ def test_a_want_of_descriptors_revokes_nobody(keys, monkeypatch, where):
             monkeypatch.undo()
             other = allow(keys, "b", other, ROLES).public
             patched.setattr(where, none_left)
-        assert not ring.refresh()
-        assert ring.has_token(one.token)
-    assert ring.refresh()
-    assert not ring.has_token(one.token)
-    assert (ring.get(other) is None) is ("iterdir" in where)
+        assert not allow_list.refresh()
+        assert allow_list.has_token(one.token)
+    assert allow_list.refresh()
+    assert not allow_list.has_token(one.token)
+    assert (allow_list.get(other) is None) is ("iterdir" in where)
 
 
 def test_the_commands(keys, capsys):
@@ -166,9 +174,9 @@ def test_the_commands(keys, capsys):
     assert public in out
     assert read_pair(keys / "kiosk.secret").secret not in out
     assert run("allow", "front", keys / "kiosk.public", "presser", "subscriber")[0] == 0
-    ring = AllowList(keys)
+    allow_list = AllowList(keys)
     listed = run("list")[1]
-    assert listed.split() == ["front", ring.get(public).fingerprint, "presser,", "subscriber"]
+    assert listed.split() == ["front", allow_list.get(public).fingerprint, "presser,", "subscriber"]
     assert run("revoke", "front")[:2] == (0, "front may come in no more\n")
     assert run("list")[1] == ""
     status, _, error = run("revoke", "front")

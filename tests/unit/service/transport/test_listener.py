@@ -10,8 +10,7 @@ from denseface.service.errors import AddressError, KeyFileError
 from denseface.service.monitoring import Counters, Rejections
 from denseface.service.protocol.roles import Role
 from denseface.service.runtime.limits import MemoryWatch
-from denseface.service.security.allow_list import allow, revoke
-from denseface.service.security.keys import KeyPair, new_pair, read_public
+from denseface.service.security import KeyPair, allow, new_pair, read_public, revoke
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.connection import Credentials, connect
 from denseface.service.transport.listener import Listener

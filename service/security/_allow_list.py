@@ -1,6 +1,6 @@
-"""Who may come in: the folder `allowed`, one file for each public key, looked at again and again.
+"""The allow-list: the folder `allowed`, one file for each public key that may connect.
 
-Whatever is wrong with a file keeps its key out, never in.
+A file that cannot be read, or is malformed, keeps its key out.
 """
 
 from collections.abc import Iterator, Mapping
@@ -16,7 +16,7 @@ from denseface.service.errors import KeyFileError, first_error, reason_of
 from denseface.service.protocol.roles import Role
 from denseface.service.runtime.files import private_folder, read_private_text
 from denseface.service.runtime.limits import OUT_OF_DESCRIPTORS
-from denseface.service.security.keys import (
+from denseface.service.security._keys import (
     check_key,
     check_name,
     fingerprint,
@@ -26,11 +26,12 @@ from denseface.service.security.keys import (
 __all__ = ["AllowList", "AllowedKey", "allow", "revoke"]
 
 _WRITABLE_BY_OTHERS = 0o022
+"""Mode bits that a file of the list may not have."""
 
 
 @dataclass(frozen=True)
 class AllowedKey:
-    """A key that may come in."""
+    """A key that may connect."""
 
     name: str
     public: str
@@ -43,7 +44,7 @@ class AllowedKey:
 
     @property
     def token(self) -> bytes:
-        """The key with its roles in 8 bytes: other roles make another."""
+        """Hash of the key and its roles, 8 bytes."""
         text = " ".join([self.public, *sorted(self.roles)])
         return sha256(text.encode()).digest()[:8]
 
@@ -56,15 +57,15 @@ class _File(BaseModel):
 
 
 class AllowList:
-    """The keys of one folder, as they are now."""
+    """The keys of one folder, as of the last `refresh`."""
 
     def __init__(self, keys: Path) -> None:
         self._folder = keys / "allowed"
-        self._seen: dict[str, tuple[int, ...]] | None = None
+        self._files: dict[str, tuple[int, ...]] | None = None
         self._by_public: Mapping[str, AllowedKey] = {}
         self._tokens: frozenset[bytes] = frozenset()
         self.changes = 0
-        """How often the list has changed since it was first read."""
+        """Times that `refresh` found another list."""
         self._log = structlog.get_logger("keys")
         self.refresh()
         self.changes = 0
@@ -76,64 +77,65 @@ class AllowList:
         return iter(self._by_public.values())
 
     def get(self, public: str) -> AllowedKey | None:
-        """Give what a key is allowed, None where it is not."""
+        """Give an allowed key, None where it is not."""
         return self._by_public.get(public)
 
     def has_token(self, token: bytes) -> bool:
-        """Say whether a key is still allowed, with the same roles."""
+        """Whether a key is still allowed with the same roles."""
         return token in self._tokens
 
     def refresh(self) -> bool:
-        """Look at the folder; True where anything changed."""
-        seen = self._look()
-        if seen == self._seen:
+        """Read the folder again where its files changed; True where the list did."""
+        files = self._stat_files()
+        if files == self._files:
             return False
-        before, self._seen = self._seen, seen
+        before, self._files = self._files, files
         found: dict[str, AllowedKey] = {}
-        for name in sorted(seen):
+        for name in sorted(files):
             try:
                 one = _read(self._folder / name)
             except KeyFileError as error:
                 if _out_of_descriptors(error.__cause__):
-                    self._seen = before
+                    self._files = before
                     return False
                 self._log.error("key not let in", reason=str(error))
                 continue
-            first = found.setdefault(one.public, one)
-            if first is not one:
-                self._log.error("key not let in", reason=f"{name}: the same key as {first.name}")
+            other = found.setdefault(one.public, one)
+            if other is not one:
+                self._log.error("key not let in", reason=f"{name}: the same key as {other.name}")
         changed = found != self._by_public
         self.changes += changed
         self._by_public = found
         self._tokens = frozenset(one.token for one in found.values())
         return changed
 
-    def _look(self) -> dict[str, tuple[int, ...]]:
-        seen: dict[str, tuple[int, ...]] = {}
+    def _stat_files(self) -> dict[str, tuple[int, ...]]:
+        """Give the name of each file and what changes when the file does."""
+        files: dict[str, tuple[int, ...]] = {}
         try:
             for path in self._folder.iterdir():
                 with suppress(FileNotFoundError):  # revoked meanwhile
                     found = path.stat()
                     if not path.name.startswith("."):
-                        seen[path.name] = (found.st_ino, found.st_mtime_ns, found.st_ctime_ns,
-                                           found.st_size)
+                        files[path.name] = (found.st_ino, found.st_mtime_ns, found.st_ctime_ns,
+                                            found.st_size)
         except FileNotFoundError:
             return {}  # nobody was ever allowed
         except OSError as error:
-            if _out_of_descriptors(error):  # a flood of connections may revoke nobody
-                return self._seen or {}
+            if _out_of_descriptors(error):  # a flood of connections must not revoke keys
+                return self._files or {}
             self._log.error("allow-list unreadable, nobody is let in", reason=str(error))
             return {}
-        return seen
+        return files
 
 
 def allow(keys: Path, name: str, public: str, roles: frozenset[Role]) -> AllowedKey:
-    """Let a key in from now on, with these roles in place of those it had.
+    """Allow a key with these roles, in place of those it had.
 
     Raises
     ------
     KeyFileError, SettingsError
-        Where the key has another name already, the name another key, or it cannot be written.
+        Where key or name is in use with another, or the file cannot be written.
     """
     one = AllowedKey(check_name(name), public, roles)
     folder = private_folder(private_folder(keys) / "allowed")
@@ -147,7 +149,7 @@ def allow(keys: Path, name: str, public: str, roles: frozenset[Role]) -> Allowed
 
 
 def revoke(keys: Path, name: str) -> None:
-    """Let a key in no more; whoever uses it is cut off by a running hub at once.
+    """Allow a key no more; a running hub disconnects it at once.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""CURVE keys in files of mode 0600: what `denseface keys` writes and every process reads.
+"""CURVE keys in files of mode 0600, written by `denseface keys`.
 
-`NAME.secret` holds a pair, `NAME.public` its public half, which is what goes to another machine,
-and `allowed/NAME` (see `service.security.allow_list`) the public half of someone who may come in.
+`NAME.secret` holds a pair, `NAME.public` its public key for other machines, and `allowed/NAME` (see
+`service.security._allow_list`) a public key that may connect.
 """
 
 import re
@@ -22,9 +22,11 @@ __all__ = ["HUB_NAME", "KeyPair", "check_key", "check_name", "fingerprint", "new
            "read_public", "write_key_file"]
 
 HUB_NAME = "hub"
-"""Name of the hub's own pair."""
+"""Name of the hub's own pair of keys."""
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+_OTHERS = 0o077
+"""Mode bits that a file with a secret key may not have."""
 _Z85 = re.compile(r"[0-9A-Za-z.\-:+=^!/*?&<>()\[\]{}@%$#]{40}")
 
 
@@ -38,34 +40,34 @@ class _File(BaseModel):
 
 @dataclass(frozen=True)
 class KeyPair:
-    """A CURVE pair, each half 40 characters of Z85."""
+    """A CURVE pair, each key 40 characters of Z85."""
 
     public: str
     secret: str
 
     @classmethod
     def generate(cls) -> Self:
-        """Make a new one."""
+        """Generate a new pair."""
         public, secret = zmq.curve_keypair()
         return cls(public.decode(), secret.decode())
 
     def __repr__(self) -> str:
-        """Show the public half alone: the other may not reach a log."""
+        """Show the public key alone: the secret one may not reach a log."""
         return f"KeyPair({self.public!r})"
 
 
 def fingerprint(public: str) -> str:
-    """Name a public key in 16 hexadecimal digits."""
+    """Give the first 16 hexadecimal digits of a public key's SHA-256."""
     return sha256(public.encode()).hexdigest()[:16]
 
 
 def check_name(name: str) -> str:
-    """Give a key's name back.
+    """Check a key's name and give it back.
 
     Raises
     ------
     KeyFileError
-        Where it could not be a file's name.
+        Where it may not be a file's name.
     """
     if not _NAME.fullmatch(name):
         raise KeyFileError(f"key name {name!r}: expected letters, digits, - and _, at most 64")
@@ -73,12 +75,12 @@ def check_name(name: str) -> str:
 
 
 def check_key(path: Path, key: str) -> str:
-    """Give a key back that a file held.
+    """Check a key that a file held and give it back.
 
     Raises
     ------
     KeyFileError
-        Where it is none.
+        Where it is no key.
     """
     if not _is_key(key):
         raise KeyFileError(f"{path}: its key is not 40 characters of Z85")
@@ -90,17 +92,17 @@ def _is_key(text: str) -> bool:
         return False
     try:
         return len(zmq.utils.z85.decode(text)) == 32
-    except struct.error:  # five of them can say more than four bytes hold
+    except struct.error:  # five characters can encode more than four bytes hold
         return False
 
 
 def new_pair(folder: Path, name: str) -> tuple[Path, Path]:
-    """Make a pair and give its files, secret and public.
+    """Generate a pair and give the paths of its files, secret and public.
 
     Raises
     ------
     KeyFileError, SettingsError
-        Where there is one of that name, or the folder cannot be written.
+        Where the name is in use, or the folder cannot be written.
     """
     private_folder(folder)
     secret, public = (folder / f"{check_name(name)}.{kind}" for kind in ("secret", "public"))
@@ -114,7 +116,7 @@ def new_pair(folder: Path, name: str) -> tuple[Path, Path]:
 
 
 def write_key_file(path: Path, contents: BaseModel) -> None:
-    """Write a file of mode 0600, whole or not at all.
+    """Write a key file of mode 0600 atomically.
 
     Raises
     ------
@@ -125,14 +127,14 @@ def write_key_file(path: Path, contents: BaseModel) -> None:
 
 
 def read_pair(path: Path) -> KeyPair:
-    """Read one's own pair.
+    """Read a pair.
 
     Raises
     ------
     KeyFileError
-        Where it is none, or others than its owner may read it.
+        Where it is none, or other users may read it.
     """
-    file = _parse(path, read_private_text(path, 0o077))
+    file = _parse(path, read_private_text(path, _OTHERS))
     if file.secret_key is None:
         raise KeyFileError(f"{path}: holds a public key, expected the file NAME.secret")
     check_key(path, file.secret_key)
