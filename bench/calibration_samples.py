@@ -15,7 +15,7 @@ from bench.cases import Case, with_preset
 from denseface.capture import RgbdFrame
 from denseface.recon import Preset, ReconstructionError, reconstruct
 from denseface.recon.face import Face
-from denseface.recon.propagation import densify
+from denseface.recon.propagation import _densify as densify
 from denseface.recon.propagation.uncertainty import VarianceComponents, variance_components
 from tests.simulator import KINECT_CALIBRATED, Person, Scene, Truth, head_names, simulate
 

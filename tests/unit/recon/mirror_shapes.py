@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from denseface.recon.detail.mirror_plane import MirrorPlane
+from denseface.recon.detail._mirror_plane import MirrorPlane
 
 NEAR = np.array([0.0, 0.0, 700.0])
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from denseface.recon.detail.holes import fill_holes
-from denseface.recon.detail.rim import Rim
+from denseface.recon.detail._holes import fill_holes
+from denseface.recon.detail._rim import Rim
 
 SPACING, STEP, CELLS = 1.5, 0.75, 40
 # Where the cells are, and the points, mm.

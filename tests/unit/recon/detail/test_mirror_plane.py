@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from denseface.recon.detail.mirror_plane import find_plane
+from denseface.recon.detail._mirror_plane import find_plane
 from tests.unit.recon.mirror_shapes import Pose, face_points, height
 
 STEP = 1.5

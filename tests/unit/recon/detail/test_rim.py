@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from denseface.recon.detail.rim import Rim, iterated_average
+from denseface.recon.detail._rim import Rim, iterated_average
 
 ROWS, COLUMNS, FINER = 40, 50, 4
 USUAL = 4.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from denseface.recon.detail.shading import shading_detail, shape_from_shading
+from denseface.recon.detail._shading import shading_detail, shape_from_shading
 
 STEP = 1.2
 XS = np.arange(-50, 50, STEP)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from denseface.recon.detail.mirror_plane import MirrorPlane
-from denseface.recon.detail.symmetry import symmetry_correction
+from denseface.recon.detail._mirror_plane import MirrorPlane
+from denseface.recon.detail._symmetry import symmetry_correction
 from denseface.recon.surface import fit_surface
 from tests.unit.recon.mirror_shapes import Pose, face_points, height
 from tests.unit.recon.shapes import with_detail

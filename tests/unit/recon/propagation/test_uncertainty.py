@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
+from denseface.recon.propagation._densify import densify
 from denseface.recon.propagation._uncertainty_kernels import coarsen
-from denseface.recon.propagation.densify import densify
 from denseface.recon.propagation.uncertainty import fit_cutoff, noise_fraction
 from denseface.recon.settings import Preset, Settings
 from tests.unit.recon.shapes import disc_seeds, fitted, seeds

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.detail._detail_kernels import blend_toward, face_field, shares, slopes
-from denseface.recon.detail.holes import fill_holes
-from denseface.recon.detail.mirror_plane import find_plane
-from denseface.recon.detail.rim import BROADER, Rim, iterated_average
-from denseface.recon.detail.shading import shading_detail
-from denseface.recon.detail.symmetry import symmetry_correction
+from denseface.recon.detail._holes import fill_holes
+from denseface.recon.detail._mirror_plane import find_plane
+from denseface.recon.detail._rim import BROADER, Rim, iterated_average
+from denseface.recon.detail._shading import shading_detail
+from denseface.recon.detail._symmetry import symmetry_correction
 from denseface.recon.intermediate import ColorSampler, SurfaceGrid
 from denseface.recon.numerics.bilinear import add_resampled
 from denseface.recon.numerics.filters import blurred, downsampled, upsampled

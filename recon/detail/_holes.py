@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.detail._hole_kernels import interpolate_filled, minimize_bending
-from denseface.recon.detail.rim import Rim
+from denseface.recon.detail._rim import Rim
 from denseface.recon.numerics.components import large_components
 from denseface.recon.numerics.filters import downsampled
 

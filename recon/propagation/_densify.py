@@ -12,7 +12,7 @@ from denseface.recon.face import DenseCloud, Seeds
 from denseface.recon.intermediate import ColorSampler, SurfaceGrid
 from denseface.recon.numerics.push_pull import interpolate_colors
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, pixel_coordinates
-from denseface.recon.propagation._image_kernels import collect, unset
+from denseface.recon.propagation._grid_kernels import collect, unset
 from denseface.recon.propagation.uncertainty import standard_error, variance_components
 from denseface.recon.support import Support
 

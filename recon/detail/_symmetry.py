@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.detail._mirror_kernels import mirror_image
+from denseface.recon.detail._mirror_plane import MirrorPlane
 from denseface.recon.detail._symmetry_kernels import (
     add_mirrored,
     halved_moments,
     halved_peaks,
     parts_kept,
 )
-from denseface.recon.detail.mirror_plane import MirrorPlane
 from denseface.recon.numerics.filters import blurred, upsampled
 from denseface.recon.numerics.normalized_convolution import normalized
 

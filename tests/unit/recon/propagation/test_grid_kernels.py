@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from denseface.recon.propagation._image_kernels import collect, unset
+from denseface.recon.propagation._grid_kernels import collect, unset
 
 
 def places(count):
