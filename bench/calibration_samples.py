@@ -15,7 +15,6 @@ from bench.cases import Case, with_preset
 from denseface.capture import RgbdFrame
 from denseface.recon import Preset, ReconstructionError, reconstruct
 from denseface.recon.face import Face
-from denseface.recon.propagation import _densify as densify
 from denseface.recon.propagation.uncertainty import VarianceComponents, variance_components
 from tests.simulator import KINECT_CALIBRATED, Person, Scene, Truth, head_names, simulate
 
@@ -137,7 +136,7 @@ def _recorded_components() -> Iterator[list[_PlacedComponents]]:
         recorded.append(_PlacedComponents(found, origin, step * found.every))
         return found
 
-    with mock.patch.object(densify, "variance_components", record):
+    with mock.patch("denseface.recon.propagation._densify.variance_components", record):
         yield recorded
 
 

@@ -7,8 +7,7 @@ from functools import partial
 from bench.cases import Case
 from denseface.recon import Settings
 from denseface.recon.pipeline import surface_of
-from denseface.recon.propagation._densify import densify
-from denseface.recon.propagation.uncertainty import noise_fraction
+from denseface.recon.propagation import densify, noise_fraction
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import segment_face
 from denseface.recon.surface import mean_spacing

@@ -35,13 +35,13 @@ def fitted(samples: dict[Preset, Samples]) -> dict[str, float]:
     share, hole, slope, rim = _most_likely(best.components, best)
     alone = [_most_likely(samples[preset].components, samples[preset])[3] for preset in _FITS_ALONE]
     found = {"_HOLE": hole / share, "_SLOPE": slope, "_RIM": rim,
-             "_RIM_ALONE": math.sqrt(math.prod(alone))}
+             "_RIM_FIT_ALONE": math.sqrt(math.prod(alone))}
     scale = math.sqrt(math.prod(_scale(preset, samples[preset], found)
                                 for preset in _FITS_ALONE))
     settings = Settings.of(Preset.BEST)
     base = scale * fit_cutoff(settings.r0_factor, settings.smoothing) ** 2
     detail = scale * averaging_cutoff(settings.detail_factor or math.inf) ** 2
-    return found | {"_SHARE": scale, "_DETAIL_PART": (share - base) / detail}
+    return found | {"_FIT_FRACTION": scale, "_DETAIL_FRACTION": (share - base) / detail}
 
 
 def _most_likely(components: Floats, of: Samples) -> Floats:
@@ -68,7 +68,7 @@ def _most_likely(components: Floats, of: Samples) -> Floats:
 def _scale(preset: Preset, of: Samples, known: dict[str, float]) -> float:
     """Give what balances a preset of one fit, where all else is known: its share by (h / L)^2."""
     noise = of.components[:, 0] + known["_HOLE"] * of.components[:, 1]
-    rest = of.components[:, 2:] @ [known["_SLOPE"], known["_RIM_ALONE"]]
+    rest = of.components[:, 2:] @ [known["_SLOPE"], known["_RIM_FIT_ALONE"]]
     settings = Settings.of(preset)
     share = brentq(lambda share: _imbalance(np.sqrt(share * noise + rest), of), 0.01, 20)
     return float(share) / fit_cutoff(settings.r0_factor, settings.smoothing) ** 2

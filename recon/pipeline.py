@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.capture.frame import RgbdFrame
-from denseface.recon.detail._detail import add_detail
+from denseface.recon.detail import add_detail
 from denseface.recon.detection import detect_face
 from denseface.recon.errors import NoDepthError, TooLittleDepthError
 from denseface.recon.face import Face, PointCloud, Report
 from denseface.recon.intermediate import ColorSampler, Registration, SurfaceGrid
 from denseface.recon.numerics.threads import one_blas_thread
-from denseface.recon.propagation._densify import densify
-from denseface.recon.propagation.uncertainty import noise_fraction
+from denseface.recon.propagation import densify, noise_fraction
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import box_window, segment_face
 from denseface.recon.settings import Settings

@@ -11,7 +11,7 @@ from denseface.recon.detection import detect_face, judge_box
 from denseface.recon.errors import NoFaceError
 from denseface.recon.numerics.malloc import keep_freed_memory
 from denseface.recon.pipeline import surface_of
-from denseface.recon.propagation._densify import densify
+from denseface.recon.propagation import densify
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import segment_face
 from denseface.recon.settings import Settings

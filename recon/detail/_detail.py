@@ -3,16 +3,23 @@
 One smoothing for the whole face is a compromise: cheeks and forehead could bear more of it, lips
 and eyelids less. So the fit is broad, and what it leaves of the seeds is averaged around each
 place by a narrow Gaussian. Of this detail the local Wiener gain of Lee, 1980,
-doi:10.1109/TPAMI.1980.4766994, keeps what stands above noise.
+doi:10.1109/TPAMI.1980.4766994, keeps what stands above noise. Constants: docs/decisions/0008, 0017.
 """
 
 import math
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.detail._detail_kernels import blend_toward, face_field, shares, slopes
+from denseface.recon.detail._detail_kernels import (
+    blend_toward,
+    mirror_planes,
+    normalize_sums,
+    slopes,
+)
 from denseface.recon.detail._holes import fill_holes
+from denseface.recon.detail._mirror_kernels import HeightField
 from denseface.recon.detail._mirror_plane import find_plane
 from denseface.recon.detail._rim import BROADER, Rim, iterated_average
 from denseface.recon.detail._shading import shading_detail
@@ -29,23 +36,25 @@ __all__ = ["add_detail"]
 
 Image = NDArray[np.float32]
 
-# Below this share of the usual weight lies a hole, or the rim: a broad average is taken there.
 _FULL = 0.4
-# An average fades where the seeds within reach weigh less than this share of what is usual.
+"""Below this part of the usual weight of seeds lies a hole, or the rim."""
 _FADING = 0.005
-# Over what radius detail counts as local (standard deviation).
+"""Averages fade where the seeds within reach weigh less than this part of what is usual."""
 _WINDOW_MM = 11.0
-# The smoothest part of a face shows what noise alone adds to the detail, away from the rim, where
-# broad averages leave less of it.
+"""Standard deviation of the Gaussian over which detail counts as local, mm."""
 _NOISE_PERCENTILE = 26
-_AT_RIM = 0.5
-# What lies within about so many spacings of the rim tells little of the noise, and of the other
-# side.
-_FADING_RIM = 1.5
+"""The smoothest part of a face shows what noise alone adds to the detail, percent."""
+_NARROW = 0.5
+"""Noise is told where the broad average weighs less: it leaves less noise."""
+_RIM_SPACINGS = 1.5
+"""So near the rim detail tells little of the noise, and of the other side, mean spacings."""
+
+_COARSE = np.s_[::2, ::2]
+"""Every second point each way: how much of the detail is noise varies slowly."""
 
 
 def add_detail(
-    heights: Image, supported: Support, points: NDArray[np.float32], spacing: float,
+    heights: Image, support: Support, points: NDArray[np.float32], spacing: float,
     radius: float, *, symmetry: bool = False, sampler: ColorSampler | None = None,
 ) -> SurfaceGrid:
     """Add to a broad fit what its seeds show besides.
@@ -53,81 +62,69 @@ def add_detail(
     Parameters
     ----------
     heights : (rows, columns) float32, mm, a fit of `points` on the support's grid
-    supported : where they support a surface
+    support : where they support a surface
     points : (n, 3) float32, mm, depth camera frame
     spacing : mean spacing of the points, mm
     radius : of the average (standard deviation), mm
-    symmetry : let each side of the face be helped by the other's mirror image
+    symmetry : correct each side of the face by the other's mirror image
     sampler : tells points' colours, of whose shading more detail is taken; None: of depth alone
     """
-    xs, ys, step, support = supported.xs, supported.ys, supported.step, supported.inside
-    columns, rows = (((points[:, axis] - low) / step).astype(np.float32)
-                     for axis, low in ((0, xs[0]), (1, ys[0])))
-    grid = _SeedGrid(columns, rows, support.shape)
-    rest = points[:, 2] - grid.at_seeds(heights)
-    usual = np.float32((step / spacing) ** 2)
-    weight, detail = (blurred(one, _blur_after_scatter(radius / step)) for one in grid.sums(rest))
-    seeded, missing = shares(weight, detail, float(usual) * _FADING, float(usual) * _FULL)
-    rim = Rim.of(support, step / spacing)
-    # So broad an average needs no more than every fourth point.
-    cells = grid.halved().halved()
-    counts, sums = cells.sums(rest)
-    broad = iterated_average(counts, sums, BROADER * radius / (4 * step), 16 * float(usual), rim, 2)
-    blend_toward(detail, upsampled(broad, detail.shape), upsampled(rim.nearness, detail.shape),
-                 missing)
-    filled, hole = fill_holes(counts, sums, missing, rim, heights, detail, spacing)
-    detail *= 1 - hole
+    inside = support.inside
+    seeds = _SeedGrid.over(points, support)
+    residuals = points[:, 2] - seeds.interpolate(heights)
+    rim = Rim.of(inside, support.step / spacing)
+    averages = _average(seeds, residuals, heights, rim, radius / support.step, spacing,
+                        support.step)
+    detail, filled, hole = averages.detail, averages.filled, averages.hole
 
-    # How much of it is more than noise varies slowly: every second point is enough.
-    some = np.s_[::2, ::2]
-    shown = support[some].astype(np.float32)
-    inner = np.clip(2 * blurred(shown, _FADING_RIM) - 1, 0, 1) * shown
-    field = face_field(heights, detail, seeded, inner, spacing)
-    gain, noise = _gain(
-        field[..., 3], inner * (1 - hole[some]), rim.nearness < _AT_RIM, spacing)
-    origin = float(xs[0]), float(ys[0])
-    plane = find_plane(field, origin, spacing) if symmetry else None
-    kept = gain * detail[some]
-    between = [(np.arange(side) / 2).astype(np.float32) for side in detail.shape]
-    share = np.zeros_like(detail)
-    add_resampled(share, gain, *between)
-    detail *= share
+    shown = inside[_COARSE].astype(np.float32)
+    inner = np.clip(2 * blurred(shown, _RIM_SPACINGS) - 1, 0, 1) * shown
+    field = HeightField(mirror_planes(heights, detail, averages.seeded, inner, spacing),
+                        np.array([support.xs[0], support.ys[0], 0.0]), spacing)
+    gain, noise = _wiener_gain(
+        field.planes[..., 3], inner * (1 - hole[_COARSE]), rim.broad_weight < _NARROW, spacing)
+    kept = gain * detail[_COARSE]
+    detail *= _add_upsampled(np.zeros_like(detail), gain)
     more = np.zeros_like(shown)
+    plane = find_plane(field) if symmetry else None
     if plane is not None:
-        more = symmetry_correction(field, kept, filled[some], hole[some], plane, noise,
-                                   _WINDOW_MM, origin, spacing)
+        more = symmetry_correction(
+            field, kept, filled[_COARSE], hole[_COARSE], plane, noise, _WINDOW_MM)
     if sampler is not None:
-        surface = heights[some] + detail[some] + filled[some] + more
-        across, down = np.empty_like(surface), np.empty_like(surface)
-        slopes(surface, spacing, across, down)
-        more += shading_detail(
-            surface, shown * rim.within, (across, down), (xs[::2], ys[::2]), sampler)
-    add_resampled(detail, more, *between)
-
-    smaller = downsampled(heights)
-    across, down = np.empty_like(smaller), np.empty_like(smaller)
-    slopes(smaller, 2 * step, across, down)
-    detail += upsampled(rim.fraying_correction((across, down), spacing), detail.shape)
+        surface = heights[_COARSE] + detail[_COARSE] + filled[_COARSE] + more
+        more += shading_detail(surface, shown * rim.color_weight, _slopes(surface, spacing),
+                               (support.xs[::2], support.ys[::2]), sampler)
+    _add_upsampled(detail, more)
+    fraying = rim.fraying_correction(*_slopes(downsampled(heights), 2 * support.step), spacing)
+    detail += upsampled(fraying, detail.shape)
     detail += filled
     values = np.empty((3, *detail.shape), np.float32)
     np.add(heights, detail, out=values[0])
-    slopes(values[0], step, values[1], values[2])
-    noise_mm = float((rest - grid.at_seeds(detail)).std())
-    return SurfaceGrid(values, supported, noise_mm, detailed=True)
+    slopes(values[0], support.step, values[1], values[2])
+    noise_mm = float((residuals - seeds.interpolate(detail)).std())
+    return SurfaceGrid(values, support, noise_mm, detailed=True)
 
 
-class _SeedGrid:
+class _SeedGrid(NamedTuple):
     """Seeds over an image.
 
-    Parameters
+    Attributes
     ----------
     columns, rows : (n,) float32, where they are, pixels, inside the image and off its last row
         and column
     shape : (rows, columns) of the image
     """
 
-    def __init__(self, columns: Image, rows: Image, shape: tuple[int, ...]) -> None:
-        self.columns, self.rows, self.shape = columns, rows, shape
+    columns: Image
+    rows: Image
+    shape: tuple[int, ...]
+
+    @classmethod
+    def over(cls, points: NDArray[np.float32], support: Support) -> Self:
+        """Place (n, 3) points, mm, on the grid of their support."""
+        columns, rows = (((points[:, axis] - low) / support.step).astype(np.float32)
+                         for axis, low in ((0, support.xs[0]), (1, support.ys[0])))
+        return cls(columns, rows, support.margin.shape)
 
     def halved(self) -> "_SeedGrid":
         """The same over an image of which each pixel is four of these."""
@@ -135,26 +132,66 @@ class _SeedGrid:
         columns, rows = (half * (one - half) for one in (self.columns, self.rows))
         return _SeedGrid(columns, rows, ((self.shape[0] + 1) // 2, (self.shape[1] + 1) // 2))
 
-    def sums(self, values: Image) -> tuple[Image, Image]:
-        """Sum the seeds, and their values, each shared among the four pixels around it."""
+    def scatter(self, values: Image) -> tuple[Image, Image]:
+        """Sum the seeds, and their values, by bilinear weights on the four pixels around each."""
         counts, sums = np.zeros(self.shape, np.float32), np.zeros(self.shape, np.float32)
         splat(self.columns, self.rows, values, counts, sums)
         return counts, sums
 
-    def at_seeds(self, image: Image) -> Image:
-        """Interpolate an image, (n,)."""
+    def interpolate(self, image: Image) -> Image:
+        """Read an image at the seeds, (n,)."""
         return interpolate(image, self.columns, self.rows)
 
 
+class _Averages(NamedTuple):
+    """Local averages of the residuals, (rows, columns) float32 each.
+
+    Attributes
+    ----------
+    detail : mm along z, narrow averages, broad ones at the rim; 0 where a hole is filled
+    seeded : 0-1, weight of the seeds
+    filled : mm along z, in holes, weighted by
+    hole : 0-1
+    """
+
+    detail: Image
+    seeded: Image
+    filled: Image
+    hole: Image
+
+
+def _average(
+    seeds: _SeedGrid, residuals: Image, heights: Image, rim: Rim, radius: float, spacing: float,
+    step: float,
+) -> _Averages:
+    """Average the residuals, and fill holes.
+
+    radius : of the narrow average (standard deviation), points of the grid
+    step : distance of these, mm
+    """
+    usual = float(np.float32((step / spacing) ** 2))
+    blur = _blur_after_scatter(radius)
+    weight, detail = (blurred(one, blur) for one in seeds.scatter(residuals))
+    seeded, missing = normalize_sums(weight, detail, usual * _FADING, usual * _FULL)
+    # So broad an average needs no more than every fourth point.
+    counts, sums = seeds.halved().halved().scatter(residuals)
+    broad = iterated_average(counts, sums, BROADER * radius / 4, 16 * usual, rim, 2)
+    blend_toward(detail, upsampled(broad, detail.shape),
+                 upsampled(rim.broad_weight, detail.shape), missing)
+    filled, hole = fill_holes(counts, sums, missing, rim, heights, detail, spacing)
+    detail *= 1 - hole
+    return _Averages(detail, seeded, filled, hole)
+
+
 def _blur_after_scatter(sigma: float) -> float:
-    """The radius of a blur, less what sharing a value among four pixels has blurred already."""
+    """The standard deviation of a blur, less what bilinear weights have blurred already."""
     return math.sqrt(sigma * sigma - BILINEAR_VARIANCE)
 
 
-def _gain(
+def _wiener_gain(
     detail: Image, inner: Image, narrow: NDArray[np.bool_], step: float
 ) -> tuple[Image, float]:
-    """How much of the detail is not noise, 0-1, place by place, and the variance of noise.
+    """Give the gain, 0-1, place by place, and the variance of noise, mm^2.
 
     detail : mm along the normal: along z, noise and detail both grow where a face is steep
     inner : 0-1, what counts as face
@@ -166,3 +203,17 @@ def _gain(
     noise = percentile(seen, _NOISE_PERCENTILE) if seen.size else 0.0
     gain = 1 - np.float32(noise) / np.maximum(local, np.float32(max(noise, 1e-12)))
     return np.asarray(gain, np.float32), noise
+
+
+def _slopes(heights: Image, step: float) -> tuple[Image, Image]:
+    """Give dz/dx and dz/dy of points at a distance, mm."""
+    dz_dx, dz_dy = np.empty_like(heights), np.empty_like(heights)
+    slopes(heights, step, dz_dx, dz_dy)
+    return dz_dx, dz_dy
+
+
+def _add_upsampled(image: Image, coarse: Image) -> Image:
+    """Add in place what is known at every second point each way, bilinear; give the image."""
+    rows, columns = ((np.arange(side) / 2).astype(np.float32) for side in image.shape)
+    add_resampled(image, coarse, rows, columns)
+    return image

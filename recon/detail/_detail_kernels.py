@@ -1,23 +1,22 @@
-"""Slopes of a surface on a grid, and what else its detail is weighed by, compiled."""
+"""Slopes of a surface on a grid, and what its detail is weighed by, compiled."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["blend_toward", "face_field", "shares", "slopes"]
+__all__ = ["blend_toward", "mirror_planes", "normalize_sums", "slopes"]
+
+Image = NDArray[np.float32]
 
 _1 = np.uint64(1)
 
 
 @compiled
-def slopes(
-    heights: NDArray[np.float32], step: float, across: NDArray[np.float32],
-    down: NDArray[np.float32],
-) -> None:
-    """Set dz/dx and dz/dy of points at a distance, mm; all are (rows, columns), 2 each at least.
+def slopes(heights: Image, step: float, dz_dx: Image, dz_dy: Image) -> None:
+    """Set dz/dx and dz/dy by central differences; one-sided, of half the size, at the edge.
 
-    From the neighbours on both sides; beyond the edge its own height goes on.
+    heights, dz_dx, dz_dy : (rows, columns), at least 2 each, mm, unitless; step : mm
     """
     rows, columns = heights.shape
     half = np.float32(0.5 / step)
@@ -25,24 +24,24 @@ def slopes(
     for row in range(rows):
         line = heights[row]
         above, below = heights[max(row - 1, 0)], heights[min(row + 1, rows - 1)]
-        out_across, out_down = across[row], down[row]
+        along_x, along_y = dz_dx[row], dz_dy[row]
         for j in range(np.uint64(columns)):
-            out_down[j] = half * (below[j] - above[j])
+            along_y[j] = half * (below[j] - above[j])
         for j in range(_1, last):
-            out_across[j] = half * (line[j + _1] - line[j - _1])
-        out_across[0] = half * (line[1] - line[0])
-        out_across[last] = half * (line[last] - line[last - _1])
+            along_x[j] = half * (line[j + _1] - line[j - _1])
+        along_x[0] = half * (line[1] - line[0])
+        along_x[last] = half * (line[last] - line[last - _1])
 
 
 @compiled
-def shares(
-    weight: NDArray[np.float32], sums: NDArray[np.float32], fading: float, full: float
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Make sums means, which fade where the weight is not much more than `fading`.
+def normalize_sums(
+    weight: Image, sums: Image, fading: float, full: float
+) -> tuple[Image, Image]:
+    """Divide sums by their weight, in place; means fade where the weight is near `fading`.
 
-    weight, sums : (rows, columns); the last changed
+    weight, sums : (rows, columns)
 
-    Gives how much of `full` the weight is, 0-1, and how much is missing of that, smooth between.
+    Gives the weight over `full`, clipped to 0-1, and the smoothstep of what it lacks.
     """
     seeded, missing = np.empty_like(weight), np.empty_like(weight)
     least, per_full = np.float32(fading), np.float32(1 / full)
@@ -60,30 +59,25 @@ def shares(
 
 
 @compiled
-def blend_toward(
-    detail: NDArray[np.float32], broad: NDArray[np.float32], nearness: NDArray[np.float32],
-    missing: NDArray[np.float32],
-) -> None:
-    """Move detail toward a broad average, by how near the rim is or how much is missing.
+def blend_toward(detail: Image, broad: Image, rim_weight: Image, missing: Image) -> None:
+    """Blend detail in place toward a broad average, by the larger of two weights, 0-1.
 
-    All are (rows, columns), `detail` is changed.
+    All are (rows, columns).
     """
     for i in range(detail.shape[0]):
-        own, other, near, lacking = detail[i], broad[i], nearness[i], missing[i]
+        own, other, near, lacking = detail[i], broad[i], rim_weight[i], missing[i]
         for j in range(np.uint64(len(own))):
             own[j] += max(near[j], lacking[j]) * (other[j] - own[j])
 
 
 @compiled
-def face_field(
-    heights: NDArray[np.float32], detail: NDArray[np.float32], seeded: NDArray[np.float32],
-    inner: NDArray[np.float32], step: float,
-) -> NDArray[np.float32]:
-    """Give the field that a face is mirrored in, (rows, columns, 5); see `symmetry_correction`.
+def mirror_planes(
+    heights: Image, detail: Image, seeded: Image, inner: Image, step: float
+) -> Image:
+    """Give the planes of a `HeightField`, (rows, columns, 5), at every second point.
 
-    heights, detail, seeded : (2 rows, 2 columns), of which every second point counts
-    inner : (rows, columns), weight as a mirror image
-    step : from point to point of the field, mm
+    heights, detail, seeded : (2 rows, 2 columns) or one less; inner : (rows, columns), weight
+    step : of the result, mm
     """
     rows, columns = inner.shape
     out = np.empty((rows, columns, 5), np.float32)

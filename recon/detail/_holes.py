@@ -1,17 +1,25 @@
-"""Holes are filled by the surface that bends least, as bending counts along the surface.
+"""Holes are filled by the surface of least bending energy.
 
 Broad fits of heights spread a turn evenly over the hole, as a thin plate does: a chin's edge is
 cut off. What a bent plate stores, the integral of its squared curvatures over its area, is
 about (second differences)^2 / (1 + slope^2)^(5/2), so that a turn is where the surface is steep.
 Sought is the least of that and of the squared residuals of the seeds around, on cells two
-spacings wide; outside of a hole and its border the surface is given.
+spacings wide; outside of a hole and its border the surface is given. Constants:
+docs/decisions/0019.
 """
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solveh_banded
 
-from denseface.recon.detail._hole_kernels import interpolate_filled, minimize_bending
+from denseface.recon.detail._hole_kernels import (
+    Cells,
+    bandwidth,
+    normal_equations,
+    number_unknowns,
+    resample_filled,
+)
 from denseface.recon.detail._rim import Rim
 from denseface.recon.numerics.components import large_components
 from denseface.recon.numerics.filters import downsampled
@@ -20,15 +28,20 @@ __all__ = ["fill_holes"]
 
 Image = NDArray[np.float32]
 
-# Cells of which so much is missing are a hole, of so many at least and so many spacings inside the
-# rim; its border reaches so many cells farther.
 _MISSING = 0.5
-_LEAST_CELLS = 2
-_FROM_RIM = 2.0
+"""Cells of which a larger part is missing are a hole."""
+_MIN_CELLS = 2
+"""Fewer cells are none."""
+_MIN_RIM_DISTANCE = 2.0
+"""Cells nearer to the rim are none, mean spacings."""
 _BORDER = 2
-# Of the bending, against the seeds' squared residuals; lengths are in mean spacings.
+"""A hole's unknowns reach so many cells over its border."""
 _SMOOTHING = 4.0
+"""Weight of the bending against the seeds' squared residuals, lengths in mean spacings."""
 _CELL = 2.0
+"""Side of a cell, mean spacings."""
+_ITERATIONS = 2
+"""Solutions, each with the slopes of the one before."""
 
 
 def fill_holes(
@@ -41,8 +54,8 @@ def fill_holes(
     ----------
     counts, sums : (rows, columns) float32, the seeds in each cell, two spacings wide, and the sum
         of what they are off the heights, mm
-    missing : (4 rows, 4 columns) or up to three fewer, 0-1, what share of the surface the seeds
-        do not tell
+    missing : (4 rows, 4 columns) float32 or up to three fewer, 0-1, what part of the surface the
+        seeds do not tell
     rim : of the surface, by half as many points each way as `missing`
     heights, detail : as `missing`, mm: a fit and what is added to it; in holes a first guess
     spacing : mean spacing of the seeds, mm
@@ -52,21 +65,44 @@ def fill_holes(
     filled : as `missing`, mm: what is to be added to the heights there, times
     hole : 0-1, how much of a place is filled; both 0 where there is no hole
     """
-    away = downsampled(rim.away)
-    inside = away > 0
+    distance = downsampled(rim.distance)
+    inside = distance > 0
     hole = large_components(
-        (downsampled(downsampled(missing)) > _MISSING) & (away > _FROM_RIM), _LEAST_CELLS)
+        (downsampled(downsampled(missing)) > _MISSING) & (distance > _MIN_RIM_DISTANCE), _MIN_CELLS)
     if not hole.any():
         none = np.zeros_like(missing)
         return none, none
+    labels, boxes = _with_border(hole, inside)
+    cells = Cells(counts, sums, downsampled(downsampled(heights)),
+                  downsampled(downsampled(detail)), inside, np.full(labels.shape, -1, np.int32))
+    for label in range(1, len(boxes)):
+        _minimize_bending(cells, labels, label, boxes[label], _CELL * spacing)
+    return resample_filled(cells.added, labels, missing)
+
+
+def _with_border(
+    hole: NDArray[np.bool_], inside: NDArray[np.bool_]
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Number holes with their borders: labels, 0 elsewhere, and a box for each, (labels, 5)."""
     side = 2 * _BORDER + 1
     ellipse = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
     wanted = np.asarray(cv2.dilate(hole.view(np.uint8), ellipse) * inside, np.uint8)
     wanted[:3] = wanted[-3:] = 0
     wanted[:, :3] = wanted[:, -3:] = 0
-    _, *found, _ = cv2.connectedComponentsWithStats(wanted)
-    parts, boxes = (np.asarray(one, np.int32) for one in found)
-    added = downsampled(downsampled(detail))
-    minimize_bending(counts, sums, downsampled(downsampled(heights)), added, parts, boxes, inside,
-               _SMOOTHING / _CELL**2, _CELL * spacing)
-    return interpolate_filled(added, parts, missing)
+    _, labels, boxes, _ = cv2.connectedComponentsWithStats(wanted)
+    return np.asarray(labels, np.int32), np.asarray(boxes, np.int32)
+
+
+def _minimize_bending(
+    cells: Cells, labels: NDArray[np.int32], label: int, box: NDArray[np.int32], step: float
+) -> None:
+    """Set what is added in one hole; `step` is from cell to cell, mm."""
+    rows, columns = number_unknowns(labels, label, box, cells.numbers)
+    band = bandwidth(rows, columns, cells.numbers)
+    for _ in range(_ITERATIONS):
+        lower, right = normal_equations(
+            cells, rows, columns, box, band, _SMOOTHING / _CELL**2, step)
+        # Transposed, rows of the lower half are columns of the upper one, as LAPACK has it.
+        cells.added[rows, columns] = solveh_banded(
+            lower.T, right, overwrite_ab=True, overwrite_b=True, check_finite=False)
+    cells.numbers[rows, columns] = -1

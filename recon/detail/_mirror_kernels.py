@@ -1,12 +1,11 @@
 """A height field's mirror image in a plane, compiled.
 
-A plane is a unit normal and an offset: n . p = offset. `field` is (rows, columns, k) float32, its
-first plane the height, mm, the second the share of a point's normal that looks along z, the third
-its weight; places in it are grid points from `origin`, (x, y) mm, `step` apart. Where `origin` has
-a z, heights count from -z.
+A plane is a unit normal and an offset, mm: n . p = offset. A point looks along z by the cosine of
+its normal to the z axis, its *facing*.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,34 +13,51 @@ from numpy.typing import NDArray
 from denseface.recon.numerics.jit import compiled
 from denseface.recon.numerics.linear_solve import solve_small
 
-__all__ = ["mirror_costs", "mirror_image", "principal_curvature_angle", "refine_plane",
-           "sample_points"]
+__all__ = ["HeightField", "mirror_costs", "mirror_image", "principal_curvature_angle",
+           "refine_plane", "sample_points"]
+
+Image = NDArray[np.float32]
+Floats = NDArray[np.float64]
+
+
+class HeightField(NamedTuple):
+    """A face's surface over (X, Y), on a regular grid.
+
+    Attributes
+    ----------
+    planes : (rows, columns, k) float32: height, mm; facing; weight as a mirror image, 0-1; and for
+        `mirror_image` besides: detail, mm along the normal; weight of the seeds, 0-1
+    origin : (3,) float64, mm, x and y of the first point, and what is added to the heights
+    step : distance of the points, mm
+    """
+
+    planes: Image
+    origin: Floats
+    step: float
 
 
 @compiled
-def sample_points(
-    field: NDArray[np.float32], origin: NDArray[np.float64], step: float, every: int,
-    facing: float,
-) -> NDArray[np.float64]:
-    """Give every so many of a field's points, (n, 3), that count and look along z by so much."""
-    rows, columns = field.shape[:2]
+def sample_points(field: HeightField, every: int, min_facing: float) -> Floats:
+    """Give every so many of a field's points, (n, 3) mm, that count and face the camera."""
+    planes, origin, step = field
+    rows, columns = planes.shape[:2]
     points = np.empty(((rows // every + 1) * (columns // every + 1), 3))
     count = 0
     for i in range(0, rows, every):
         for j in range(0, columns, every):
-            if field[i, j, 2] > 0 and field[i, j, 1] > facing:
+            if planes[i, j, 2] > 0 and planes[i, j, 1] > min_facing:
                 points[count, 0] = origin[0] + step * j
                 points[count, 1] = origin[1] + step * i
-                points[count, 2] = field[i, j, 0]
+                points[count, 2] = planes[i, j, 0]
                 count += 1
     return points[:count].copy()
 
 
 @compiled
-def principal_curvature_angle(points: NDArray[np.float64]) -> float:
-    """Give the direction across the view in which points about their middle curve away most.
+def principal_curvature_angle(points: Floats) -> float:
+    """Give the direction, from x toward y, rad, in which points curve away from the camera most.
 
-    points : (n, 3); gives the angle from x toward y
+    points : (n, 3), mm, about their mean; a quadric is fitted to them
     """
     matrix, right, term = np.zeros((6, 6)), np.zeros(6), np.ones(6)
     for i in range(len(points)):
@@ -53,23 +69,25 @@ def principal_curvature_angle(points: NDArray[np.float64]) -> float:
             for k in range(6):
                 matrix[j, k] += term[j] * term[k]
     fit = solve_small(matrix, right)
-    # The second axis of a symmetric matrix of two rows.
+    # The axis of the Hessian's larger eigenvalue.
     return math.atan2(2 * fit[4], fit[3] - fit[5]) / 2
 
 
 @compiled
 def mirror_costs(
-    field: NDArray[np.float32], origin: NDArray[np.float64], step: float,
-    points: NDArray[np.float64], normals: NDArray[np.float64], offsets: NDArray[np.float64],
-    most: float, missing: float,
-) -> NDArray[np.float64]:
-    """How far points' mirror images are off the field, for each normal and each offset.
+    field: HeightField, points: Floats, normals: Floats, offsets: Floats, limit: float,
+    missing: float,
+) -> Floats:
+    """Give the mean squared distance of points' mirror images from the field, mm^2.
 
-    The mean of their squared distances, mm^2, each at most `most`, and `missing` where there is
-    nothing.
+    points : (n, 3), normals : (a, 3), offsets : (b,)
+    limit, missing : mm^2, the largest cost of a point, and its cost where the field has no weight
+
+    Gives (a, b).
     """
+    planes, origin, step = field
     costs = np.zeros((len(normals), len(offsets)))
-    rows, columns = field.shape[0] - 1, field.shape[1] - 1
+    rows, columns = planes.shape[0] - 1, planes.shape[1] - 1
     for a in range(len(normals)):
         nx, ny, nz = normals[a]
         for b in range(len(offsets)):
@@ -81,10 +99,10 @@ def mirror_costs(
                 row = (y - twice * ny - origin[1]) / step
                 cost = missing
                 if 0 <= row < rows and 0 <= column < columns:
-                    near = field[int(row + 0.5), int(column + 0.5)]
+                    near = planes[int(row + 0.5), int(column + 0.5)]
                     if near[2] > 0:
                         away = (near[0] + origin[2] - (z - twice * nz)) * near[1]
-                        cost = min(away * away, most)
+                        cost = min(away * away, limit)
                 total += cost
             costs[a, b] = total / len(points)
     return costs
@@ -92,129 +110,125 @@ def mirror_costs(
 
 @compiled
 def refine_plane(
-    field: NDArray[np.float32], origin: NDArray[np.float64], step: float,
-    points: NDArray[np.float64], normal: NDArray[np.float64], offset: float, scale: float,
-    steps: int, still: float,
-) -> tuple[NDArray[np.float64], float, int]:
-    """Steps of Gauss and Newton toward the plane that mirrors points onto the field.
+    field: HeightField, points: Floats, normal: Floats, offset: float, scale: float, steps: int,
+    tolerance: float,
+) -> tuple[Floats, float, int]:
+    """Take Gauss-Newton steps toward the plane that mirrors points onto the field.
 
-    Residuals r, mm along the field's normal, have the weight 1 / (1 + (r / scale)^2)^2; unknown
-    are the normal's turn about two axes and the offset's change. It ends when none changes by
-    more than `still`, mm and (for points about the origin) a hundredth of it in radians.
+    Unknown are the normal's turn about two axes, rad, and the offset's change, mm. Ends when none
+    changes by more than `tolerance`, mm, of turns a hundredth of it.
+
+    points : (n, 3) mm, about the origin
+    scale : mm, of the residuals' weights (Geman and McClure, 1987)
 
     Gives the normal, (3,), the offset, mm, and how many points' images met the field.
     """
-    J = np.empty(3)
-    rows, columns = field.shape[0] - 1, field.shape[1] - 1
-    nx, ny, nz = normal
     met = 0
     for _ in range(steps):
-        # Two unit vectors across the normal.
-        length = math.sqrt(nx * nx + ny * ny) if abs(nz) < 0.9 else math.sqrt(ny * ny + nz * nz)
-        if abs(nz) < 0.9:
-            ax, ay, az = ny / length, -nx / length, 0.0
-        else:
-            ax, ay, az = 0.0, nz / length, -ny / length
-        bx, by, bz = ny * az - nz * ay, nz * ax - nx * az, nx * ay - ny * ax
-        A, g = np.zeros((3, 3)), np.zeros(3)
-        met = 0
-        for i in range(len(points)):
-            x, y, z = points[i]
-            away = nx * x + ny * y + nz * z - offset
-            column = (x - 2 * away * nx - origin[0]) / step
-            row = (y - 2 * away * ny - origin[1]) / step
-            if not (0 <= row < rows and 0 <= column < columns):
-                continue
-            r, c = int(row), int(column)
-            if min(field[r, c, 2], field[r, c + 1, 2],
-                   field[r + 1, c, 2], field[r + 1, c + 1, 2]) <= 0:
-                continue
-            down, right = row - r, column - c
-            upper = field[r, c, 0] + right * (field[r, c + 1, 0] - field[r, c, 0])
-            lower = field[r + 1, c, 0] + right * (field[r + 1, c + 1, 0] - field[r + 1, c, 0])
-            dx = ((1 - down) * (field[r, c + 1, 0] - field[r, c, 0])
-                  + down * (field[r + 1, c + 1, 0] - field[r + 1, c, 0])) / step
-            dy = (lower - upper) / step
-            # The field's normal is (-dx, -dy, 1) facing.
-            facing = 1 / math.sqrt(1 + dx * dx + dy * dy)
-            rest = (upper + down * (lower - upper) + origin[2] - (z - 2 * away * nz)) * facing
-            looks = facing * (nz - dx * nx - dy * ny)
-            J[0] = 2 * ((ax * x + ay * y + az * z) * looks
-                        + away * facing * (az - dx * ax - dy * ay))
-            J[1] = 2 * ((bx * x + by * y + bz * z) * looks
-                        + away * facing * (bz - dx * bx - dy * by))
-            J[2] = -2 * looks
-            weight = 1 / (1 + (rest / scale) ** 2) ** 2
-            for j in range(3):
-                g[j] -= weight * J[j] * rest
-                for k in range(3):
-                    A[j, k] += weight * J[j] * J[k]
-            met += 1
-        moved = _solve(A, g)
-        nx, ny, nz = (nx + moved[0] * ax + moved[1] * bx, ny + moved[0] * ay + moved[1] * by,
-                      nz + moved[0] * az + moved[1] * bz)
-        length = math.sqrt(nx * nx + ny * ny + nz * nz)
-        nx, ny, nz = nx / length, ny / length, nz / length
+        a, b = _tangents(normal)
+        matrix, right, met = _normal_equations(field, points, normal, offset, a, b, scale)
+        moved = solve_small(matrix, right)
+        normal = normal + moved[0] * a + moved[1] * b
+        normal = normal / math.sqrt(
+            normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
         offset += moved[2]
-        if max(100 * abs(moved[0]), 100 * abs(moved[1]), abs(moved[2])) < still:
+        if max(100 * abs(moved[0]), 100 * abs(moved[1]), abs(moved[2])) < tolerance:
             break
-    return np.array([nx, ny, nz]), offset, met
+    return normal, offset, met
 
 
 @compiled
-def _solve(A: NDArray[np.float64], g: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve three symmetric equations by Cholesky; 0 for what they leave open."""
-    L = np.zeros((3, 3))
-    x = np.zeros(3)
-    for j in range(3):
-        left = A[j, j]
-        for k in range(j):
-            left -= L[j, k] * L[j, k]
-        if left <= 1e-9 * A[j, j]:
-            return x
-        L[j, j] = math.sqrt(left)
-        for i in range(j + 1, 3):
-            value = A[i, j]
-            for k in range(j):
-                value -= L[i, k] * L[j, k]
-            L[i, j] = value / L[j, j]
-    for i in range(3):
-        value = g[i]
-        for k in range(i):
-            value -= L[i, k] * x[k]
-        x[i] = value / L[i, i]
-    for i in range(2, -1, -1):
-        value = x[i]
-        for k in range(i + 1, 3):
-            value -= L[k, i] * x[k]
-        x[i] = value / L[i, i]
-    return x
+def _tangents(normal: Floats) -> tuple[Floats, Floats]:
+    """Give two unit vectors that span the plane, (3,) each."""
+    nx, ny, nz = normal
+    if abs(nz) < 0.9:
+        length = math.sqrt(nx * nx + ny * ny)
+        a = np.array([ny / length, -nx / length, 0.0])
+    else:
+        length = math.sqrt(ny * ny + nz * nz)
+        a = np.array([0.0, nz / length, -ny / length])
+    b = np.array([ny * a[2] - nz * a[1], nz * a[0] - nx * a[2], nx * a[1] - ny * a[0]])
+    return a, b
+
+
+@compiled
+def _normal_equations(
+    field: HeightField, points: Floats, normal: Floats, offset: float, a: Floats, b: Floats,
+    scale: float,
+) -> tuple[Floats, Floats, int]:
+    """Sum the weighted normal equations of `refine_plane`, and count the images that met.
+
+    Residuals r, mm along the field's normal, have the weight 1 / (1 + (r / scale)^2)^2.
+    """
+    planes, origin, step = field
+    A, g, J = np.zeros((3, 3)), np.zeros(3), np.empty(3)
+    rows, columns = planes.shape[0] - 1, planes.shape[1] - 1
+    nx, ny, nz = normal
+    ax, ay, az = a
+    bx, by, bz = b
+    met = 0
+    for i in range(len(points)):
+        x, y, z = points[i]
+        away = nx * x + ny * y + nz * z - offset
+        column = (x - 2 * away * nx - origin[0]) / step
+        row = (y - 2 * away * ny - origin[1]) / step
+        if not (0 <= row < rows and 0 <= column < columns):
+            continue
+        r, c = int(row), int(column)
+        if min(planes[r, c, 2], planes[r, c + 1, 2],
+               planes[r + 1, c, 2], planes[r + 1, c + 1, 2]) <= 0:
+            continue
+        down, right = row - r, column - c
+        upper = planes[r, c, 0] + right * (planes[r, c + 1, 0] - planes[r, c, 0])
+        lower = planes[r + 1, c, 0] + right * (planes[r + 1, c + 1, 0] - planes[r + 1, c, 0])
+        dx = ((1 - down) * (planes[r, c + 1, 0] - planes[r, c, 0])
+              + down * (planes[r + 1, c + 1, 0] - planes[r + 1, c, 0])) / step
+        dy = (lower - upper) / step
+        # The field's normal is (-dx, -dy, 1) facing.
+        facing = 1 / math.sqrt(1 + dx * dx + dy * dy)
+        rest = (upper + down * (lower - upper) + origin[2] - (z - 2 * away * nz)) * facing
+        cosine = facing * (nz - dx * nx - dy * ny)
+        J[0] = 2 * ((ax * x + ay * y + az * z) * cosine
+                    + away * facing * (az - dx * ax - dy * ay))
+        J[1] = 2 * ((bx * x + by * y + bz * z) * cosine
+                    + away * facing * (bz - dx * bx - dy * by))
+        J[2] = -2 * cosine
+        weight = 1 / (1 + (rest / scale) ** 2) ** 2
+        for j in range(3):
+            g[j] -= weight * J[j] * rest
+            for k in range(3):
+                A[j, k] += weight * J[j] * J[k]
+        met += 1
+    return A, g, met
 
 
 @compiled
 def mirror_image(
-    field: NDArray[np.float32], added: NDArray[np.float32], origin: NDArray[np.float64],
-    step: float, normal: NDArray[np.float64], offset: float, farthest: float, steepest: float,
-) -> NDArray[np.float32]:
-    """What a field shows at each of its points' mirror images, (k, rows, columns) float32.
+    field: HeightField, added: Image, normal: Floats, offset: float, max_distance: float,
+    min_facing: float,
+) -> Image:
+    """Sample a field at the mirror image of each of its points, (k, rows, columns) float32.
 
-    `added` to the heights, (rows, columns) mm, is the surface whose points are mirrored. The
-    first plane of the result is how far along the point's own normal the mirrored heights are
-    from the heights, mm; the second how far the mirrored surface is from the surface; the third
-    the weight of the image, fading to 0 at distances of `farthest` and where the surface there
-    looks aside by `steepest`; all others are looked up. Zero where there is nothing.
+    added : (rows, columns), mm, added to the heights: of that surface the points are mirrored
+    max_distance : mm, at which the weight of an image has faded to 0
+    min_facing : below which it has, too
+
+    Planes of the result: how far along the point's own normal the mirrored heights are from the
+    heights, mm; how far the mirrored surface is from the surface, mm; the weight of the image; the
+    field's other planes, bilinear. Zero where there is nothing.
     """
-    rows, columns, kinds = field.shape
+    planes, origin, step = field
+    rows, columns, kinds = planes.shape
     out = np.zeros((kinds, rows, columns), np.float32)
     read = np.empty(kinds, np.float32)
-    flat, per_step = field.ravel(), 1 / step
+    flat, per_step = planes.ravel(), 1 / step
     to_right, to_lower = np.uint64(kinds), np.uint64(columns * kinds)
     for i in range(rows):
         y = origin[1] + step * i
         for j in range(columns):
-            if field[i, j, 2] <= 0:
+            if planes[i, j, 2] <= 0:
                 continue
-            x, z = origin[0] + step * j, np.float64(field[i, j, 0] + added[i, j])
+            x, z = origin[0] + step * j, np.float64(planes[i, j, 0] + added[i, j])
             twice = 2 * (normal[0] * x + normal[1] * y + normal[2] * z - offset)
             column = j - twice * normal[0] * per_step
             row = i - twice * normal[1] * per_step
@@ -230,9 +244,9 @@ def mirror_image(
                 lower = flat[here] + right * (flat[here + to_right] - flat[here])
                 read[k] = upper + down * (lower - upper)
             away = (read[0] - np.float32(z - twice * normal[2])) * read[1]
-            gap = away + added[i, j] * field[i, j, 1]
-            near = min(max(2 - 2 * abs(gap) / farthest, 0.0), 1.0)
-            faced = min(max(read[1] / steepest - 1, 0.0), 1.0)
+            gap = away + added[i, j] * planes[i, j, 1]
+            near = min(max(2 - 2 * abs(gap) / max_distance, 0.0), 1.0)
+            faced = min(max(read[1] / min_facing - 1, 0.0), 1.0)
             weight = read[2] * near * faced
             if weight > 0:
                 for k in range(kinds):

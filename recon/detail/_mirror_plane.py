@@ -1,9 +1,9 @@
 """The plane that mirrors a face onto itself best.
 
 The mirror images of points a few millimetres apart should lie on the face. A coarse search over
-turns and offsets begins, about the direction in which the face curves most, ear to ear; steps of
-Gauss and Newton from the best few end it. Large distances count little (Geman and McClure's
-weights), so that a swollen cheek does not draw the plane.
+turns and offsets starts from the direction in which the face curves most, ear to ear; Gauss-Newton
+steps from the best few end it. The weights of Geman and McClure, 1987, bound what large distances
+count, so that a swollen cheek does not draw the plane.
 """
 
 import math
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.detail._mirror_kernels import (
+    HeightField,
     mirror_costs,
     principal_curvature_angle,
     refine_plane,
@@ -21,28 +22,36 @@ from denseface.recon.detail._mirror_kernels import (
 
 __all__ = ["MirrorPlane", "find_plane"]
 
-# Planes to begin with: turned by so many degrees from where the face is looked at from ahead,
-# passing so near the middle of its points, mm.
 _TURNS = np.radians(np.arange(-40.0, 41.0, 10.0))
-_OFFSETS = np.arange(-24.0, 25.0, 8.0)
-# Points for the search, and for the last steps.
-_SPARSE_MM = 11.0
-_DENSE_MM = 4.0
-# From so many starts; distances above these, mm, are all alike before and after the first steps,
-# and where a mirror image meets nothing counts as a share of them.
+"""Turns of the planes to start from, away from the view from ahead, rad."""
+_OFFSETS_MM = np.arange(-24.0, 25.0, 8.0)
+"""Their distances from the middle of the face's points, mm."""
 _STARTS = 4
+"""How many of them are refined."""
+_SPARSE_MM = 11.0
+"""Distance of points in the coarse search, mm."""
+_DENSE_MM = 4.0
+"""Distance of points in the last steps, mm."""
 _FAR_MM = 8.0
+"""In the coarse search, larger distances of a mirror image cost the same, mm."""
 _FAR_REFINED_MM = 5.0
+"""The same when refined planes are compared, mm."""
 _MISSING = 0.1
+"""Cost of a mirror image that meets nothing, as a part of the largest."""
 _SCALE_MM = 2.0
-_FIRST_STEPS = 6
-_LAST_STEPS = 10
-_STILL_MM = 0.01
-# Where less of the face is met by its own mirror image, there is no telling.
-_LEAST_MET = 0.4
-_LEAST_POINTS = 200
-# Steeper points tell little.
-_FACING = 0.2
+"""Scale of the robust weights, mm."""
+_COARSE_STEPS = 6
+"""Most Gauss-Newton steps from each start."""
+_FINAL_STEPS = 10
+"""Most Gauss-Newton steps from the best of them, on dense points."""
+_TOLERANCE_MM = 0.01
+"""Smaller changes of the plane end the steps, mm."""
+_MIN_MET = 0.4
+"""Part of the face that its mirror image must meet for the plane to be told."""
+_MIN_POINTS = 200
+"""Fewer dense points tell no plane."""
+_MIN_FACING = 0.2
+"""Points that face the camera by less (cosine) do not count."""
 
 Floats = NDArray[np.float64]
 
@@ -61,48 +70,39 @@ class MirrorPlane:
     offset: float
 
 
-def find_plane(
-    field: NDArray[np.float32], origin: tuple[float, float], step: float
-) -> MirrorPlane | None:
-    """Find the plane of symmetry of a face.
-
-    Parameters
-    ----------
-    field : (rows, columns, k) float32: height, mm, share of the normal along z, weight; see
-        `recon.detail._mirror_kernels`
-    origin : (x, y) of its first point, mm
-    step : distance of its points, mm
-
-    Returns
-    -------
-    None where the face shows too little of one of its sides.
-    """
-    points = sample_points(
-        field, np.asarray(origin), step, max(1, round(_DENSE_MM / step)), _FACING)
-    if len(points) < _LEAST_POINTS:
+def find_plane(field: HeightField) -> MirrorPlane | None:
+    """Find the plane of symmetry of a face; None where too little of one of its sides shows."""
+    points = sample_points(field, max(1, round(_DENSE_MM / field.step)), _MIN_FACING)
+    if len(points) < _MIN_POINTS:
         return None
     middle = points.mean(axis=0)
     points -= middle
-    start = np.array([*origin, 0.0]) - middle
+    centered = field._replace(origin=field.origin - middle)
     some = points[::round((_SPARSE_MM / _DENSE_MM) ** 2)]
-    turn = principal_curvature_angle(some)
-    level = np.array([math.cos(turn), math.sin(turn), 0.0])
-    normals = np.cos(_TURNS)[:, None] * level + np.sin(_TURNS)[:, None] * (0.0, 0.0, 1.0)
-    costs = mirror_costs(field, start, step, some, normals, _OFFSETS, _FAR_MM**2,
-                         _MISSING * _FAR_MM**2)
-    best = np.inf
-    for turned in np.argsort(costs.min(axis=1), kind="stable")[:_STARTS]:
-        normal, offset, met = refine_plane(
-            field, start, step, some, normals[turned], _OFFSETS[costs[turned].argmin()], _SCALE_MM,
-            _FIRST_STEPS, _STILL_MM)
-        cost = mirror_costs(field, start, step, some, normal[None], np.array([offset]),
-                            _FAR_REFINED_MM**2, _MISSING * _FAR_REFINED_MM**2)[0, 0]
-        if met >= _LEAST_MET * len(some) and cost < best:
-            best, likeliest = cost, (normal, offset)
-    if best == np.inf:
+    start = _coarse_plane(centered, some)
+    if start is None:
         return None
     normal, offset, met = refine_plane(
-        field, start, step, points, *likeliest, _SCALE_MM, _LAST_STEPS, _STILL_MM)
-    if met < _LEAST_MET * len(points):
+        centered, points, *start, _SCALE_MM, _FINAL_STEPS, _TOLERANCE_MM)
+    if met < _MIN_MET * len(points):
         return None
     return MirrorPlane(normal, offset + float(normal @ middle))
+
+
+def _coarse_plane(field: HeightField, points: Floats) -> tuple[Floats, float] | None:
+    """Search turns and offsets; give the cheapest normal and offset after some refinement."""
+    angle = principal_curvature_angle(points)
+    level = np.array([math.cos(angle), math.sin(angle), 0.0])
+    normals = np.cos(_TURNS)[:, None] * level + np.sin(_TURNS)[:, None] * (0.0, 0.0, 1.0)
+    costs = mirror_costs(
+        field, points, normals, _OFFSETS_MM, _FAR_MM**2, _MISSING * _FAR_MM**2)
+    best, least = None, np.inf
+    for turned in np.argsort(costs.min(axis=1), kind="stable")[:_STARTS]:
+        normal, offset, met = refine_plane(
+            field, points, normals[turned], _OFFSETS_MM[costs[turned].argmin()], _SCALE_MM,
+            _COARSE_STEPS, _TOLERANCE_MM)
+        cost = mirror_costs(field, points, normal[None], np.array([offset]), _FAR_REFINED_MM**2,
+                            _MISSING * _FAR_REFINED_MM**2)[0, 0]
+        if met >= _MIN_MET * len(points) and cost < least:
+            best, least = (normal, offset), cost
+    return best

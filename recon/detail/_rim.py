@@ -2,7 +2,7 @@
 
 At a depth edge the sensor's matching window takes one side or the other, several pixels at once.
 What is left of the face there was read at places further in, where it is nearer, and the error is
-alike over several spacings: narrow averages take it for detail.
+alike over several spacings: narrow averages take it for detail. Constants: docs/decisions/0018.
 """
 
 import math
@@ -22,26 +22,36 @@ Image = NDArray[np.float32]
 BROADER = 4.0
 """Radius of the broad average, in radii of the narrow one."""
 
-# In units of the mean spacing: up to the first the broad average stands alone, from the second on
-# it does not count.
-_ALONE, _NONE = 3.0, 8.0
-# A colour up to the first may be of what lies behind, from the second on it is the face's own.
-_BEHIND, _OWN = 0.5, 2.5
-# How often it is taken of what it leaves, and how often within so much of the rim, where fewer
-# would leave a slope that has seeds on one side alone. Each adds what it finds times a factor:
-# below 2, all is found in the end, above 1 sooner.
-_PASSES, _PASSES_AT_RIM = 5, 16
+_BROAD_ALONE = 3.0
+"""Up to this distance from the rim the broad average stands alone, mean spacings."""
+_BROAD_ENDS = 8.0
+"""From this distance on it does not count, mean spacings."""
+_COLOR_BEHIND = 0.5
+"""Up to this distance a colour may be of what lies behind the face, mean spacings."""
+_COLOR_OWN = 2.5
+"""From this distance on a colour is the face's own, mean spacings."""
+
+_ITERATIONS = 5
+"""How often the broad average is taken of what it leaves."""
+_RIM_ITERATIONS = 16
+"""The same at the rim: fewer leave a slope that has seeds on one side alone."""
 _RELAXATION = 1.5
-_AT_RIM = 3.0
-# It fades where the seeds within reach weigh less than this share of what is usual.
+"""Factor on what an iteration finds: all is found below 2, above 1 sooner."""
+_RIM_ITERATIONS_END = 3.0
+"""Distance from the rim at which its iterations have faded out, mean spacings."""
 _FADING = 0.05
-# The sideways shift at the rim, in mean spacings; the slope that counts, at most; over what radius
-# (standard deviation) it is told how near the rim is: there half of a Gaussian is over the face.
-# Where so much is, 1.28 radii inside, the shift has ended.
+"""The average fades where the seeds within reach weigh less than this part of what is usual."""
+
 _SHIFT = 0.6
-_STEEPEST = 1.5
-_AROUND = 3.0
-_HALF, _INSIDE = 0.5, 0.9
+"""Outward shift of the surface at the rim, mean spacings."""
+_MAX_SLOPE = 1.5
+"""Largest slope, dz over distance, that the shift is multiplied by."""
+_COVERAGE_RADIUS = 3.0
+"""Standard deviation of the Gaussian that tells how near the rim is, mean spacings."""
+_COVERAGE_AT_RIM = 0.5
+"""How much of that Gaussian is over the face on a straight rim: the shift is whole."""
+_COVERAGE_INSIDE = 0.9
+"""The same 1.28 standard deviations inside: the shift has ended."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +60,12 @@ class Rim:
 
     Attributes
     ----------
-    inside : (rows, columns) float32, 0-1, how much of a Gaussian around a place is over the face
-    away : (rows, columns) float32, how far inside the outline, mean spacings; less than 0 outside
+    coverage : (rows, columns) float32, 0-1, how much of a Gaussian around a place is over the face
+    distance : (rows, columns) float32, from the outline inward, mean spacings; negative outside
     """
 
-    inside: Image
-    away: Image
+    coverage: Image
+    distance: Image
 
     @classmethod
     def of(cls, support: NDArray[np.bool_], step: float) -> Self:
@@ -64,54 +74,56 @@ class Rim:
         support : (rows, columns) bool
         step : side of a pixel, mean spacings
         """
-        away = cv2.distanceTransform(support.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-        away = (away - np.float32(0.5)) * np.float32(step)
-        return cls(blurred(downsampled(support.astype(np.float32)), _AROUND / (2 * step)),
-                   downsampled(away))
+        distance = cv2.distanceTransform(support.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+        distance = (distance - np.float32(0.5)) * np.float32(step)
+        coverage = blurred(downsampled(support.astype(np.float32)), _COVERAGE_RADIUS / (2 * step))
+        return cls(coverage, downsampled(distance))
 
     @property
-    def nearness(self) -> Image:
-        """How much the broad average counts, 0-1."""
-        return _smoothstep(self.away, _ALONE, _NONE)
+    def broad_weight(self) -> Image:
+        """Weight of the broad average, 0-1."""
+        return _smoothstep(self.distance, _BROAD_ALONE, _BROAD_ENDS)
 
     @property
-    def within(self) -> Image:
-        """How much what is seen there is of the face and not of what is behind it, 0-1."""
-        share = (self.away - np.float32(_BEHIND)) / np.float32(_OWN - _BEHIND)
-        return np.asarray(np.clip(share, 0, 1), np.float32)
+    def color_weight(self) -> Image:
+        """How much of a colour seen there is the face's and not of what is behind it, 0-1."""
+        weight = (self.distance - np.float32(_COLOR_BEHIND)) / np.float32(
+            _COLOR_OWN - _COLOR_BEHIND)
+        return np.asarray(np.clip(weight, 0, 1), np.float32)
 
-    def fraying_correction(self, slopes: tuple[Image, Image], spacing: float) -> Image:
-        """Give what is to be added to the depths: a shift toward the rim, times the slope.
+    def fraying_correction(self, dz_dx: Image, dz_dy: Image, spacing: float) -> Image:
+        """Give what is to be added to the depths: an outward shift times the slope.
 
         Parameters
         ----------
-        slopes : dz/dx, dz/dy, (rows, columns) float32
+        dz_dx, dz_dy : (rows, columns) float32
         spacing : mean spacing of the seeds, mm
 
         Returns
         -------
         (rows, columns) float32, mm
         """
-        inward = [cv2.Sobel(self.inside, cv2.CV_32F, right, 1 - right, ksize=3)
+        inward = [cv2.Sobel(self.coverage, cv2.CV_32F, right, 1 - right, ksize=3)
                   for right in (1, 0)]
-        outward_slope = -(inward[0] * slopes[0] + inward[1] * slopes[1])
+        outward_slope = -(inward[0] * dz_dx + inward[1] * dz_dy)
         # cv2.magnitude rounds by where in memory its input lies.
         outward_slope /= np.maximum(
             np.sqrt(inward[0] * inward[0] + inward[1] * inward[1]), np.float32(1e-9))
-        shift = np.clip((_INSIDE - self.inside) * np.float32(1 / (_INSIDE - _HALF)), 0, 1)
+        shift = np.clip((_COVERAGE_INSIDE - self.coverage)
+                        * np.float32(1 / (_COVERAGE_INSIDE - _COVERAGE_AT_RIM)), 0, 1)
         shift *= np.float32(_SHIFT * spacing)
-        return np.asarray(shift * np.clip(outward_slope, 0, _STEEPEST), np.float32)
+        return np.asarray(shift * np.clip(outward_slope, 0, _MAX_SLOPE), np.float32)
 
 
 def iterated_average(
     seeds: Image, values: Image, radius: float, usual: float, rim: Rim, finer: int
 ) -> Image:
-    """Average what the seeds show, then what that leaves of them, and so on.
+    """Average what the seeds show, then what that leaves of them, and so on (Richardson iteration).
 
     Parameters
     ----------
     seeds : (rows, columns) float32, how many are in each cell of a grid
-    values : the sums of what they show, mm
+    values : (rows, columns) float32, the sums of what they show, mm
     radius : of the Gaussian (standard deviation), cells
     usual : seeds in a cell where none are missing
     rim : of a finer grid
@@ -126,27 +138,27 @@ def iterated_average(
     gain = np.float32(_RELAXATION) / (down @ seeds @ across + np.float32(_FADING * usual))
     total = np.zeros_like(seeds)
     inside = total
-    for number in range(_PASSES_AT_RIM):
-        if number == _PASSES:
+    for iteration in range(_RIM_ITERATIONS):
+        if iteration == _ITERATIONS:
             inside = total.copy()
         more = down @ (values - seeds * total) @ across
         more *= gain
         total += more
-    rows, columns = rim.away.shape
+    rows, columns = rim.distance.shape
     inside, total = (
         np.asarray(cv2.resize(one, None, fx=finer, fy=finer, interpolation=cv2.INTER_LINEAR),
                    np.float32)[:rows, :columns] for one in (inside, total))
-    return inside + _smoothstep(rim.away, 0, _AT_RIM) * (total - inside)
+    return inside + _smoothstep(rim.distance, 0, _RIM_ITERATIONS_END) * (total - inside)
 
 
 def _blur_matrix(side: int, sigma: float) -> Image:
-    """What filters an image of so many rows from the left by a Gaussian, zero outside."""
+    """The (side, side) matrix that blurs columns by a Gaussian, zero outside."""
     steps = np.arange(side)
     taps = np.exp(steps**2 / (-2 * sigma * sigma)) / (math.sqrt(2 * math.pi) * sigma)
     return taps.astype(np.float32)[np.abs(np.subtract.outer(steps, steps))]
 
 
 def _smoothstep(values: Image, one: float, none: float) -> Image:
-    """1 up to a value, 0 from another on, smooth between (3 t^2 - 2 t^3)."""
+    """Fall from 1, up to `one`, to 0, from `none` on, by 3 t^2 - 2 t^3."""
     t = np.clip((np.float32(none) - values) / np.float32(none - one), 0, 1)
     return np.asarray(t * t * (3 - 2 * t), np.float32)

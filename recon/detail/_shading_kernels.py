@@ -1,22 +1,49 @@
 """The loops of shape from shading, compiled."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = [
-    "apply_jacobian",
-    "apply_jacobian_transpose",
-    "brightness_image",
-    "conjugate_gradient_step",
-    "grid_points",
-    "masked_brightness",
-    "shading_residuals",
-    "weigh",
-]
+__all__ = ["Iterate", "ShadingSystem", "apply_jacobian", "apply_jacobian_transpose",
+           "apply_weights", "brightness_image", "conjugate_gradient_step", "grid_points",
+           "masked_brightness", "shading_residuals"]
 
 Image = NDArray[np.float32]
+
+
+class ShadingSystem(NamedTuple):
+    """The linear least squares that a change of height is to solve: J h = residuals.
+
+    Attributes
+    ----------
+    residuals : (rows, columns), about the logarithm of brightness over shading
+    jacobian_x, jacobian_y : (rows, columns), its change with dz/dx and dz/dy; once weighted, with
+        the differences of the heights on both sides
+    """
+
+    residuals: Image
+    jacobian_x: Image
+    jacobian_y: Image
+
+
+class Iterate(NamedTuple):
+    """What conjugate gradients carry from step to step, (rows, columns) each, changed in place.
+
+    Attributes
+    ----------
+    heights : the solution so far
+    residual : what is left of the right side
+    direction : of the search, before the preconditioner
+    smooth_direction : the same after it
+    """
+
+    heights: Image
+    residual: Image
+    direction: Image
+    smooth_direction: Image
 
 
 @compiled
@@ -36,17 +63,14 @@ def grid_points(
 
 @compiled
 def brightness_image(
-    colors: NDArray[np.uint8], seen: NDArray[np.bool_], table: Image, full: int, weight: Image
+    colors: NDArray[np.uint8], seen: NDArray[np.bool_], table: Image, saturated: int, weight: Image
 ) -> Image:
     """Put the linear brightness of `grid_points` back on their grid; 0 elsewhere.
 
-    Parameters
-    ----------
-    colors : (n, 3), RGB
-    seen : (n,)
-    table : (3, 256), what each value of each channel adds
-    full : where a channel has so much or more, it may be brighter still
-    weight : (rows, columns), set to 0 where a point is not seen or too bright to tell
+    colors : (n, 3), RGB; seen : (n,)
+    table : (3, 256), the brightness of each value of each channel
+    saturated : where a channel is not below it, brightness is unknown
+    weight : (rows, columns), set to 0 where brightness is unknown
     """
     brightness = np.zeros(weight.shape, np.float32)
     count = 0
@@ -55,7 +79,7 @@ def brightness_image(
             if weight[i, j] == 0:
                 continue
             red, green, blue = colors[count, 0], colors[count, 1], colors[count, 2]
-            if seen[count] and max(red, green, blue) < full:
+            if seen[count] and max(red, green, blue) < saturated:
                 brightness[i, j] = table[0, red] + table[1, green] + table[2, blue]
             else:
                 weight[i, j] = 0
@@ -65,7 +89,7 @@ def brightness_image(
 
 @compiled
 def masked_brightness(brightness: Image, weight: Image) -> Image:
-    """Give (rows, columns, 2): 1, and the brightness, where the weight is not zero; else 0."""
+    """Give (rows, columns, 2): 1 and the brightness where the weight is above zero, else 0."""
     out = np.zeros((*weight.shape, 2), np.float32)
     for i in range(weight.shape[0]):
         for j in range(weight.shape[1]):
@@ -76,144 +100,139 @@ def masked_brightness(brightness: Image, weight: Image) -> Image:
 
 @compiled
 def shading_residuals(
-    brightness: Image, across: Image, down: Image, light: NDArray[np.float32], least: float,
-    residuals: Image, by_across: Image, by_down: Image,
-) -> None:
-    """Compare brightness with what the light makes of the normals, place by place.
+    brightness: Image, dz_dx: Image, dz_dy: Image, lighting: NDArray[np.float32],
+    min_shading: float,
+) -> ShadingSystem:
+    """Compare brightness b with the shading s that the lighting makes of the normals.
 
-    Parameters
-    ----------
-    brightness : (rows, columns), linear
-    across, down : (rows, columns), dz/dx and dz/dy
-    light : (9,), as `sample_harmonics`
-    least : less light is taken for so much
-    residuals : written to, about the logarithm of brightness over light: 2 (a - b) / (a + b)
-    by_across, by_down : written to, how the light's logarithm changes with dz/dx and dz/dy
+    Residuals are 2 (b - s) / (b + s): the logarithm of b / s within 2 % where it counts, in a
+    tenth of its time.
+
+    brightness, dz_dx, dz_dy : (rows, columns)
+    lighting : (9,), of `fit_lighting`
+    min_shading : less is taken for so much
     """
     rows, columns = brightness.shape
-    one, two, least_shade = np.float32(1), np.float32(2), np.float32(least)
-    l0, l1, l2, l3, l4, l5, l6, l7, l8 = light
-    facing, shades = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    residuals, by_dx, by_dy = (
+        np.empty((rows, columns), np.float32), np.empty((rows, columns), np.float32),
+        np.empty((rows, columns), np.float32))
+    one, two, least = np.float32(1), np.float32(2), np.float32(min_shading)
+    l0, l1, l2, l3, l4, l5, l6, l7, l8 = lighting
+    facing, shading = np.empty(columns, np.float32), np.empty(columns, np.float32)
     for i in range(rows):
-        # Loops that write one or two rows each: of more, the compiler takes one number at a time.
-        right, lower, seen = across[i], down[i], brightness[i]
+        # Loops write one or two rows each: with more the compiler does not vectorize them.
+        along_x, along_y, seen = dz_dx[i], dz_dy[i], brightness[i]
         for j in range(np.uint64(columns)):
-            p, q = right[j], lower[j]
+            p, q = along_x[j], along_y[j]
             z = one / np.sqrt(one + p * p + q * q)
             x, y = p * z, q * z
             facing[j] = z
-            shades[j] = max(l0 + l1 * x + l2 * y + l3 * z + l4 * x * x + l5 * x * y + l6 * y * y
-                            + l7 * x * z + l8 * y * z, least_shade)
+            shading[j] = max(l0 + l1 * x + l2 * y + l3 * z + l4 * x * x + l5 * x * y + l6 * y * y
+                             + l7 * x * z + l8 * y * z, least)
         out = residuals[i]
         for j in range(np.uint64(columns)):
-            # The logarithm within 2 % where it counts, in a tenth of its time.
-            out[j] = two * (seen[j] - shades[j]) / (seen[j] + shades[j])
-        out, other = by_across[i], by_down[i]
+            out[j] = two * (seen[j] - shading[j]) / (seen[j] + shading[j])
+        out, other = by_dx[i], by_dy[i]
         for j in range(np.uint64(columns)):
-            p, q, z = right[j], lower[j], facing[j]
+            p, q, z = along_x[j], along_y[j], facing[j]
             x, y = p * z, q * z
-            # With x, y and z one after another; z falls as x and y grow.
+            # The chain rule: z falls as x and y grow.
             by_z = l3 + l7 * x + l8 * y
             by_x = l1 + two * l4 * x + l5 * y + l7 * z - by_z * p
             by_y = l2 + l5 * x + two * l6 * y + l8 * z - by_z * q
-            scale = z * z * z / shades[j]
+            scale = z * z * z / shading[j]
             out[j] = scale * (by_x * (one + q * q) - by_y * p * q)
             other[j] = scale * (by_y * (one + p * p) - by_x * p * q)
+    return ShadingSystem(residuals, by_dx, by_dy)
 
 
 @compiled
-def weigh(
-    residuals: Image, right: Image, lower: Image, weight: Image, energy: Image, colored: float,
-    told: float, step: float,
+def apply_weights(
+    system: ShadingSystem, weight: Image, energy: Image, color_noise: float, precision: float,
+    step: float,
 ) -> None:
-    """Multiply by the root of what a place tells, and make slopes' factors those of differences.
+    """Multiply a system by the roots of its weights, and make slopes those of differences.
 
-    Parameters
-    ----------
-    residuals : (rows, columns), changed
-    right, lower : how they change with dz/dx and dz/dy, changed to those with differences of the
-        heights on both sides
-    weight, energy : (rows, columns), how much a place counts, and the residuals' mean square around
-    colored : root of the mean square from which on skin is of many colours
-    told : how much a place of even skin tells; step : distance of places, mm
+    weight, energy : (rows, columns), how much a point counts, and the residuals' mean square around
+    color_noise : root of the mean square above which the weight falls
+    precision : 1 over the variance of a residual on even skin; step : from point to point, mm
     """
-    per_energy, even = np.float32(1 / colored**2), np.float32(told)
+    residuals, by_x, by_y = system
+    per_energy, even = np.float32(1 / color_noise**2), np.float32(precision)
     half = np.float32(1 / (2 * step))
     for i in range(residuals.shape[0]):
         for j in range(residuals.shape[1]):
             root = np.sqrt(
                 even * weight[i, j] / max(per_energy * energy[i, j], np.float32(1)))
             residuals[i, j] *= root
-            right[i, j] *= half * root
-            lower[i, j] *= half * root
+            by_x[i, j] *= half * root
+            by_y[i, j] *= half * root
 
 
 @compiled
-def apply_jacobian(heights: Image, right: Image, lower: Image, out: Image) -> None:
-    """Write a height's differences along x and y, weighted by `right` and `lower`, and summed.
+def apply_jacobian(heights: Image, by_x: Image, by_y: Image, out: Image) -> None:
+    """Write J h: the heights' differences along x and y, weighted and summed.
 
-    All (rows, columns); the outermost places of `out` are left alone.
+    All (rows, columns); the outermost points of `out` are left alone.
     """
     rows, columns = heights.shape
     for i in range(1, rows - 1):
         for j in range(1, columns - 1):
-            out[i, j] = (right[i, j] * (heights[i, j + 1] - heights[i, j - 1])
-                         + lower[i, j] * (heights[i + 1, j] - heights[i - 1, j]))
+            out[i, j] = (by_x[i, j] * (heights[i, j + 1] - heights[i, j - 1])
+                         + by_y[i, j] * (heights[i + 1, j] - heights[i - 1, j]))
 
 
 @compiled
-def apply_jacobian_transpose(values: Image, right: Image, lower: Image, out: Image) -> None:
+def apply_jacobian_transpose(values: Image, by_x: Image, by_y: Image, out: Image) -> None:
     """Write the transpose of `apply_jacobian` times values."""
     rows, columns = values.shape
     for i in range(1, rows - 1):
         for j in range(1, columns - 1):
-            out[i, j] = (right[i, j - 1] * values[i, j - 1] - right[i, j + 1] * values[i, j + 1]
-                         + lower[i - 1, j] * values[i - 1, j]
-                         - lower[i + 1, j] * values[i + 1, j])
+            out[i, j] = (by_x[i, j - 1] * values[i, j - 1] - by_x[i, j + 1] * values[i, j + 1]
+                         + by_y[i - 1, j] * values[i - 1, j]
+                         - by_y[i + 1, j] * values[i + 1, j])
 
 
 @compiled
 def conjugate_gradient_step(
-    rest: Image, smooth: Image, variance: float, right: Image, lower: Image, way: Image,
-    smooth_way: Image, heights: Image, last: float,
+    state: Iterate, smooth_residual: Image, variance: float, by_x: Image, by_y: Image,
+    previous: float,
 ) -> float:
-    """Go a step of conjugate gradients; all are (rows, columns).
+    """Take a step of preconditioned conjugate gradients for (J^T J + C^-1) h = J^T r.
 
-    Parameters
-    ----------
-    rest : what is left of the right side, changed
-    smooth : the same, blurred; times the variance it is times the preconditioner
-    right, lower : as of `apply_jacobian`
-    way : where to, changed; smooth_way : the same times the preconditioner, kept beside it
-    heights : the solution so far, changed
-    last : what the step before gave; any number at first, with ways of zero
+    The preconditioner is the covariance C, a blur times a variance; J is that of `apply_jacobian`.
 
-    Gives the residuals' norm before the step; where it is not above 0, there is no more to find.
+    state : of the steps before; before any, heights and directions are zero
+    smooth_residual : (rows, columns), the residual, blurred
+    previous : what the step before gave; before any, any number but 0
+
+    Gives the residual's squared norm before the step; nothing is left to find where it is 0.
     """
-    rows, columns = rest.shape
-    factor, now = np.float32(variance), np.float32(0)
+    heights, residual, direction, smooth_direction = state
+    rows, columns = residual.shape
+    factor, norm = np.float32(variance), np.float32(0)
     for i in range(rows):
         for j in range(columns):
-            now += rest[i, j] * smooth[i, j]
-    now *= factor
-    if now <= 0:
+            norm += residual[i, j] * smooth_residual[i, j]
+    norm *= factor
+    if norm <= 0:
         return 0.0
-    share = now / np.float32(last)
+    beta = norm / np.float32(previous)
     for i in range(rows):
         for j in range(columns):
-            way[i, j] = share * way[i, j] + rest[i, j]
-            smooth_way[i, j] = share * smooth_way[i, j] + factor * smooth[i, j]
+            direction[i, j] = beta * direction[i, j] + residual[i, j]
+            smooth_direction[i, j] = beta * smooth_direction[i, j] + factor * smooth_residual[i, j]
     along, image = np.zeros((rows, columns), np.float32), np.zeros((rows, columns), np.float32)
-    apply_jacobian(smooth_way, right, lower, along)
-    apply_jacobian_transpose(along, right, lower, image)
-    norm = np.float32(0)
+    apply_jacobian(smooth_direction, by_x, by_y, along)
+    apply_jacobian_transpose(along, by_x, by_y, image)
+    curvature = np.float32(0)
     for i in range(rows):
         for j in range(columns):
-            image[i, j] += way[i, j]
-            norm += smooth_way[i, j] * image[i, j]
-    length = now / norm
+            image[i, j] += direction[i, j]
+            curvature += smooth_direction[i, j] * image[i, j]
+    length = norm / curvature
     for i in range(rows):
         for j in range(columns):
-            heights[i, j] += length * smooth_way[i, j]
-            rest[i, j] -= length * image[i, j]
-    return float(now)
+            heights[i, j] += length * smooth_direction[i, j]
+            residual[i, j] -= length * image[i, j]
+    return float(norm)

@@ -1,4 +1,9 @@
-"""The light on a face, by spherical harmonics of its normals, compiled."""
+"""Lighting by spherical harmonics of the surface's normals, compiled.
+
+Nine terms, up to order two, hold 98 % of what any distant light does to a convex matt surface:
+Basri and Jacobs, 2003, doi:10.1109/TPAMI.2003.1177153; Ramamoorthi and Hanrahan, 2001,
+doi:10.1364/JOSAA.18.002448.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,85 +14,87 @@ from denseface.recon.numerics.linear_solve import solve_small
 __all__ = ["fit_lighting", "sample_harmonics"]
 
 Image = NDArray[np.float32]
+Floats = NDArray[np.float64]
 
 _TERMS = 9
-_LEAST_PLACES = 50
-# What is this share of the median brightness or less is hair, at first; what is off the light by
-# this share counts a quarter.
+"""Harmonics up to order two."""
+_MIN_SAMPLES = 50
+"""Fewer samples tell no lighting."""
 _DARK = 0.3
-_OFF = 0.2
+"""Samples below this part of the median brightness are hair: no part of the first fit."""
+_SCALE = 0.2
+"""Scale of the refits' robust weights, in medians of the brightness: there a sample counts 1/4."""
 _REFITS = 2
+"""Refits with weights by the residuals of the fit before."""
 _RIDGE = 1e-4
+"""Ridge for each sample, against harmonics that the face's normals do not tell apart."""
 
 
 @compiled
 def sample_harmonics(
-    brightness: Image, weight: Image, across: Image, down: Image, every: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give what the light is a sum of, (9, n), and the brightness, (n,).
+    brightness: Image, weight: Image, dz_dx: Image, dz_dy: Image, every: int
+) -> tuple[Floats, Floats]:
+    """Give the real harmonics of the unit normals without their constants, and the brightness.
 
-    Of every so many places each way whose weight is above a half: the real spherical harmonics up
-    to order two of the unit normal, without their constants.
+    Of every so many points each way whose weight is above a half: (9, n) and (n,).
 
-    across, down : (rows, columns), dz/dx and dz/dy
+    brightness, weight, dz_dx, dz_dy : (rows, columns)
     """
     rows, columns = weight.shape
     most = (rows // every + 1) * (columns // every + 1)
-    basis, seen = np.empty((_TERMS, most)), np.empty(most)
+    basis, samples = np.empty((_TERMS, most)), np.empty(most)
     count = 0
     for i in range(0, rows, every):
         for j in range(0, columns, every):
             if weight[i, j] <= 0.5:
                 continue
-            p, q = across[i, j], down[i, j]
+            p, q = dz_dx[i, j], dz_dy[i, j]
             z = 1 / np.sqrt(1 + p * p + q * q)
             x, y = p * z, q * z
             basis[0, count], basis[1, count] = 1, x
             basis[2, count], basis[3, count] = y, z
             basis[4, count], basis[5, count], basis[6, count] = x * x, x * y, y * y
             basis[7, count], basis[8, count] = x * z, y * z
-            seen[count] = brightness[i, j]
+            samples[count] = brightness[i, j]
             count += 1
-    return np.ascontiguousarray(basis[:, :count]), seen[:count].copy()
+    return np.ascontiguousarray(basis[:, :count]), samples[:count].copy()
 
 
 @compiled
-def fit_lighting(
-    basis: NDArray[np.float64], seen: NDArray[np.float64]
-) -> tuple[NDArray[np.float32], float]:
-    """Fit the light to the brightness, as of `sample_harmonics`.
+def fit_lighting(basis: Floats, samples: Floats) -> tuple[NDArray[np.float32], float]:
+    """Fit harmonics to brightness by robust least squares: weights of Geman and McClure, 1987.
 
-    Gives what each term counts, (9,), and the median brightness; 0 where there is too little.
+    basis, samples : (9, n), (n,), of `sample_harmonics`
+
+    Gives the coefficients, (9,), and the median brightness; 0 where there is too little of it.
     """
-    light = np.zeros(_TERMS)
-    median = np.median(seen) if len(seen) >= _LEAST_PLACES else 0.0
+    lighting = np.zeros(_TERMS)
+    median = np.median(samples) if len(samples) >= _MIN_SAMPLES else 0.0
     if median <= 0:
-        return light.astype(np.float32), 0.0
-    weights = np.empty(len(seen))
-    for i in range(len(seen)):
-        weights[i] = 1.0 if seen[i] > _DARK * median else 0.0
+        return lighting.astype(np.float32), 0.0
+    weights = np.empty(len(samples))
+    for i in range(len(samples)):
+        weights[i] = 1.0 if samples[i] > _DARK * median else 0.0
     for fit in range(1 + _REFITS):
         if fit > 0:
-            weights[:] = seen
+            weights[:] = samples
             for j in range(_TERMS):
-                term, part = basis[j], light[j]
-                for i in range(len(seen)):
+                term, part = basis[j], lighting[j]
+                for i in range(len(samples)):
                     weights[i] -= part * term[i]
-            per_off = 1 / (_OFF * median)
-            for i in range(len(seen)):
-                off = weights[i] * per_off
+            per_scale = 1 / (_SCALE * median)
+            for i in range(len(samples)):
+                off = weights[i] * per_scale
                 near = 1 / (1 + off * off)
                 weights[i] = near * near
-        light = _fitted(basis, seen, weights)
-    return light.astype(np.float32), median
+        lighting = _weighted_least_squares(basis, samples, weights)
+    return lighting.astype(np.float32), median
 
 
 @compiled
-def _fitted(
-    basis: NDArray[np.float64], seen: NDArray[np.float64], weights: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Solve the normal equations, with a ridge."""
-    count = len(seen)
+def _weighted_least_squares(basis: Floats, samples: Floats, weights: Floats) -> Floats:
+    """Solve the normal equations, with a ridge; (9,)."""
+    count = len(samples)
     matrix, right = np.zeros((_TERMS, _TERMS)), np.zeros(_TERMS)
     weighted = np.empty(count)
     for j in range(_TERMS):
@@ -101,7 +108,7 @@ def _fitted(
             matrix[j, k] = matrix[k, j] = total
         total = 0.0
         for i in range(count):
-            total += weighted[i] * seen[i]
+            total += weighted[i] * samples[i]
         right[j] = total
         matrix[j, j] += _RIDGE * count
     return solve_small(matrix, right)

@@ -4,78 +4,81 @@ What is known at fewer points is read between them along the rows first, once fo
 rows, then from row to row.
 """
 
+from typing import Any, NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.numerics.bilinear import column_positions, read_row
-from denseface.recon.numerics.jit import compiled
+from denseface.recon.numerics.jit import compiled, inlined
 
-__all__ = ["collect", "unset"]
+__all__ = ["Nodes", "Resampling", "gather_points", "indices_of_zeros"]
 
-# Indices without a sign spare the compiler's question whether one counts from the end.
+# Unsigned indices spare the compiled code a test whether one counts from the end.
 _0, _1, _2, _3 = (np.uint64(k) for k in range(4))
 
+Floats = NDArray[np.float32]
+Extents = NDArray[np.uint64]
+
+
+class Nodes(NamedTuple):
+    """Values, (rows, columns, ...), at every so many points each way, bilinear between.
+
+    One row and column more than cover their grid.
+    """
+
+    values: NDArray[Any]
+    every: int
+
+
+class Resampling(NamedTuple):
+    """Heights and slopes on another grid, bilinear between its points.
+
+    Attributes
+    ----------
+    values : (3, rows, columns) float32, mm; dz/dx, dz/dy
+    rows, columns : (m,), (k,) float32, where the points are on that grid, inside it, rising
+    """
+
+    values: Floats
+    rows: Floats
+    columns: Floats
+
 
 @compiled
-def _steps(
-    every: int, channels: int, count: int
-) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
-    """Give `read_row`'s places for so many points, of which every so many are known."""
-    left, part = np.empty(channels * count, np.uint32), np.empty(channels * count, np.float32)
-    for j in range(count):
-        for c in range(channels):
-            left[channels * j + c] = channels * (j // every) + c
-            part[channels * j + c] = np.float32(j % every) / np.float32(every)
-    return left, part
-
-
-@compiled
-def collect(
-    support: NDArray[np.bool_],
-    xs: NDArray[np.float64],
-    ys: NDArray[np.float64],
-    sheet: NDArray[np.float32],
-    sheet_rows: NDArray[np.float32],
-    sheet_columns: NDArray[np.float32],
-    colors: NDArray[np.uint8],
-    every: int,
-    sigma: NDArray[np.float32],
-    each: int,
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8], NDArray[np.float32],
-           NDArray[np.int32]]:
+def gather_points(
+    support: NDArray[np.bool_], xs: NDArray[np.float64], ys: NDArray[np.float64],
+    surface: Resampling, colors: Nodes, sigma: Nodes,
+) -> tuple[Floats, Floats, NDArray[np.uint8], Floats, NDArray[np.int32]]:
     """Gather the grid's supported points, row by row: points, normals, colours, sigma, cells.
 
-    sheet : (3, rows, columns), heights, and slopes along x and y, on a grid of its own, bilinear
-        between
-    sheet_rows, sheet_columns : (m,), (k,), where the points are on that grid, inside it, rising
-    colors : at every so many points each way, bilinear between
-    sigma : at each so many points of the sheet, bilinear between
-        Both have one more row and column than cover their grid.
+    support : (m, k); xs, ys : (k,), (m,), mm
+    colors : (rows, columns, 3) uint8, on this grid's points
+    sigma : (rows, columns) float32, mm, on those of the surface's grid
     """
     rows, columns = support.shape
     n = np.count_nonzero(support)
     points, normals = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
     rgb, cells = np.empty((n, 3), np.uint8), np.empty((n, 2), np.int32)
     error = np.empty(n, np.float32)
-    # Flat, with indices that have no sign: a slice for each row takes longer than its numbers.
-    flat_points, flat_normals = points.ravel(), normals.ravel()
-    flat_rgb, flat_cells = rgb.ravel(), cells.ravel()
-    flat_sheet, flat_sigma, flat_support = sheet.ravel(), sigma.ravel(), support.ravel()
-    x, known = xs.astype(np.float32), colors.astype(np.float32).ravel()
+    # Flat arrays, no slices or tuples in the loop: each counts references, for every row.
+    flat_points, flat_normals, flat_rgb, flat_cells = (
+        points.ravel(), normals.ravel(), rgb.ravel(), cells.ravel())
+    flat_support, x = support.ravel(), xs.astype(np.float32)
+    values, places, across = surface
+    flat_values, wide = values.ravel(), np.uint64(values.shape[2])
+    plane = np.uint64(values.shape[1]) * wide
+    left, part = column_positions(across, values.shape[2])
+    known, color_wide = colors.values.astype(np.float32).ravel(), 3 * colors.values.shape[1]
+    every, each = colors.every, np.float32(sigma.every)
     color_left, color_part = _steps(every, 3, columns)
-    left, part = column_positions(sheet_columns, sheet.shape[2])
-    sigma_left, sigma_part = column_positions(sheet_columns / np.float32(each), sigma.shape[1])
-    # What is known of the row above and of the row below.
-    c0, c1 = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
-    z0, z1 = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    x0, x1 = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    y0, y1 = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    s0, s1 = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    z, off = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    dx, dy = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    lengths, whole = np.empty(columns, np.float32), np.empty(3 * columns, np.uint8)
-    wide, plane = np.uint64(sheet.shape[2]), np.uint64(sheet.shape[1] * sheet.shape[2])
-    color_wide, sigma_wide = np.uint64(3 * colors.shape[1]), np.uint64(sigma.shape[1])
+    flat_sigma, sigma_wide = sigma.values.ravel(), np.uint64(sigma.values.shape[1])
+    sigma_left, sigma_part = column_positions(across / each, sigma.values.shape[1])
+    # Known rows above and below, and what is between: heights and slopes, colours, sigma.
+    s0, s1, s = _empty_row(3 * columns), _empty_row(3 * columns), _empty_row(3 * columns)
+    c0, c1, c = _empty_row(3 * columns), _empty_row(3 * columns), np.empty(3 * columns, np.uint8)
+    e0, e1, e = _empty_row(columns), _empty_row(columns), _empty_row(columns)
+    facing = _empty_row(columns)
     upper_row, upper_node = -2, -2
     firsts, ends = _extents(support)
     i = _0
@@ -85,74 +88,139 @@ def collect(
             first, end = _widest(firsts, ends, row, min(row + 2 * every, rows))
             if row == 0:
                 read_row(known, _0, color_left, color_part, _3, _3 * first, _3 * end, c0)
-            read_row(known, np.uint64(row // every + 1) * color_wide, color_left, color_part, _3,
+            read_row(known, np.uint64((row // every + 1) * color_wide), color_left, color_part, _3,
                      _3 * first, _3 * end, c1)
-        upper = min(int(sheet_rows[row]), sheet.shape[1] - 2)
+        upper = min(int(places[row]), values.shape[1] - 2)
         if upper != upper_row:
-            at, behind = np.uint64(upper) * wide, row + 1
-            while behind < rows and sheet_rows[behind] < np.float32(upper + 2):
-                behind += 1
-            first, end = _widest(firsts, ends, row, behind)
+            first, end = _widest(firsts, ends, row, _next_place(places, row, upper + 2))
             if upper == upper_row + 1:
-                z0, z1, x0, x1, y0, y1 = z1, z0, x1, x0, y1, y0
+                s0, s1 = s1, s0
             else:
-                read_row(flat_sheet, at, left, part, _1, first, end, z0)
-                read_row(flat_sheet, at + plane, left, part, _1, first, end, x0)
-                read_row(flat_sheet, at + plane + plane, left, part, _1, first, end, y0)
-            at += wide
-            read_row(flat_sheet, at, left, part, _1, first, end, z1)
-            read_row(flat_sheet, at + plane, left, part, _1, first, end, x1)
-            read_row(flat_sheet, at + plane + plane, left, part, _1, first, end, y1)
+                _read_planes(flat_values, np.uint64(upper) * wide, plane, left, part, first, end,
+                             s0)
+            _read_planes(flat_values, np.uint64(upper + 1) * wide, plane, left, part, first, end,
+                         s1)
             upper_row = upper
-        node = int(sheet_rows[row] / np.float32(each))
+        node = int(places[row] / each)
         if node != upper_node:
             at = np.uint64(node) * sigma_wide
-            read_row(flat_sigma, at, sigma_left, sigma_part, _1, _0, np.uint64(columns), s0)
+            read_row(flat_sigma, at, sigma_left, sigma_part, _1, _0, np.uint64(columns), e0)
             read_row(flat_sigma, at + sigma_wide, sigma_left, sigma_part, _1, _0,
-                     np.uint64(columns), s1)
+                     np.uint64(columns), e1)
             upper_node = node
-        line = np.uint64(row) * np.uint64(columns)
         first, end = firsts[row], ends[row]
-        down = np.float32(row % every) / np.float32(every)
-        for j in range(_3 * first, _3 * end):
-            whole[j] = np.uint8(np.int32(c0[j] + down * (c1[j] - c0[j]) + np.float32(0.5)))
-        down = sheet_rows[row] - np.float32(upper)
-        _mix(z0, z1, down, first, end, z)
-        _mix(x0, x1, down, first, end, dx)
-        _mix(y0, y1, down, first, end, dy)
-        down = sheet_rows[row] / np.float32(each) - np.float32(node)
-        _mix(s0, s1, down, first, end, off)
-        for j in range(first, end):
-            lengths[j] = np.float32(1) / np.sqrt(dx[j] * dx[j] + dy[j] * dy[j] + np.float32(1))
-        y = np.float32(ys[row])
+        _mix_colors(c0, c1, np.float32(row % every) / np.float32(every), first, end, c)
+        _mix_planes(s0, s1, places[row] - np.float32(upper), first, end, s, facing)
+        _mix(e0, e1, places[row] / each - np.float32(node), first, end, e)
+        line = np.uint64(row) * np.uint64(columns)
         while first < end:
             stop = first
             while stop < end and flat_support[line + stop]:
                 stop += _1
-            count = stop - first
-            at = _3 * i
-            for j in range(count):
-                flat_points[at + _3 * j] = x[first + j]
-                flat_points[at + _3 * j + _1] = y
-                flat_points[at + _3 * j + _2] = z[first + j]
-            for j in range(count):
-                flat_normals[at + _3 * j] = dx[first + j] * lengths[first + j]
-                flat_normals[at + _3 * j + _1] = dy[first + j] * lengths[first + j]
-                flat_normals[at + _3 * j + _2] = -lengths[first + j]
-            seen = _3 * first
-            for j in range(_3 * count):
-                flat_rgb[at + j] = whole[seen + j]
-            for j in range(count):
-                error[i + j] = off[first + j]
-            at = _2 * i
-            for j in range(count):
-                flat_cells[at + _2 * j] = row
-                flat_cells[at + _2 * j + _1] = first + j
-            i += count
+            _write_points(x, np.float32(ys[row]), s, first, stop, flat_points, i)
+            _write_normals(s, facing, first, stop, flat_normals, i)
+            for j in range(_3 * (stop - first)):
+                flat_rgb[_3 * i + j] = c[_3 * first + j]
+            for j in range(stop - first):
+                error[i + j] = e[first + j]
+            for j in range(stop - first):
+                flat_cells[_2 * (i + j)] = row
+                flat_cells[_2 * (i + j) + _1] = first + j
+            i += stop - first
             first = stop
             while first < end and not flat_support[line + first]:
                 first += _1
     return points, normals, rgb, error, cells
+
+
+@inlined
+def _empty_row(count: int) -> Floats:
+    """Room for so many values."""
+    return np.empty(count, np.float32)
+
+
+@compiled
+def _steps(
+    every: int, channels: int, count: int
+) -> tuple[NDArray[np.uint32], Floats]:
+    """Give `read_row`'s positions for so many points, of which every so many are known."""
+    left, part = np.empty(channels * count, np.uint32), np.empty(channels * count, np.float32)
+    for j in range(count):
+        for c in range(channels):
+            left[channels * j + c] = channels * (j // every) + c
+            part[channels * j + c] = np.float32(j % every) / np.float32(every)
+    return left, part
+
+
+@compiled
+def _next_place(places: Floats, row: int, least: int) -> int:
+    """Give the first row behind `row` whose place is not less, or how many rows there are."""
+    behind = row + 1
+    while behind < len(places) and places[behind] < np.float32(least):
+        behind += 1
+    return behind
+
+
+@compiled
+def _read_planes(
+    flat: Floats, at: np.uint64, plane: np.uint64, left: NDArray[np.uint32], part: Floats,
+    first: np.uint64, end: np.uint64, out: Floats,
+) -> None:
+    """Read a row of height and slopes, one behind the other, as `read_row` does."""
+    columns = np.uint64(len(left))
+    for k in range(_3):
+        for j in range(first, end):
+            here = flat[at + k * plane + left[j]]
+            out[k * columns + j] = here + part[j] * (flat[at + k * plane + left[j] + _1] - here)
+
+
+@compiled
+def _mix_planes(
+    upper: Floats, lower: Floats, down: np.float32, first: np.uint64, end: np.uint64, out: Floats,
+    facing: Floats,
+) -> None:
+    """Read height and slopes from row to row, and the cosine of the normal to the z axis."""
+    columns = np.uint64(len(facing))
+    for k in range(_3):
+        _mix(upper, lower, down, k * columns + first, k * columns + end, out)
+    for j in range(first, end):
+        dx, dy = out[columns + j], out[_2 * columns + j]
+        facing[j] = np.float32(1) / np.sqrt(dx * dx + dy * dy + np.float32(1))
+
+
+@compiled
+def _mix_colors(
+    upper: Floats, lower: Floats, down: np.float32, first: np.uint64, end: np.uint64,
+    out: NDArray[np.uint8],
+) -> None:
+    """Read colours from row to row, rounded."""
+    for j in range(_3 * first, _3 * end):
+        out[j] = np.uint8(np.int32(upper[j] + down * (lower[j] - upper[j]) + np.float32(0.5)))
+
+
+@compiled
+def _write_points(
+    x: Floats, y: np.float32, heights: Floats, first: np.uint64, stop: np.uint64, out: Floats,
+    i: np.uint64,
+) -> None:
+    """Write (x, y, z) of some columns from the i-th point on."""
+    for j in range(stop - first):
+        out[_3 * (i + j)] = x[first + j]
+        out[_3 * (i + j) + _1] = y
+        out[_3 * (i + j) + _2] = heights[first + j]
+
+
+@compiled
+def _write_normals(
+    surface: Floats, facing: Floats, first: np.uint64, stop: np.uint64, out: Floats, i: np.uint64
+) -> None:
+    """Write unit normals toward the camera from the i-th point on."""
+    dx = np.uint64(len(facing)) + first
+    dy = np.uint64(len(facing)) + dx
+    for j in range(stop - first):
+        out[_3 * (i + j)] = surface[dx + j] * facing[first + j]
+        out[_3 * (i + j) + _1] = surface[dy + j] * facing[first + j]
+        out[_3 * (i + j) + _2] = -facing[first + j]
 
 
 @compiled
@@ -197,7 +265,7 @@ def _mix(
 
 
 @compiled
-def unset(
+def indices_of_zeros(
     image: NDArray[np.uint8], rows: NDArray[np.float32], columns: NDArray[np.float32],
     cells: NDArray[np.int32],
 ) -> NDArray[np.int64]:

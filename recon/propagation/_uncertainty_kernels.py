@@ -5,29 +5,26 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["coarsen"]
+__all__ = ["node_statistics"]
 
 
 @compiled
-def coarsen(
-    points: NDArray[np.float32],
-    support: NDArray[np.bool_],
-    heights: NDArray[np.float32],
-    slopes_x: NDArray[np.float32],
-    slopes_y: NDArray[np.float32],
-    origin: tuple[float, float],
-    step: float,
-    every: int,
+def node_statistics(
+    points: NDArray[np.float32], support: NDArray[np.bool_], surface: NDArray[np.float32],
+    origin: tuple[float, float], step: float, every: int,
 ) -> NDArray[np.float32]:
-    """Gather what the standard error is made of on every so many grid points.
+    """Gather what the standard error is made of on every so many grid points, the nodes.
 
-    points : (n, 3), mm; those off the support are left out
-    origin, step : where the grid's first point is, (x, y), and the distance of its points, mm
+    points : (n, 3), mm; those off the support do not count
+    support : (rows, columns)
+    surface : (3, rows, columns), height, mm, dz/dx and dz/dy
+    origin : (x, y) of the grid's first point, mm; step : distance of its points, mm
 
     Gives (rows / every, columns / every, 4), rounded up: 1 on the support, slope^2 there, seeds
     nearest to the node, sum of their squared residuals, mm^2.
     """
     rows, columns = support.shape
+    heights, slopes_x, slopes_y = surface[0], surface[1], surface[2]
     out = np.zeros(((rows + every - 1) // every, (columns + every - 1) // every, 4), np.float32)
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):

@@ -25,27 +25,31 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics._push_pull_kernels import blur
 from denseface.recon.numerics.filters import gaussian_taps
-from denseface.recon.propagation._uncertainty_kernels import coarsen
+from denseface.recon.propagation._uncertainty_kernels import node_statistics
 from denseface.recon.settings import Settings
 
 __all__ = ["VarianceComponents", "averaging_cutoff", "fit_cutoff", "noise_fraction",
            "standard_error", "variance_components"]
 
-# From bench/calibration.py: H, S, E above, E of a fit without detail, which has no broad average at
-# the rim, and those of `noise_fraction`.
 _HOLE = 0.4
+"""H, for each spacing into a hole. This and the next five: `bench/calibration.py --fit`."""
 _SLOPE = 0.075
+"""S, of a slope squared."""
 _RIM = 1.46
-_RIM_ALONE = 2.4
-_SHARE = 90.0
-_DETAIL_PART = 0.12
+"""E of a fit with detail, which has a broad average at the rim."""
+_RIM_FIT_ALONE = 2.4
+"""E of a fit without detail."""
+_FIT_FRACTION = 90.0
+"""Of `noise_fraction`: over the squared cut-off of the fit."""
+_DETAIL_FRACTION = 0.12
+"""Of `noise_fraction`: what detail brings back, over what its own average would let pass."""
 
-# Over what radius (standard deviation) residuals and slopes count as local, spacings.
 _WINDOW = 2.5
-# As much as so many seeds for each spacing squared, the whole face's residuals count too.
+"""Standard deviation of the Gaussian over which residuals and slopes count as local, spacings."""
 _PRIOR = 0.03
-# What averaging tens of readings in whole millimetres leaves of their 0.29 mm.
-_LEAST_MM = 0.05
+"""Weight of the whole face's residuals, in seeds for each squared spacing."""
+_MIN_SIGMA_MM = 0.05
+"""What averaging tens of readings in whole millimetres leaves of their 0.29 mm, mm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,65 +70,61 @@ class VarianceComponents:
 
 
 def noise_fraction(settings: Settings) -> float:
-    """Give k: how much of the residuals' variance is the error left in the surface.
+    """Give k: what fraction of the residuals' variance is error left in the surface.
 
     A smoother lets pass what is longer than some L, where signal and smoothing weigh the same: of
-    noise, a share in proportion to (h / L)^2. Detail that is added to the fit brings back a part
-    of the share of its own average.
+    noise, a fraction in proportion to (h / L)^2. Detail that is added to the fit brings back a part
+    of what its own average lets pass.
     """
-    share = _SHARE * fit_cutoff(settings.r0_factor, settings.smoothing) ** 2
+    fraction = _FIT_FRACTION * fit_cutoff(settings.r0_factor, settings.smoothing) ** 2
     if settings.detail_factor is not None:
-        share += _DETAIL_PART * _SHARE * averaging_cutoff(settings.detail_factor) ** 2
-    return share
+        fraction += (_DETAIL_FRACTION * _FIT_FRACTION
+                     * averaging_cutoff(settings.detail_factor) ** 2)
+    return fraction
 
 
 def fit_cutoff(r0_factor: float, smoothing: float) -> float:
-    """Give h / L of a fit, L = pi R0 / sqrt(ln(pi (R0/h)^2 / lambda))."""
+    """Give the cut-off h / L of a fit, L = pi R0 / sqrt(ln(pi (R0/h)^2 / lambda))."""
     weight = max(math.pi * r0_factor**2 / smoothing, math.e)
     return math.sqrt(math.log(weight)) / (math.pi * r0_factor)
 
 
 def averaging_cutoff(detail_factor: float) -> float:
-    """Give h / L of a Gaussian average: of a wave of length L, half is left."""
+    """Give the cut-off h / L of a Gaussian average: of a wave of length L, half is left."""
     return math.sqrt(math.log(2) / 2) / (math.pi * detail_factor)
 
 
 def variance_components(
-    points: NDArray[np.float32],
-    support: NDArray[np.bool_],
-    heights: NDArray[np.float32],
-    slopes: tuple[NDArray[np.float32], NDArray[np.float32]],
-    origin: tuple[float, float],
-    step: float,
-    spacing: float,
+    points: NDArray[np.float32], support: NDArray[np.bool_], surface: NDArray[np.float32],
+    origin: tuple[float, float], step: float, spacing: float,
 ) -> VarianceComponents:
-    """Find what an error can come from, place by place.
+    """Find the components of the variance, place by place.
 
     Parameters
     ----------
     points : (n, 3) float32, mm, the seeds, depth camera frame
     support : (rows, columns) bool, where the dense grid has points
-    heights, slopes : (rows, columns) float32, mm, and dz/dx, dz/dy; used on the support alone
+    surface : (3, rows, columns) float32, height, mm, dz/dx and dz/dy; used on the support alone
     origin : (x, y) of the grid's first point, mm
     step : distance of its points, mm
     spacing : h, mean spacing of the seeds, mm
     """
     every = max(1, round(spacing / step))
     node = every * step / spacing
-    planes = coarsen(points, support, heights, *slopes, origin, step, every)
-    far = cv2.distanceTransform((planes[..., 2] == 0).astype(np.uint8), cv2.DIST_L2, 5)
-    seeds, squares = planes[..., 2].sum(dtype=np.float64), planes[..., 3].sum(dtype=np.float64)
-    covered, slope, count, square = cv2.split(blur(planes, gaussian_taps(_WINDOW / node)))
+    nodes = node_statistics(points, support, surface, origin, step, every)
+    far = cv2.distanceTransform((nodes[..., 2] == 0).astype(np.uint8), cv2.DIST_L2, 5)
+    seeds, squares = nodes[..., 2].sum(dtype=np.float64), nodes[..., 3].sum(dtype=np.float64)
+    covered, slope, count, square = cv2.split(blur(nodes, gaussian_taps(_WINDOW / node)))
     prior = np.float32(_PRIOR * node**2)
     noise = (square + prior * np.float32(squares / max(seeds, 1.0))) / (count + prior)
     hole = noise * np.maximum(np.float32(node) * far - 1, np.float32(0))
     slope /= np.maximum(covered, np.float32(1e-3))
-    across = np.float32(spacing**2)
+    area = np.float32(spacing**2)
     edge = np.clip(2 - 2 * covered, np.float32(0), np.float32(1))
     return VarianceComponents(
         noise=np.asarray(noise, np.float32), hole=np.asarray(hole, np.float32),
-        slope=np.asarray(across * slope * slope, np.float32),
-        rim=np.asarray(across * slope * edge, np.float32), every=every)
+        slope=np.asarray(area * slope * slope, np.float32),
+        rim=np.asarray(area * slope * edge, np.float32), every=every)
 
 
 def standard_error(
@@ -143,8 +143,8 @@ def standard_error(
     (rows, columns) float32, mm: 68 % of the errors along the viewing ray are within it, 95 % within
     twice
     """
-    rim = np.float32(_RIM if detailed else _RIM_ALONE)
+    rim = np.float32(_RIM if detailed else _RIM_FIT_ALONE)
     variance = (np.float32(noise_fraction)
                 * (components.noise + np.float32(_HOLE) * components.hole)
                 + np.float32(_SLOPE) * components.slope + rim * components.rim)
-    return np.asarray(np.maximum(np.sqrt(variance), np.float32(_LEAST_MM)), np.float32)
+    return np.asarray(np.maximum(np.sqrt(variance), np.float32(_MIN_SIGMA_MM)), np.float32)

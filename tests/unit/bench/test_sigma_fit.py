@@ -28,8 +28,8 @@ def made_up(preset: Preset, seed: int) -> Samples:
 
 def test_the_coefficients_that_made_the_errors_are_found():
     found = fitted({preset: made_up(preset, seed) for seed, preset in enumerate(Preset)})
-    expected = {"_HOLE": HOLE, "_SLOPE": SLOPE, "_RIM": RIM, "_RIM_ALONE": RIM_ALONE,
-                "_SHARE": SHARE, "_DETAIL_PART": DETAIL_PART}
+    expected = {"_HOLE": HOLE, "_SLOPE": SLOPE, "_RIM": RIM, "_RIM_FIT_ALONE": RIM_ALONE,
+                "_FIT_FRACTION": SHARE, "_DETAIL_FRACTION": DETAIL_PART}
     assert found.keys() == expected.keys()
     for name, value in expected.items():
         assert found[name] == pytest.approx(value, rel=0.12), name

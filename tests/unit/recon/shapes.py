@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.capture.calibration import DepthToColor
-from denseface.recon.detail._detail import add_detail
+from denseface.recon.detail import add_detail
 from denseface.recon.face import Seeds
 from denseface.recon.intermediate import Registration, SurfaceGrid
 from denseface.recon.registration import register

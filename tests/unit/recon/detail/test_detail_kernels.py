@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from denseface.recon.detail._detail_kernels import blend_toward, face_field, shares, slopes
+from denseface.recon.detail._detail_kernels import (
+    blend_toward,
+    mirror_planes,
+    normalize_sums,
+    slopes,
+)
 
 
 def numpys(heights, step):
@@ -27,7 +32,7 @@ def test_the_field_holds_every_second_point(shape):
     heights, detail, seeded = rng.normal(
         size=(3, 2 * shape[0], 2 * shape[1])).astype(np.float32)
     inner = rng.random(shape).astype(np.float32)
-    field = face_field(heights, detail, seeded, inner, 1.2)
+    field = mirror_planes(heights, detail, seeded, inner, 1.2)
     across, down = numpys(heights[::2, ::2], 1.2)
     facing = 1 / np.sqrt(1 + across**2 + down**2)
     expected = np.stack(
@@ -35,19 +40,19 @@ def test_the_field_holds_every_second_point(shape):
     np.testing.assert_allclose(field, expected, atol=1e-5)
 
 
-def test_means_fade_and_what_is_missing_of_the_full_weight_is_told():
+def test_means_fade_and_the_part_missing_of_the_full_weight_is_given():
     rng = np.random.default_rng(4)
     weight, sums = (rng.random((13, 17)).astype(np.float32) for _ in range(2))
     weight[:3] = sums[:3] = 0
     means = sums.copy()
-    seeded, missing = shares(weight, means, 0.02, 0.6)
+    seeded, missing = normalize_sums(weight, means, 0.02, 0.6)
     np.testing.assert_allclose(means, sums / (weight + 0.02), rtol=1e-5)
     expected = np.minimum(weight / 0.6, 1)
     np.testing.assert_allclose(seeded, expected, rtol=1e-5)
     np.testing.assert_allclose(missing, (1 - expected) ** 2 * (1 + 2 * expected), atol=1e-6)
 
 
-def test_detail_is_moved_by_the_larger_of_two_shares():
+def test_detail_is_blended_by_the_larger_of_two_weights():
     rng = np.random.default_rng(5)
     detail, broad, near, missing = (rng.random((13, 17)).astype(np.float32) for _ in range(4))
     moved = detail.copy()

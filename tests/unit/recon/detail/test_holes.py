@@ -24,8 +24,9 @@ def filled(shape, hole_mm, off_mm=0.0, noise_mm=0.0):
     true = shape(X, Y).astype(np.float32)
     broad = gaussian_filter(true, 8 / STEP) + np.float32(off_mm)
     detail = true + missing * (broad - true)
-    found, hole = fill_holes(counts, sums.astype(np.float32), missing,
-                             Rim.of(INSIDE, STEP / SPACING), 0 * true, detail, SPACING)
+    rim = Rim.of(INSIDE, STEP / SPACING)
+    found, hole = fill_holes(
+        counts, sums.astype(np.float32), missing, rim, 0 * true, detail, SPACING)
     return found + (1 - hole) * detail - true, hole, missing
 
 
@@ -80,8 +81,8 @@ def test_a_hole_at_the_rim_is_none():
     counts = np.full(CELL_X.shape, 4, np.float32)
     missing = np.clip((np.hypot(X, Y) - 48.5) / SPACING, 0, 1).astype(np.float32)
     none = np.zeros(X.shape, np.float32)
-    found, hole = fill_holes(counts, 0 * counts + 1, missing, Rim.of(INSIDE, STEP / SPACING), none,
-                             none, SPACING)
+    rim = Rim.of(INSIDE, STEP / SPACING)
+    found, hole = fill_holes(counts, 0 * counts + 1, missing, rim, none, none, SPACING)
     assert not hole.any()
     assert not found.any()
 

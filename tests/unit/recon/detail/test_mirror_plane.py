@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from denseface.recon.detail._mirror_kernels import HeightField
 from denseface.recon.detail._mirror_plane import find_plane
 from tests.unit.recon.mirror_shapes import Pose, face_points, height
 
@@ -11,7 +12,7 @@ STEP = 1.5
 
 
 def field_of(points):
-    """Heights, and what `find_plane` asks for besides, on a grid, by the nearest points."""
+    """A height field of the nearest points."""
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     xs, ys = (np.arange(low[k], high[k], STEP) for k in (0, 1))
     X, Y = np.meshgrid(xs, ys)
@@ -19,13 +20,12 @@ def field_of(points):
     weight = 1 / (away + 0.05)
     z = (points[nearest, 2] * weight).sum(axis=-1) / weight.sum(axis=-1)
     dy, dx = np.gradient(z, STEP)
-    field = np.stack([z, 1 / np.sqrt(1 + dx * dx + dy * dy), away[..., 0] < STEP], axis=-1)
-    return field.astype(np.float32), (float(low[0]), float(low[1]))
+    planes = np.stack([z, 1 / np.sqrt(1 + dx * dx + dy * dy), away[..., 0] < STEP], axis=-1)
+    return HeightField(planes.astype(np.float32), np.array([low[0], low[1], 0.0]), STEP)
 
 
 def found(points):
-    field, origin = field_of(points)
-    return find_plane(field, origin, STEP)
+    return find_plane(field_of(points))
 
 
 def off(plane, pose):
@@ -78,7 +78,7 @@ def test_none_where_there_is_next_to_nothing():
     points = face_points(Pose())
     assert found(points[np.hypot(*points[:, :2].T) < 12]) is None
     empty = np.zeros((40, 40, 3), np.float32)
-    assert find_plane(empty, (0.0, 0.0), STEP) is None
+    assert find_plane(HeightField(empty, np.zeros(3), STEP)) is None
 
 
 def test_a_ball_has_some_plane_through_its_middle():

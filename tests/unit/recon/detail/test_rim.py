@@ -22,8 +22,8 @@ def averaged(shown, seeds=FULL, away=10.0):
 def frayed(support, slopes, spacing, step):
     """What is added, on every other point of each direction."""
     rim = Rim.of(support, step / spacing)
-    coarse = tuple(one[::2, ::2].astype(np.float32) for one in slopes)
-    return rim.fraying_correction(coarse, spacing)
+    dz_dx, dz_dy = (one[::2, ::2].astype(np.float32) for one in slopes)
+    return rim.fraying_correction(dz_dx, dz_dy, spacing)
 
 
 def test_nothing_stays_nothing():
@@ -49,18 +49,18 @@ def test_at_the_rim_more_of_a_slope_is_left():
 
 def test_the_broad_average_counts_near_the_rim_alone():
     away = np.array([[-1, 0, 2.9, 5.5, 8.1, 50]], np.float32)
-    np.testing.assert_allclose(Rim(away, away).nearness, [[1, 1, 1, 0.5, 0, 0]], atol=1e-5)
+    np.testing.assert_allclose(Rim(away, away).broad_weight, [[1, 1, 1, 0.5, 0, 0]], atol=1e-5)
 
 
 def test_the_rim_is_as_far_as_the_outline():
     support = np.zeros((120, 161), bool)
     support[20:, 40:120] = True
     rim = Rim.of(support, 0.25)
-    assert rim.away.shape == rim.inside.shape == (60, 81)
-    np.testing.assert_allclose(rim.away[40, [20, 22, 39, 40, 59]], [0.25, 1.25, 9.75, 9.75, 0.25],
-                               atol=0.05)
-    assert (rim.away[~support[::2, ::2]] < 0).all()
-    np.testing.assert_allclose(rim.inside[40, [19, 20]].mean(), 0.5, atol=0.01)
+    assert rim.distance.shape == rim.coverage.shape == (60, 81)
+    np.testing.assert_allclose(
+        rim.distance[40, [20, 22, 39, 40, 59]], [0.25, 1.25, 9.75, 9.75, 0.25], atol=0.05)
+    assert (rim.distance[~support[::2, ::2]] < 0).all()
+    np.testing.assert_allclose(rim.coverage[40, [19, 20]].mean(), 0.5, atol=0.01)
 
 
 @pytest.mark.parametrize("spacing", [1.0, 2.0])
@@ -91,4 +91,4 @@ def test_a_wall_counts_no_more_than_a_slope():
 
 def test_a_colour_is_the_face_s_own_within_the_rim():
     away = np.array([[-1, 0.5, 1.5, 2.5, 50]], np.float32)
-    np.testing.assert_allclose(Rim(np.ones_like(away), away).within, [[0, 0, 0.5, 1, 1]])
+    np.testing.assert_allclose(Rim(np.ones_like(away), away).color_weight, [[0, 0, 0.5, 1, 1]])

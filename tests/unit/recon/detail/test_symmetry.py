@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
+from denseface.recon.detail._mirror_kernels import HeightField
 from denseface.recon.detail._mirror_plane import MirrorPlane
 from denseface.recon.detail._symmetry import symmetry_correction
 from denseface.recon.surface import fit_surface
@@ -135,10 +136,11 @@ def test_half_a_face_is_no_worse_for_it(half):
 @pytest.mark.parametrize("plane", [MirrorPlane(np.array([1.0, 0, 0]), 500.0),
                                    MirrorPlane(np.array([0.0, 0, 1]), 0.0)])
 def test_a_plane_beside_the_face_adds_nothing(plane):
-    field = np.ones((30, 20, 5), np.float32)
-    field[..., 0] = 700
+    planes = np.ones((30, 20, 5), np.float32)
+    planes[..., 0] = 700
+    field = HeightField(planes, np.zeros(3), 1.5)
     none = np.zeros((30, 20), np.float32)
-    added = symmetry_correction(field, none, none, none, plane, 0.1, 11.0, (0.0, 0.0), 1.5)
+    added = symmetry_correction(field, none, none, none, plane, 0.1, 11.0)
     np.testing.assert_array_equal(added, 0)
 
 
@@ -148,12 +150,12 @@ def test_without_noise_nothing_changes():
     dy, dx = np.gradient(z)
     detail = 0.5 * np.cos(x / 4)
     facing = 1 / np.sqrt(1 + dx * dx + dy * dy)
-    field = np.stack([700 + z, facing, np.ones_like(z), detail * facing, np.ones_like(z)],
-                     axis=-1).astype(np.float32)
+    planes = np.stack([700 + z, facing, np.ones_like(z), detail * facing, np.ones_like(z)],
+                      axis=-1).astype(np.float32)
+    field = HeightField(planes, np.array([-30.0, -30.0, 0.0]), 1.0)
     none = np.zeros(z.shape, np.float32)
     added = symmetry_correction(field, detail.astype(np.float32), none, none,
-                             MirrorPlane(np.array([1.0, 0, 0]), 0.0), 0.0, 11.0, (-30.0, -30.0),
-                             1.0)
+                                MirrorPlane(np.array([1.0, 0, 0]), 0.0), 0.0, 11.0)
     assert np.isfinite(added).all()
     assert np.abs(added).max() < 0.01
 

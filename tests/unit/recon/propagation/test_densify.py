@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from denseface.recon.propagation._densify import densify
+from denseface.recon.propagation import densify
 from denseface.recon.surface import exact_spacing
 from tests.unit.recon.shapes import disc_seeds, fitted, seeds
 

@@ -3,24 +3,29 @@
 import numpy as np
 import pytest
 
-from denseface.recon.propagation._grid_kernels import collect, unset
+from denseface.recon.propagation._grid_kernels import (
+    Nodes,
+    Resampling,
+    gather_points,
+    indices_of_zeros,
+)
 
 
-def places(count):
+def positions(count):
     return np.arange(count, dtype=np.float32)
 
 
-def test_the_supported_points_are_collected_row_by_row():
+def test_the_supported_points_are_gathered_row_by_row():
     rng = np.random.default_rng(1)
     support = rng.random((7, 9)) < 0.4
     xs, ys = np.arange(9) * 0.5 - 2, np.arange(7) * 0.5 + 1
-    sheet = rng.normal(size=(3, 7, 9)).astype(np.float32)
-    heights, slopes_x, slopes_y = sheet
+    values = rng.normal(size=(3, 7, 9)).astype(np.float32)
+    heights, slopes_x, slopes_y = values
     image = rng.integers(0, 256, (7, 9, 3), np.uint8)
     sigma = rng.random((7, 9)).astype(np.float32)
-    points, normals, colors, errors, cells = collect(
-        support, xs, ys, sheet, places(7), places(9), np.pad(image, ((0, 1), (0, 1), (0, 0))), 1,
-        np.pad(sigma, (0, 1)), 1)
+    points, normals, colors, errors, cells = gather_points(
+        support, xs, ys, Resampling(values, positions(7), positions(9)),
+        Nodes(np.pad(image, ((0, 1), (0, 1), (0, 0))), 1), Nodes(np.pad(sigma, (0, 1)), 1))
     np.testing.assert_array_equal(errors, sigma[support])
     np.testing.assert_array_equal(cells, np.argwhere(support))
     np.testing.assert_array_equal(colors, image[support])
@@ -41,15 +46,16 @@ def test_what_is_between_the_given_points_is_in_between(every, each, finer, shap
     rows, columns = shape
     tall, wide = ((side - 1) // every + 2 for side in shape)
     ramp = 10 * every * np.arange(tall)[:, None] + 3 * every * np.arange(wide)
-    down, across = places(rows) / np.float32(finer), places(columns) / np.float32(finer)
-    own = [int(np.ceil(side[-1])) + 1 for side in (down, across)]
+    down, right = positions(rows) / np.float32(finer), positions(columns) / np.float32(finer)
+    own = [int(np.ceil(side[-1])) + 1 for side in (down, right)]
     i, j = np.mgrid[:own[0], :own[1]].astype(np.float32)
-    sheet = np.stack([700 + 3 * i - 2 * j, 0.02 * i + 0.01 * j, -0.03 * i])
+    values = np.stack([700 + 3 * i - 2 * j, 0.02 * i + 0.01 * j, -0.03 * i])
     i, j = np.mgrid[:(own[0] - 1) // each + 2, :(own[1] - 1) // each + 2].astype(np.float32)
-    points, normals, colors, errors, cells = collect(
-        np.ones(shape, bool), np.arange(float(columns)), np.arange(float(rows)), sheet, down,
-        across, np.dstack([ramp, ramp, 200 - ramp]).astype(np.uint8), every,
-        2 + each * (0.3 * i - 0.1 * j), each)
+    points, normals, colors, errors, cells = gather_points(
+        np.ones(shape, bool), np.arange(float(columns)), np.arange(float(rows)),
+        Resampling(values, down, right),
+        Nodes(np.dstack([ramp, ramp, 200 - ramp]).astype(np.uint8), every),
+        Nodes(2 + each * (0.3 * i - 0.1 * j), each))
     y, x = (cells / finer).T
     np.testing.assert_allclose(points[:, 2], 700 + 3 * y - 2 * x, atol=2e-4)
     np.testing.assert_allclose(normals[:, 0] / -normals[:, 2], 0.02 * y + 0.01 * x, atol=1e-5)
@@ -59,10 +65,11 @@ def test_what_is_between_the_given_points_is_in_between(every, each, finer, shap
     np.testing.assert_array_equal(colors, np.column_stack([expected, expected, 200 - expected]))
 
 
-def test_nothing_supported_is_nothing_collected():
-    points, normals, colors, errors, cells = collect(
-        np.zeros((3, 4), bool), np.arange(4.0), np.arange(3.0), np.zeros((3, 3, 4), np.float32),
-        places(3), places(4), np.zeros((4, 5, 3), np.uint8), 1, np.zeros((4, 5), np.float32), 1)
+def test_nothing_supported_is_nothing_gathered():
+    points, normals, colors, errors, cells = gather_points(
+        np.zeros((3, 4), bool), np.arange(4.0), np.arange(3.0),
+        Resampling(np.zeros((3, 3, 4), np.float32), positions(3), positions(4)),
+        Nodes(np.zeros((4, 5, 3), np.uint8), 1), Nodes(np.zeros((4, 5), np.float32), 1))
     assert points.shape == normals.shape == colors.shape == (0, 3)
     assert errors.shape == (0,)
     assert cells.shape == (0, 2)
@@ -73,10 +80,11 @@ def test_the_cells_where_an_image_is_zero():
     cells = np.argwhere(np.random.default_rng(3).random((8, 9)) < 0.5).astype(np.int32)
     expected = np.flatnonzero(image[cells[:, 0], cells[:, 1]] == 0)
     assert 0 < len(expected) < len(cells)
-    np.testing.assert_array_equal(unset(image, places(8), places(9), cells), expected)
-    assert len(unset(image, places(8), places(9), cells[:0])) == 0
+    found = indices_of_zeros(image, positions(8), positions(9), cells)
+    np.testing.assert_array_equal(found, expected)
+    assert len(indices_of_zeros(image, positions(8), positions(9), cells[:0])) == 0
     finer = np.argwhere(np.ones((15, 17), bool)).astype(np.int32)
     near = (finer + 1) // 2
     np.testing.assert_array_equal(
-        unset(image, places(15) / 2, places(17) / 2, finer),
+        indices_of_zeros(image, positions(15) / 2, positions(17) / 2, finer),
         np.flatnonzero(image[near[:, 0], near[:, 1]] == 0))

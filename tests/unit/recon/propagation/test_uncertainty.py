@@ -6,19 +6,19 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from denseface.recon.propagation._densify import densify
-from denseface.recon.propagation._uncertainty_kernels import coarsen
+from denseface.recon.propagation import densify
+from denseface.recon.propagation._uncertainty_kernels import node_statistics
 from denseface.recon.propagation.uncertainty import fit_cutoff, noise_fraction
 from denseface.recon.settings import Preset, Settings
 from tests.unit.recon.shapes import disc_seeds, fitted, seeds
 
-SHARE = 0.5
-LEAST_MM = 0.05
+FRACTION = 0.5
+MIN_SIGMA_MM = 0.05
 
 
-def dense_of(points, spacing, share=SHARE, ratio=10.0):
+def dense_of(points, spacing, noise_fraction=FRACTION, ratio=10.0):
     return densify(
-        seeds(points), fitted(points, spacing, 8 * spacing, 3.0), spacing, ratio, share)
+        seeds(points), fitted(points, spacing, 8 * spacing, 3.0), spacing, ratio, noise_fraction)
 
 
 def noisy(xy, height, noise_mm, seed=0):
@@ -58,7 +58,7 @@ def test_it_is_positive_and_finite_whatever_the_seeds(spacing, hole, noise, miss
     assert dense.sigma.dtype == np.float32
     assert dense.sigma.shape == (len(dense),)
     assert np.isfinite(dense.sigma).all()
-    assert dense.sigma.min() >= np.float32(LEAST_MM)
+    assert dense.sigma.min() >= np.float32(MIN_SIGMA_MM)
 
 
 def test_it_grows_into_a_hole():
@@ -85,8 +85,8 @@ def test_it_follows_the_noise_around_a_point():
     dense = dense_of(points, 1.3)
     x, inside = dense.points[:, 0], away(dense) < 40
     quiet, loud = (float(np.median(dense.sigma[inside & side])) for side in (x > 12, x < -12))
-    assert quiet == pytest.approx(np.sqrt(SHARE) * 1.0, rel=0.1)
-    assert loud == pytest.approx(np.sqrt(SHARE) * 3.0, rel=0.1)
+    assert quiet == pytest.approx(np.sqrt(FRACTION) * 1.0, rel=0.1)
+    assert loud == pytest.approx(np.sqrt(FRACTION) * 3.0, rel=0.1)
 
 
 def test_it_is_larger_where_the_surface_is_steep():
@@ -102,7 +102,7 @@ def test_it_is_larger_at_the_rim_of_the_same_slope():
 
 def test_nothing_is_known_better_than_whole_millimetres_allow():
     dense = dense_of(noisy(disc_seeds(1.3, 50), flat, 0), 1.3)
-    np.testing.assert_array_equal(dense.sigma[away(dense) < 45], np.float32(LEAST_MM))
+    np.testing.assert_array_equal(dense.sigma[away(dense) < 45], np.float32(MIN_SIGMA_MM))
 
 
 def test_it_moves_with_the_face():
@@ -116,10 +116,10 @@ def test_it_moves_with_the_face():
 def test_stronger_smoothing_leaves_less_noise():
     paper, faithful, best = (noise_fraction(Settings.of(preset)) for preset in Preset)
     assert paper > faithful > best > 0
-    shares = [noise_fraction(Settings.of("faithful", smoothing=value))
+    fractions = [noise_fraction(Settings.of("faithful", smoothing=value))
               for value in (0.05, 1, 30, 1000)]
-    assert shares == sorted(shares, reverse=True)
-    assert shares[-1] > 0
+    assert fractions == sorted(fractions, reverse=True)
+    assert fractions[-1] > 0
 
 
 def test_the_cutoff_is_the_one_of_the_decision():
@@ -127,7 +127,7 @@ def test_the_cutoff_is_the_one_of_the_decision():
     assert 1 / fit_cutoff(14.0, 20.0) == pytest.approx(23.7, abs=0.1)
 
 
-def test_coarsening_sums_what_is_near_each_node():
+def test_node_statistics_sum_what_is_near_each_node():
     rng = np.random.default_rng(0)
     support = rng.random((23, 17)) < 0.8
     slopes_x, slopes_y = rng.normal(size=(2, 23, 17)).astype(np.float32)
@@ -136,24 +136,26 @@ def test_coarsening_sums_what_is_near_each_node():
     rest = rng.normal(0, 2, 200)
     points = np.column_stack([10 + 0.5 * cells[:, 1], -20 + 0.5 * cells[:, 0],
                               heights[cells[:, 0], cells[:, 1]] + rest]).astype(np.float32)
-    planes = coarsen(points, support, heights, slopes_x, slopes_y, (10.0, -20.0), 0.5, 3)
-    assert planes.shape == (8, 6, 4)
-    np.testing.assert_array_equal(planes[..., 0], support[::3, ::3])
+    surface = np.stack([heights, slopes_x, slopes_y])
+    nodes = node_statistics(points, support, surface, (10.0, -20.0), 0.5, 3)
+    assert nodes.shape == (8, 6, 4)
+    np.testing.assert_array_equal(nodes[..., 0], support[::3, ::3])
     np.testing.assert_allclose(
-        planes[..., 1], np.where(support, slopes_x**2 + slopes_y**2, 0)[::3, ::3], rtol=1e-5)
+        nodes[..., 1], np.where(support, slopes_x**2 + slopes_y**2, 0)[::3, ::3], rtol=1e-5)
     on = support[cells[:, 0], cells[:, 1]]
-    nodes = np.minimum((cells[on] + 1) // 3, [7, 5])
+    nearest = np.minimum((cells[on] + 1) // 3, [7, 5])
     count, squares = np.zeros((8, 6)), np.zeros((8, 6))
-    np.add.at(count, tuple(nodes.T), 1)
-    np.add.at(squares, tuple(nodes.T), rest[on] ** 2)
-    np.testing.assert_array_equal(planes[..., 2], count)
-    np.testing.assert_allclose(planes[..., 3], squares, rtol=1e-3, atol=1e-3)
+    np.add.at(count, tuple(nearest.T), 1)
+    np.add.at(squares, tuple(nearest.T), rest[on] ** 2)
+    np.testing.assert_array_equal(nodes[..., 2], count)
+    np.testing.assert_allclose(nodes[..., 3], squares, rtol=1e-3, atol=1e-3)
 
 
 def test_residuals_follow_the_slope_between_grid_points():
     heights = np.full((4, 4), 700, np.float32) + 0.5 * np.arange(4, dtype=np.float32)
     slope = np.full((4, 4), 0.5, np.float32)
     points = np.array([[1.3, 2.4, 700.65]], np.float32)
-    planes = coarsen(points, np.ones((4, 4), bool), heights, slope, 0 * slope, (0.0, 0.0), 1.0, 1)
-    assert planes[2, 1, 2] == 1
-    assert planes[..., 3].max() < 1e-6
+    surface = np.stack([heights, slope, 0 * slope])
+    nodes = node_statistics(points, np.ones((4, 4), bool), surface, (0.0, 0.0), 1.0, 1)
+    assert nodes[2, 1, 2] == 1
+    assert nodes[..., 3].max() < 1e-6
