@@ -28,6 +28,7 @@ __all__: list[str] = []
 
 _DISTANCES_MM = (600.0, 950.0)
 _YAW, _PITCH, _ROLL = 20.0, 8.0, 6.0
+"""Largest turns to either side, degrees."""
 _WAYS = {"without": Settings.of(Preset.BEST, symmetry=False), "with": Settings.of(Preset.BEST)}
 
 

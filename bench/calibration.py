@@ -22,7 +22,9 @@ __all__: list[str] = []
 _FRAMES = 42
 _CHOOSING_SEED, _REPORTING_SEED = 11, 13
 _BANDS_MM = ((0, 800), (800, 950), (950, 2000))
+"""Bands of distance from the camera, mm."""
 _PARTS = 10
+"""Groups of points by sigma, of the same size."""
 
 
 def _taken(heads: tuple[str, ...], count: int, seed: int, *, distance: bool) -> dict[

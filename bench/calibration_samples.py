@@ -27,10 +27,15 @@ REPORTING = ("lps", "ict_neutral", "mh_afr_f", "mh_cauc_m")
 
 _DISTANCES_MM = (600.0, 1100.0)
 _YAW = 20.0
+"""Largest turn to either side, degrees."""
 _HOLES = (0.25, 1.0)
+"""`Scene.holes` by turns: traces at eyes and nostrils, large patches."""
 _RIM_SPACINGS = 3.0
+"""Points nearer to the outline are the rim, mean spacings."""
 _POINTS = 8000
+"""Points drawn from a frame."""
 _HOLE_POINTS = 2000
+"""Points in holes drawn besides, at most."""
 
 Floats = NDArray[np.float64]
 

@@ -21,10 +21,11 @@ __all__ = ["HOLE_SPACINGS", "Case", "posed", "recorded", "reporting_heads", "sim
 HOLE_SPACINGS = 2.0
 """A point farther than this many mean spacings from every seed, over (X, Y), is inside a hole."""
 
-# Settings were chosen on other heads; the procedural one stands in where no scans are at hand.
 _HEADS = ("lps", "ict_neutral", "mh_afr_f", "mh_cauc_m")
+"""Heads that no setting was chosen on."""
 _DISTANCES_MM = (600.0, 1100.0)
 _YAW = 20.0
+"""Largest turn to either side, degrees."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +120,7 @@ def simulated(count: int) -> Iterator[Case]:
 
 
 def reporting_heads() -> list[str]:
-    """List the heads at hand that no setting was chosen on."""
+    """List the heads at hand that no setting was chosen on; the procedural one where none is."""
     return [name for name in _HEADS if name in head_names()] or ["procedural"]
 
 

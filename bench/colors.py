@@ -1,4 +1,4 @@
-"""Colours of the dense points against the true shaded ones, and the background's share in them."""
+"""Colours of the dense points against the true shaded ones, and the background's part in them."""
 
 import argparse
 import statistics
@@ -22,11 +22,16 @@ __all__ = ["PARTS", "Compared"]
 
 _DISTANCES_MM = (600.0, 1100.0)
 _YAW = 20.0
+"""Largest turn to either side, degrees."""
 _RIM_SPACINGS = 3.0
+"""Points nearer to the outline are the rim, mean spacings."""
 _WALLS = {"green": (30, 220, 40), "magenta": (225, 30, 200)}
 _BEHIND_MM = 450.0
-# The share of the background in a colour from which it is the background's, and shows.
-_MOSTLY, _SHOWS = 0.5, 0.25
+"""Distance of the wall behind the head, mm."""
+_MOSTLY = 0.5
+"""Fraction of the background in a colour from which it is the background's."""
+_SHOWS = 0.25
+"""Fraction from which it shows."""
 
 Colors = NDArray[np.uint8]
 PARTS = ("all", "rim", "inside holes", "eyes, brows, nostrils, mouth", "elsewhere")
@@ -64,13 +69,13 @@ class Compared:
                 for name, part in self.parts.items()}
 
     def background(self, colors: Colors, wall: NDArray[np.floating]) -> NDArray[np.floating]:
-        """Share of the wall's colour, (3,), in each one, along the axis from magenta to green.
+        """Fraction of the wall's colour, (3,), in each one, along the axis from magenta to green.
 
         Skin and hair lie close together on it and the walls far off: a wrong brown is no wall.
         """
         true = _greenness(self.true)
-        share: NDArray[np.floating] = (_greenness(colors) - true) / (_greenness(wall) - true)
-        return share
+        fraction: NDArray[np.floating] = (_greenness(colors) - true) / (_greenness(wall) - true)
+        return fraction
 
 
 def _greenness(colors: NDArray[np.generic]) -> NDArray[np.float64]:
@@ -141,9 +146,9 @@ def _print_background(heads: list[str]) -> None:
         rim = compared.parts["rim"]
         cells = []
         for colors in (face.dense.colors, sampled):
-            share = compared.background(colors, wall)
+            fraction = compared.background(colors, wall)
             for least in (_MOSTLY, _SHOWS):
-                over = 1e4 * (share > least)
+                over = 1e4 * (fraction > least)
                 cells.append(f"{over.mean():.1f} ({over[rim].mean():.0f})")
         print(f"| {name} | {len(face.dense):,} | " + " | ".join(cells) + " |", flush=True)
 

@@ -11,9 +11,11 @@ from tests.simulator.accuracy import GROSS_MM
 __all__ = ["BINS", "HEADINGS", "ErrorSummary"]
 
 BINS = np.linspace(0, GROSS_MM, 56)
+"""Edges of the histogram of errors, mm."""
 HEADINGS = ("method", "mean over the face, mm", "ours at the same places, mm",
             "inside holes, mm", "holes filled, %", "> 5.5 mm, %", "places covered, %", "ms")
-_FILLED = 0.5
+_MIN_FILLED = 0.5
+"""With a smaller part of its points filled, a hole's error says nothing."""
 
 
 @dataclass
@@ -64,7 +66,7 @@ class ErrorSummary:
     @property
     def hole_mm(self) -> float | None:
         """Mean error inside holes over all points there, mm; None where half are not filled."""
-        if self.hole_points <= _FILLED * self.hole_places:
+        if self.hole_points <= _MIN_FILLED * self.hole_places:
             return None
         return self.hole_sum / self.hole_points
 

@@ -20,7 +20,9 @@ from tests.simulator.accuracy import GROSS_MM
 __all__ = ["error_histogram", "error_maps", "sigma_calibration", "time_against_seeds"]
 
 _MAP_LARGEST_MM = 3.0
+"""Larger errors are red in an error map, mm."""
 _COLORS = 128
+"""Colours of a picture's palette, which keeps the file small."""
 
 
 def error_maps(case: Case, errors: dict[str, NDArray[np.float64]], path: Path) -> None:
@@ -101,6 +103,5 @@ def _save(figure: Figure, path: Path, dpi: int) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=dpi)
     plt.close(figure)
-    # A palette keeps the picture small.
     with Image.open(path) as picture:
         picture.convert("RGB").quantize(_COLORS).save(path, optimize=True)

@@ -18,9 +18,11 @@ from denseface.recon.propagation.uncertainty import averaging_cutoff, fit_cutoff
 __all__ = ["fitted"]
 
 _FREEDOM = 5.0
-# The rim is a small part of the points; it shall be right too.
+"""Degrees of freedom of Student's t."""
 _RIM_WEIGHT = 3.0
+"""Weight of points at the rim: they are few, and their sigma shall be right too."""
 _WITHIN = (0.6827, 0.9545)
+"""Fractions of a normal distribution within one and two sigma."""
 _FITS_ALONE = (Preset.FAITHFUL, Preset.PAPER)
 
 Floats = NDArray[np.float64]

@@ -21,12 +21,14 @@ __all__ = ["Band", "bands"]
 
 _DISTANCES_MM = (600, 700, 800, 900, 1000, 1100)
 _YAWS = (-20, -10, 0, 10, 20)
-# Traces of holes at eyes and nostrils, and large patches, by turns.
 _HOLES = (0.25, 1.0)
+"""`Scene.holes` by turns: traces at eyes and nostrils, large patches."""
 _SIGMA_PX = 2.0
+"""Standard deviation of OpenCV's Gaussian, pixels."""
 _RADIUS_MM = 18.0
-# With fewer of its places filled, a hole's error says nothing.
-_FILLED = 0.5
+"""Radius of PCL's moving least squares, mm."""
+_MIN_FILLED = 0.5
+"""With a smaller part of its points filled, a hole's error says nothing."""
 _HEADINGS = ("frames", "mean, mm", "SD, mm", "> 5.5 mm, %", "face within 2 mm, %",
              "worst frame, %", "inside holes, mm")
 
@@ -70,7 +72,7 @@ class Band:
             return f"| {name} | 0 |" + " - |" * (len(_HEADINGS) - 1)
         mean = float(np.mean(self.means))
         spread = float(np.sqrt(max(np.mean(self.squares) - mean**2, 0.0)))
-        filled = self.hole_points > _FILLED * self.hole_places
+        filled = self.hole_points > _MIN_FILLED * self.hole_places
         hole = f"{self.hole_sum / self.hole_points:.2f}" if filled else "-"
         return (f"| {name} | {len(self.means)} | {mean:.2f} | {spread:.2f} "
                 f"| {100 * np.mean(self.gross):.2f} | {100 * np.mean(self.covered):.1f} "

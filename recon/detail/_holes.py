@@ -11,7 +11,7 @@ docs/decisions/0019.
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solveh_banded
+from scipy.linalg.lapack import dpbsv
 
 from denseface.recon.detail._hole_kernels import (
     Cells,
@@ -102,7 +102,7 @@ def _minimize_bending(
     for _ in range(_ITERATIONS):
         lower, right = normal_equations(
             cells, rows, columns, box, band, _SMOOTHING / _CELL**2, step)
-        # Transposed, rows of the lower half are columns of the upper one, as LAPACK has it.
-        cells.added[rows, columns] = solveh_banded(
-            lower.T, right, overwrite_ab=True, overwrite_b=True, check_finite=False)
+        # The lower half by rows is the upper half by columns, as LAPACK has it. Called directly:
+        # solveh_banded's checks take as long as a small hole's solution.
+        _, cells.added[rows, columns], _ = dpbsv(lower.T, right, overwrite_ab=1, overwrite_b=1)
     cells.numbers[rows, columns] = -1
