@@ -71,7 +71,7 @@ class BaseClient:
         return answer
 
     def _no_answer(self, timeout: float) -> ClientTimeoutError:
-        why = ("is it running, or was this key revoked?" if self._keys
-               else "is `denseface up` running?")
-        return ClientTimeoutError(f"{self.address}: no answer from the hub within {timeout:g} s, "
-                                  f"{why}")
+        hint = "is it running, or was this key revoked" if self._keys else (
+            "is `denseface up` running")
+        return ClientTimeoutError(
+            f"{self.address}: no answer from the hub within {timeout:g} s, {hint}?")

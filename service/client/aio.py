@@ -10,7 +10,6 @@ from collections.abc import AsyncIterator
 from contextlib import closing, suppress
 from datetime import datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Self, TypeVar
 
 import zmq
@@ -18,12 +17,7 @@ import zmq
 from denseface.recon.face import Face
 from denseface.service.client._base import BaseClient
 from denseface.service.client.events import Published, PublishedFace, PublishedPreview, preview_of
-from denseface.service.client.exchanges import (
-    Exchange,
-    SendRequest,
-    Step,
-    deadline,
-)
+from denseface.service.client.exchanges import Exchange, SendRequest, Step, deadline
 from denseface.service.client.follower import TOPICS, Follower
 from denseface.service.errors import ClientClosedError, ClientTimeoutError, ProtocolError
 from denseface.service.protocol.messages import BaseRequest, Status
@@ -58,10 +52,7 @@ class AsyncClient(BaseClient):
     async def __aenter__(self) -> Self:
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

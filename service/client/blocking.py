@@ -13,18 +13,8 @@ from typing import TypeVar
 
 from denseface.recon.face import Face
 from denseface.service.client._base import BaseClient
-from denseface.service.client.events import (
-    Published,
-    PublishedFace,
-    PublishedPreview,
-    preview_of,
-)
-from denseface.service.client.exchanges import (
-    Exchange,
-    SendRequest,
-    Step,
-    deadline,
-)
+from denseface.service.client.events import Published, PublishedFace, PublishedPreview, preview_of
+from denseface.service.client.exchanges import Exchange, SendRequest, Step, deadline
 from denseface.service.client.follower import TOPICS, Follower
 from denseface.service.errors import ClientTimeoutError, ProtocolError
 from denseface.service.protocol import messages

@@ -97,9 +97,7 @@ class MessageWatch:
             self._latencies.observe("dispatched_to_result", now - times.dispatched)
             times.dispatched = None
 
-    def _published(
-        self, now: float, message: messages.FaceDone | messages.CaptureFailed
-    ) -> None:
+    def _published(self, now: float, message: messages.FaceDone | messages.CaptureFailed) -> None:
         times = self._captures.pop(message.capture_id, None)
         if times and times.pressed is not None:
             self._latencies.observe("press_to_published", now - times.pressed)

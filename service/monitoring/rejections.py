@@ -28,9 +28,7 @@ class _TokenBucket:
 class Rejections:
     """Counts under the name `refused`, with the reason as label."""
 
-    def __init__(
-        self, counters: Counters, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, counters: Counters, clock: Callable[[], float] = time.monotonic) -> None:
         self._counters = counters
         self._clock = clock
         self._buckets: dict[str, _TokenBucket] = {}

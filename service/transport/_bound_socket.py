@@ -1,6 +1,5 @@
 """A socket that the hub binds, with CURVE where others can reach it."""
 
-from contextlib import suppress
 from dataclasses import dataclass
 
 import zmq
@@ -51,32 +50,22 @@ class BoundSocket:
             self.monitor = HandshakeMonitor(socket, rejections)
 
     def bind(self) -> None:
-        """Bind for the first time.
-
-        Raises
-        ------
-        AddressError
-            Where the address cannot be had.
-        """
+        """Bind, also after `cut`; AddressError where the address cannot be had."""
+        if self.bound:
+            return
         try:
             self.socket.bind(self._address)
         except zmq.ZMQError as error:
             raise AddressError(f"{self._address}: {zmq.strerror(error.errno or 0)}") from error
+        # With its name resolved, so that binding again asks nobody.
         self._address = self.socket.get_string(zmq.LAST_ENDPOINT).rstrip("\0")
         self.bound = True
 
-    def rebind(self) -> None:
-        """Bind again after `cut`, if the address is free already; else at the next call."""
-        if not self.bound:
-            with suppress(zmq.ZMQError):  # libzmq's own thread has not closed it yet
-                self.socket.bind(self._address)
-                self.bound = True
-
     def cut(self) -> None:
-        """End all connections, as one alone cannot be.
+        """End all connections, as one alone cannot be ended.
 
-        Those that are allowed come back by themselves in less than a second after `rebind`, pass
-        the authenticator again and fetch what they missed.
+        Those that are allowed come back by themselves within a second of the next `bind`, pass the
+        authenticator again and fetch what they missed.
         """
         if self.bound:
             self.socket.unbind(self._address)

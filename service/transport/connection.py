@@ -76,8 +76,8 @@ class ConnectionMonitor:
         """Read what happened; True where it is a new refusal."""
         before = str(self.refused)
         while self._monitor.poll(0):
-            said = parse_monitor_message(self._monitor.recv_multipart())
-            self._note(zmq.Event(said["event"]), said["value"])
+            event = parse_monitor_message(self._monitor.recv_multipart())
+            self._note(zmq.Event(event["event"]), event["value"])
         if self._reconnect_at is not None and time.monotonic() >= self._reconnect_at:
             self._reconnect()
         return self.refused is not None and str(self.refused) != before

@@ -49,8 +49,8 @@ class HandshakeMonitor:
                 parts = self.socket.recv_multipart(zmq.DONTWAIT)
             except zmq.Again:
                 return
-            said = parse_monitor_message(parts)
-            self._note(zmq.Event(said["event"]), said["value"])
+            event = parse_monitor_message(parts)
+            self._note(zmq.Event(event["event"]), event["value"])
 
     def forget(self) -> None:
         """Forget the open handshakes: all connections were cut, which libzmq does not report."""

@@ -3,7 +3,6 @@
 import math
 import time
 from collections.abc import Callable, Iterator
-from types import TracebackType
 from typing import Any, Self
 
 import structlog
@@ -35,18 +34,14 @@ class HubConnection:
         self._heartbeat_s = settings.heartbeat_s
         self._log = structlog.get_logger(name)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._socket, self._monitor = connect(
-            self._context, zmq.DEALER, settings.address, keys)
+        self._socket, self._monitor = connect(self._context, zmq.DEALER, settings.address, keys)
         self._denied = ""
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        if error is None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
             self.send(Goodbye())
         self._context.destroy()
 
@@ -85,14 +80,14 @@ class HubConnection:
                     self._log.warning("message dropped", reason=str(error))
                     continue
                 if isinstance(packet.message, Denied):
-                    self._say_denied(packet.message.message)
+                    self._log_denied(packet.message.message)
                 else:
                     yield packet
             elif wake.fileno() in ready:
                 wake.drain()
                 yield None
 
-    def _say_denied(self, reason: str) -> None:
+    def _log_denied(self, reason: str) -> None:
         if reason != self._denied:  # once, not at every heartbeat
             self._log.error("denied", reason=reason)
             self._denied = reason

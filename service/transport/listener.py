@@ -6,10 +6,12 @@ message: a key that is revoked is cut off at once.
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import zmq
 
+from denseface.service.errors import AddressError
 from denseface.service.monitoring import Rejections
 from denseface.service.protocol.payload import MAX_PAYLOAD_BYTES
 from denseface.service.protocol.topics import Topic
@@ -92,8 +94,7 @@ class Listener:
         publisher.set(zmq.MAXMSGSIZE, _MAX_SUBSCRIPTION_BYTES)
         if credentials:
             publisher.set(zmq.LINGER, 0)  # nothing more for a key that is cut off
-        self._router = BoundSocket(
-            router, address, MESSAGES_DOMAIN, credentials, rejections)
+        self._router = BoundSocket(router, address, MESSAGES_DOMAIN, credentials, rejections)
         self._publisher = BoundSocket(
             publisher, publications_of(address), PUBLICATIONS_DOMAIN, credentials, rejections)
         try:
@@ -184,8 +185,9 @@ class Listener:
 
     def rebind(self) -> None:
         """Listen again where connections were cut."""
-        self._router.rebind()
-        self._publisher.rebind()
+        for one in (self._router, self._publisher):
+            with suppress(AddressError):  # libzmq's own thread has not closed it yet
+                one.bind()
 
     def disconnect_all(self) -> bool:
         """End every connection from another machine; those that are allowed come back.

@@ -19,10 +19,10 @@ from denseface.service.transport._bound_socket import ServerCredentials
 from denseface.service.transport.addresses import check_bindable, is_local, socket_file
 from denseface.service.transport.listener import Incoming, Listener
 
-__all__ = ["Listeners", "guarded_addresses", "server_credentials"]
+__all__ = ["Listeners", "server_credentials"]
 
 
-class _Wakes(Protocol):
+class _Pollable(Protocol):
     def fileno(self) -> int: ...
 
 
@@ -41,7 +41,7 @@ class Listeners:
 
     def __init__(
         self, context: "zmq.Context[zmq.Socket[bytes]]", settings: ServiceSettings,
-        rejections: Rejections, wakes: Sequence[_Wakes],
+        rejections: Rejections, wakes: Sequence[_Pollable],
     ) -> None:
         self._allow_list: AllowList | None = None
         self._changes = 0
@@ -51,10 +51,10 @@ class Listeners:
         self._memory = MemoryWatch(settings.memory_mb << 20)
         self._descriptors = DescriptorWatch()
         self._poller = zmq.Poller()
-        for one in wakes:
-            self._poller.register(one, zmq.POLLIN)
+        for pollable in wakes:
+            self._poller.register(pollable, zmq.POLLIN)
         try:
-            guarded = guarded_addresses(settings)
+            guarded = _guarded_addresses(settings)
             if settings.address not in guarded:
                 check_bindable(settings.address)
                 self._listeners.append(Listener(context, settings.address, None, rejections))
@@ -64,7 +64,8 @@ class Listeners:
                 self._authenticator = Authenticator(
                     context, keys.allow_list, rejections, _is_permitted)
                 self._poller.register(self._authenticator.socket, zmq.POLLIN)
-                self._listeners += [Listener(context, one, keys, rejections) for one in guarded]
+                self._listeners += [
+                    Listener(context, address, keys, rejections) for address in guarded]
         except BaseException:
             self.close()
             raise
@@ -154,14 +155,8 @@ class Listeners:
         return self._listeners[peer[0]].is_allowed(peer[1:])
 
 
-def guarded_addresses(settings: ServiceSettings) -> list[str]:
-    """Give the addresses to which only allowed keys may connect.
-
-    Raises
-    ------
-    AddressError
-        Where one of them is malformed.
-    """
+def _guarded_addresses(settings: ServiceSettings) -> list[str]:
+    """Give the addresses to which only allowed keys may connect; AddressError if malformed."""
     for address in settings.listen:
         if socket_file(address):
             raise AddressError(f"{address}: --listen expects tcp://HOST:PORT")
@@ -179,7 +174,7 @@ def server_credentials(settings: ServiceSettings) -> ServerCredentials:
     KeyFileError
         Where the hub's key cannot be used.
     """
-    address = guarded_addresses(settings)[0]
+    address = _guarded_addresses(settings)[0]
     path = settings.key or settings.keys / f"{HUB_NAME}.secret"
     if not path.exists():
         raise AddressError(
