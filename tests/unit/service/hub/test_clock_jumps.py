@@ -7,7 +7,7 @@ from denseface.service.hub import Hub
 from denseface.service.protocol.states import CaptureState
 from denseface.service.storage import FolderStore
 from tests.unit.service.clocks import FakeClock
-from tests.unit.service.hub.test_hub import SETTINGS, Bench
+from tests.unit.service.hub.bench import SETTINGS, Bench
 
 _DAY_S = 86400.0
 

@@ -1,98 +1,26 @@
-"""The hub without a socket: every order of events."""
-
-from dataclasses import dataclass, field
+"""The hub without a socket: from a press to an outcome, and what may go wrong between."""
 
 import numpy as np
 import pytest
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import StoreError
-from denseface.service.hub import Hub, settings_hash
+from denseface.service.hub import Hub
 from denseface.service.protocol import messages
-from denseface.service.protocol.outgoing import Output, Publish, Send
-from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.states import CaptureState
-from denseface.service.protocol.topics import Topic
-from denseface.service.protocol.wire import Packet
-from denseface.service.settings import ServiceSettings
 from denseface.service.storage import FolderStore
-from tests.unit.service.faces import small_face, small_frame
-
-SENSOR, CLIENT, WORKER, OTHER = b"sensor", b"client", b"worker", b"other"
-HASH = settings_hash(Settings())
-FRAME, FRAME_ARRAYS = FrameHeader.of(small_frame())
-FACE, FACE_ARRAYS = FaceHeader.of(small_face())
-SETTINGS = ServiceSettings(address="ipc:///unused", attempts=2, queue=3, reserve_mib=0)
-
-
-@dataclass
-class Bench:
-    """A hub, a clock, and what came out."""
-
-    hub: Hub
-    store: FolderStore
-    now: float = 100.0
-    published: list[messages.BaseMessage] = field(default_factory=list)
-
-    def say(self, peer: bytes, message, arrays=None) -> list[tuple[bytes, messages.BaseMessage]]:
-        return self._sent(self.hub.receive(self.now, peer, Packet(message, arrays or {})))
-
-    def wait(self, seconds: float) -> list[tuple[bytes, messages.BaseMessage]]:
-        self.now += seconds
-        return self._sent(self.hub.tick(self.now))
-
-    def _sent(self, outputs: list[Output]) -> list[tuple[bytes, messages.BaseMessage]]:
-        self.published += [one.packet.message for one in outputs
-                           if isinstance(one, Publish) and one.topic is Topic.FACES]
-        return [(one.peer, one.packet.message) for one in outputs if isinstance(one, Send)]
-
-    def sensor(self) -> None:
-        assert self.say(SENSOR, messages.SensorReady(name="s", source="x.oni")) == []
-
-    def worker(self, peer: bytes = WORKER, credit: int = 0):
-        return self.say(peer, messages.WorkerReady(name=peer.decode(), credit=credit))
-
-    def press(self, capture_id: str = "a", request: int = 7, peer: bytes = CLIENT):
-        return self.say(peer, messages.Press(request=request, capture_id=capture_id))
-
-    def frame(self, capture_id: str = "a"):
-        return self.say(SENSOR, messages.Frame(capture_id=capture_id, frame=FRAME), FRAME_ARRAYS)
-
-    def checksum(self, capture_id: str) -> str:
-        """Of the frame that is kept now."""
-        stored = self.store.find(capture_id)
-        return stored.frame_sha256 if stored else "0" * 64
-
-    def result(self, capture_id: str = "a", peer: bytes = WORKER, hashed: str = HASH,
-               frame_sha256: str | None = None, arrays=FACE_ARRAYS):
-        return self.say(peer, messages.Result(
-            capture_id=capture_id, settings_hash=hashed, face=FACE,
-            frame_sha256=frame_sha256 or self.checksum(capture_id)), arrays)
-
-    def stumble(self, peer: bytes = WORKER, capture_id: str = "a", *, final: bool = False):
-        return self.say(peer, messages.JobFailed(
-            capture_id=capture_id, settings_hash=HASH, frame_sha256=self.checksum(capture_id),
-            error="Error", message="why", final=final))
-
-    def accepted(self, *capture_ids: str) -> None:
-        self.sensor()
-        for capture_id in capture_ids:
-            self.press(capture_id)
-            self.frame(capture_id)
-
-
-@pytest.fixture
-def bench(tmp_path):
-    with FolderStore(tmp_path / "data") as store:
-        yield Bench(Hub(store, SETTINGS, Settings()), store)
-
-
-def restarted(bench: Bench) -> Bench:
-    return Bench(Hub(bench.store, SETTINGS, Settings()), bench.store, bench.now)
-
-
-def kinds(sent) -> list[tuple[bytes, str]]:
-    return [(peer, message.kind) for peer, message in sent]
+from tests.unit.service.hub.bench import (
+    CLIENT,
+    FACE_ARRAYS,
+    HASH,
+    OTHER,
+    SENSOR,
+    SETTINGS,
+    WORKER,
+    Bench,
+    kinds,
+    restarted,
+)
 
 
 def test_from_press_to_published_face(bench):
@@ -182,7 +110,7 @@ def test_no_face_ends_the_capture_at_once(bench):
     bench.accepted("a")
     bench.worker()
     bench.say(CLIENT, messages.GetFace(request=1, capture_id="a", wait_s=5))
-    assert kinds(bench.stumble(final=True)) == [(CLIENT, "capture_failed")]
+    assert kinds(bench.fail_job(final=True)) == [(CLIENT, "capture_failed")]
     (published,) = bench.published
     assert (published.error, published.message, published.dead) == ("Error", "why", False)
 
@@ -229,9 +157,9 @@ def test_repeated_ready_gives_one_job(bench):
 def test_after_the_last_attempt_a_dead_letter(bench):
     bench.accepted("a")
     bench.worker()
-    bench.stumble()
+    bench.fail_job()
     assert bench.worker(credit=1)[0][1].attempt == 2
-    bench.stumble()
+    bench.fail_job()
     (published,) = bench.published
     assert (published.kind, published.dead, published.message) == ("capture_failed", True, "why")
     assert bench.store.find("a").state is CaptureState.DEAD
@@ -240,7 +168,7 @@ def test_after_the_last_attempt_a_dead_letter(bench):
     assert len(bench.published) == 1
 
 
-def test_a_worker_that_takes_its_leave_hands_back_its_job_and_no_attempt_is_lost(bench):
+def test_a_worker_that_says_goodbye_hands_back_its_job_and_no_attempt_is_lost(bench):
     bench.accepted("a")
     for credit in range(5):
         (job,) = bench.worker(credit=credit)
@@ -290,7 +218,7 @@ def test_a_worker_whose_ready_was_lost_is_asked_again(bench):
     assert bench.say(WORKER, messages.Heartbeat(holding="b")) == []
 
 
-def test_silence_while_the_hub_was_away_counts_for_nothing(bench):
+def test_silence_while_the_event_loop_was_stalled_is_forgiven(bench):
     bench.accepted("a")
     bench.worker()
     bench.now += 60
@@ -301,7 +229,7 @@ def test_silence_while_the_hub_was_away_counts_for_nothing(bench):
     assert bench.hub.peers() == []
 
 
-def test_an_unreachable_worker_s_job_is_given_out_again(bench):
+def test_an_unreachable_worker_s_job_is_sent_to_another(bench):
     bench.accepted("a")
     bench.worker()
     bench.hub.unreachable(WORKER)

@@ -1,12 +1,10 @@
-"""A worker has its next frame at hand before it has answered."""
+"""A worker gets its next job before it has answered the last."""
 
 from denseface.service.errors import StoreError
 from denseface.service.hub import Hub
 from denseface.service.protocol import messages
 from denseface.service.protocol.states import CaptureState
-from tests.unit.service.hub.test_hub import HASH, OTHER, SETTINGS, WORKER, Bench, bench
-
-__all__ = ["bench"]
+from tests.unit.service.hub.bench import HASH, OTHER, SETTINGS, WORKER, Bench
 
 
 def jobs(sent) -> list[tuple[bytes, str, int]]:
@@ -30,7 +28,7 @@ def test_one_job_for_each_credit_before_the_first_answer(bench):
     assert [one.capture_id for one in bench.published] == ["a", "b", "c"]
 
 
-def test_who_has_nothing_to_do_comes_first(bench):
+def test_a_worker_without_a_job_comes_first(bench):
     bench.worker(credit=0)
     bench.worker(OTHER, credit=0)
     bench.sensor()
@@ -56,7 +54,7 @@ def test_a_frame_that_was_not_begun_loses_no_attempt_with_its_worker(bench):
 def test_a_frame_that_was_tried_before_has_a_worker_for_itself(bench):
     bench.accepted("a", "b")
     bench.worker(credit=0)
-    bench.stumble(capture_id="a")
+    bench.fail_job(capture_id="a")
     assert jobs(bench.worker(credit=1)) == [(WORKER, "a", 2)]
     assert jobs(bench.worker(credit=2)) == []  # none behind it
     bench.worker(OTHER, credit=0)
@@ -66,7 +64,7 @@ def test_a_frame_that_was_tried_before_has_a_worker_for_itself(bench):
     bench.press("c")
     assert jobs(bench.frame("c")) == [(WORKER, "c", 1)]
     bench.worker(OTHER, credit=1)
-    bench.stumble(OTHER, "b")  # and it is behind none
+    bench.fail_job(OTHER, "b")  # and it is behind none
     bench.worker(WORKER, credit=3)
     assert attempts(bench, "b") == [2]
     assert bench.hub._peers.workers[OTHER].jobs == ["b"]
@@ -139,7 +137,7 @@ def test_a_store_that_cannot_be_read_when_a_worker_goes_loses_no_job(bench, monk
         bench.say(OTHER, messages.Goodbye())
 
 
-def test_a_hub_that_comes_back_takes_the_answers_of_both(bench):
+def test_a_restarted_hub_takes_the_answers_of_both(bench):
     bench.accepted("a", "b")
     bench.worker(credit=0)
     bench.worker(credit=1)

@@ -1,19 +1,11 @@
 """The hub on a disk that is full or fails."""
 
-import pytest
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import StoreError
 from denseface.service.hub import Hub
 from denseface.service.protocol import messages
-from denseface.service.storage import FolderStore
-from tests.unit.service.hub.test_hub import CLIENT, SETTINGS, WORKER, Bench, kinds
-
-
-@pytest.fixture
-def bench(tmp_path):
-    with FolderStore(tmp_path / "data") as store:
-        yield Bench(Hub(store, SETTINGS, Settings()), store)
+from tests.unit.service.hub.bench import CLIENT, SETTINGS, WORKER, Bench, kinds
 
 
 def test_a_store_that_fails_answers_the_request(bench, monkeypatch):
@@ -50,10 +42,10 @@ def test_a_failure_that_cannot_be_kept_is_told_again(bench, monkeypatch):
     bench.accepted("a")
     bench.worker()
     monkeypatch.setattr(bench.store, "fail", full)
-    bench.stumble(final=True)
+    bench.fail_job(final=True)
     monkeypatch.undo()
     assert kinds(bench.worker(credit=1)) == [(WORKER, "job")]
-    bench.stumble(final=True)
+    bench.fail_job(final=True)
     assert [message.kind for message in bench.published] == ["capture_failed"]
 
 

@@ -28,7 +28,7 @@ from denseface.service.storage import FolderStore
 from tests.fuzzing.corpus import Parts, encoded
 from tests.fuzzing.mutate import mutate
 from tests.unit.service.faulty import StepWriter
-from tests.unit.service.hub.test_hub import FACE, FACE_ARRAYS, FRAME, FRAME_ARRAYS
+from tests.unit.service.hub.bench import FACE, FACE_ARRAYS, FRAME, FRAME_ARRAYS
 
 SETTINGS = ServiceSettings(address="ipc:///unused", attempts=2, queue=6, reserve_mib=0)
 _MEMORY = Path("/dev/shm")  # noqa: S108
@@ -65,7 +65,7 @@ class Hostile:
         self.writer = StepWriter(lambda: None, lambda _: None)
         self.hub = Hub(self.store, SETTINGS, Settings(), writer=self.writer)
 
-    def give(self, outputs: list[Output]) -> None:
+    def handle(self, outputs: list[Output]) -> None:
         for output in outputs:
             message = decode_from_hub(encode(output.packet)).message
             match message:
@@ -83,7 +83,7 @@ class Hostile:
             return
         self.taken += 1
         self.heard = [*self.heard[-50:], parts]
-        self.give(self.hub.receive(self.now, peer, packet))
+        self.handle(self.hub.receive(self.now, peer, packet))
         kept = {one for one in self.accepted if self.store.find(one)}
         if type(packet.message) in OPERATOR:
             self.accepted = kept
@@ -95,12 +95,12 @@ class Hostile:
             case 0 if self.rng.random() < 0.5:
                 self.writer.immediate = not self.writer.immediate
                 self.writer.step(self.rng.randrange(4))
-                self.give(self.hub.written(self.now))
+                self.handle(self.hub.written(self.now))
             case 0:
                 self.now += self.rng.choice((0.1, 1.0, 4.0, 11.0))
-                self.give(self.hub.tick(self.now))
+                self.handle(self.hub.tick(self.now))
             case 1:
-                self.give(self.hub.unreachable(peer))
+                self.handle(self.hub.unreachable(peer))
             case 2 | 3 if self.heard:
                 self.say(peer, self.rng.choice(self.heard))
             case 4 | 5:
@@ -151,7 +151,7 @@ class Hostile:
 
     def conclude(self) -> set[str]:
         """Let an honest worker finish what is left; give the ids that have an outcome."""
-        self.give(self.hub.written(self.now, wait=True))
+        self.handle(self.hub.written(self.now, wait=True))
         self.start()
         self.jobs = []
         for credit in range(20):
@@ -182,7 +182,7 @@ def test_every_kind_to_the_hub_is_tried():
 
 
 @pytest.mark.parametrize("kind", [messages.SensorReady, messages.WorkerReady])
-def test_a_crowd_is_not_taken_and_the_status_can_still_be_written(store, kind):
+def test_peers_beyond_the_limit_are_not_taken_and_the_status_can_be_written(store, kind):
     hub = Hub(store, SETTINGS, Settings())
     more = {"source": "x"} if kind is messages.SensorReady else {"credit": 0}
     for number in range(MAX_PEERS + 50):

@@ -25,7 +25,7 @@ from denseface.service.settings import ServiceSettings
 from denseface.service.storage import FrameMetadata, _retention, records, writer
 from tests.unit.service.clocks import FakeClock
 from tests.unit.service.faulty import FaultyStore, KilledError, StepWriter
-from tests.unit.service.hub.test_hub import FACE, FACE_ARRAYS, FRAME, FRAME_ARRAYS
+from tests.unit.service.hub.bench import FACE, FACE_ARRAYS, FRAME, FRAME_ARRAYS
 
 HASH = settings_hash(Settings())
 SETTINGS = ServiceSettings(
@@ -113,19 +113,19 @@ class AnyOrder(RuleBasedStateMachine):
                 return found
             assert packet.message.sequence > after
             after = packet.message.sequence
-            self.is_of_the_frame_kept(packet.message)
+            self.is_of_the_stored_frame(packet.message)
             found.append(packet.message.capture_id)
 
-    def is_of_the_frame_kept(self, outcome):
+    def is_of_the_stored_frame(self, outcome):
         if isinstance(outcome, messages.FaceDone):
             assert outcome.face.report.calibration == self.shown[outcome.capture_id]
 
-    def give(self, outputs):
+    def handle(self, outputs):
         for output in outputs:
             message = output.packet.message
             if isinstance(output, Publish):
                 if output.topic is Topic.FACES:
-                    self.is_of_the_frame_kept(message)
+                    self.is_of_the_stored_frame(message)
                     self.published.append(message)
             elif isinstance(message, messages.Take):
                 self.taken.add(message.capture_id)
@@ -155,7 +155,7 @@ class AnyOrder(RuleBasedStateMachine):
 
     def say(self, peer, message, arrays=None):
         try:
-            self.give(self.hub.receive(self.now, peer, Packet(message, arrays or {})))
+            self.handle(self.hub.receive(self.now, peer, Packet(message, arrays or {})))
         except KilledError:
             self.kill()
 
@@ -168,7 +168,7 @@ class AnyOrder(RuleBasedStateMachine):
         """As a hub does that is told to stop, and another."""
         if hasattr(self, "writer"):
             try:
-                self.give(self.hub.written(self.now, wait=True))
+                self.handle(self.hub.written(self.now, wait=True))
             except KilledError:
                 self.kill()
                 return
@@ -201,7 +201,7 @@ class AnyOrder(RuleBasedStateMachine):
         """Files are safe, and the hub hears of it."""
         try:
             self.writer.step(count)
-            self.give(self.hub.written(self.now))
+            self.handle(self.hub.written(self.now))
         except KilledError:
             self.kill()
 
@@ -213,7 +213,7 @@ class AnyOrder(RuleBasedStateMachine):
 
     def tick(self):
         try:
-            self.give(self.hub.tick(self.now))
+            self.handle(self.hub.tick(self.now))
         except KilledError:
             self.kill()
 
@@ -250,10 +250,10 @@ class AnyOrder(RuleBasedStateMachine):
         self.credit += 1
         self.say(worker, messages.WorkerReady(name="w", credit=self.credit))
 
-    @rule(worker=workers, truly=st.booleans())
-    def heartbeat(self, worker, truly):
+    @rule(worker=workers, holds_job=st.booleans())
+    def heartbeat(self, worker, holds_job):
         held = self.jobs.get(worker) or [None]
-        holding = held[-1].capture_id if truly and held[-1] else None
+        holding = held[-1].capture_id if holds_job and held[-1] else None
         self.say(worker, messages.Heartbeat(holding=holding))
 
     @rule(worker=workers)
@@ -268,11 +268,11 @@ class AnyOrder(RuleBasedStateMachine):
             self.say(worker, messages.JobFailed(
                 **self.answered(jobs), error="E", message="m", final=final))
 
-    @rule(worker=workers, capture_id=ids, well=st.booleans())
-    def an_answer_finds_the_disk_full(self, worker, capture_id, well):
+    @rule(worker=workers, capture_id=ids, success=st.booleans())
+    def an_answer_finds_the_disk_full(self, worker, capture_id, success):
         self.all_goes_well_until_the_job(capture_id, worker)
         self.store.full = True
-        if well:
+        if success:
             self.result(worker)
         else:
             self.failure(worker, final=True)
@@ -305,7 +305,7 @@ class AnyOrder(RuleBasedStateMachine):
 
     @rule(peer=st.sampled_from([b"s", b"w1", b"w2", b"c"]))
     def unreachable(self, peer):
-        self.give(self.hub.unreachable(peer))
+        self.handle(self.hub.unreachable(peer))
 
     @rule(days=st.sampled_from([-400, 400]))
     def set_the_wall_clock(self, days):
@@ -334,7 +334,7 @@ class AnyOrder(RuleBasedStateMachine):
             self.kill()
             return self.answer(message)
         answers = [one.packet.message for one in outputs if getattr(one, "peer", None) == b"o"]
-        self.give(outputs)
+        self.handle(outputs)
         (answer,) = answers
         return answer
 
@@ -390,7 +390,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.store.full = full
 
     @rule(step=st.sampled_from(["write_parts", "sync_folder", None]))
-    def will_die(self, step):
+    def arm_crash(self, step):
         self.dies_after = step
 
     @rule()

@@ -11,7 +11,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.states import CaptureState
 from denseface.service.storage import FolderStore
 from tests.unit.service.faulty import StepWriter
-from tests.unit.service.hub.test_hub import CLIENT, OTHER, SENSOR, SETTINGS, WORKER, Bench, kinds
+from tests.unit.service.hub.bench import CLIENT, OTHER, SENSOR, SETTINGS, WORKER, Bench, kinds
 
 IDS = [f"c{number}" for number in range(40)]
 
@@ -160,8 +160,8 @@ def test_a_face_is_published_when_it_is_safe_and_asked_for_meanwhile_it_is_pendi
 def test_a_second_answer_while_the_first_is_written_changes_nothing(bench):
     face_comes(bench)
     bench.result("a", peer=OTHER)
-    bench.stumble(OTHER, "a", final=True)
-    bench.stumble(OTHER, "a", final=False)
+    bench.fail_job(OTHER, "a", final=True)
+    bench.fail_job(OTHER, "a", final=False)
     assert len(bench.writer.waiting) == 1
     bench.written()
     assert [one.kind for one in bench.published] == ["face_done"]

@@ -11,7 +11,7 @@ from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet
 from denseface.service.storage import FolderStore
 from tests.unit.service.clocks import FakeClock
-from tests.unit.service.hub.test_hub import (
+from tests.unit.service.hub.bench import (
     CLIENT,
     OTHER,
     SETTINGS,
@@ -54,7 +54,7 @@ def dead(bench, capture_id="a"):
     bench.accepted(capture_id)
     for _ in range(SETTINGS.attempts):
         bench.worker(WORKER, next(CREDIT))
-        bench.stumble(capture_id=capture_id)
+        bench.fail_job(capture_id=capture_id)
     assert bench.published[-1].dead
 
 
@@ -192,7 +192,7 @@ def test_a_purged_capture_is_gone_and_may_be_pressed_again(bench, files):
 def test_the_name_of_a_purged_capture_is_nowhere_in_the_database(bench, tmp_path):
     bench.accepted("MargaretHamilton")
     bench.worker()
-    bench.stumble(capture_id="MargaretHamilton", final=True)
+    bench.fail_job(capture_id="MargaretHamilton", final=True)
     database = [path for path in (tmp_path / "data").iterdir() if path.is_file()]
     assert any(b"MargaretHamilton" in path.read_bytes() for path in database)
     ask(bench, messages.Purge(request=1, capture_id="MargaretHamilton"))
@@ -215,7 +215,7 @@ def test_the_late_face_of_a_purged_capture_is_not_the_next_one_s(bench, monkeypa
     (job,) = bench.worker()
     ask(bench, messages.Purge(request=1, capture_id="a"))
     other = bench.store.epoch  # any bytes: the next frame has another checksum
-    monkeypatch.setattr("tests.unit.service.hub.test_hub.FRAME", job[1].frame.model_copy(
+    monkeypatch.setattr("tests.unit.service.hub.bench.FRAME", job[1].frame.model_copy(
         update={"calibration_origin": other}))
     bench.accepted("a")
     bench.result(frame_sha256=job[1].frame_sha256)

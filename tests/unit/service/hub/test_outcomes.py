@@ -1,9 +1,7 @@
-"""Who asks for a face that is there, and who waits for one that is not."""
+"""Requests for a face that is there, and those that wait for one."""
 
 from denseface.service.protocol import messages
-from tests.unit.service.hub.test_hub import CLIENT, bench, kinds
-
-__all__ = ["bench"]
+from tests.unit.service.hub.bench import CLIENT, kinds
 
 
 def test_waiting_for_a_face_ends(bench):
@@ -37,7 +35,7 @@ def test_a_client_may_wait_for_several_captures(bench):
         ("face_done", 6)]
 
 
-def test_nobody_takes_all_the_places_of_those_who_wait(bench):
+def test_the_requests_of_one_client_that_wait_are_limited(bench):
     bench.accepted("a")
     answered = {
         client: [bool(bench.say(client, messages.GetFace(

@@ -12,7 +12,7 @@ from denseface.service.protocol.payload import MAX_PREVIEW_SIDE, PreviewHeader
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.storage import FolderStore
-from tests.unit.service.hub.test_hub import OTHER, SENSOR, SETTINGS, Bench, kinds
+from tests.unit.service.hub.bench import OTHER, SENSOR, SETTINGS, Bench, kinds
 
 IMAGE = {"image": np.zeros((3, 4, 3), np.uint8)}
 SHOWN = messages.PreviewFrame(preview=PreviewHeader(width=4, height=3, timestamp_us=5))
@@ -32,12 +32,12 @@ def previews(bench, peer=SENSOR):
         if isinstance(one, Publish) and one.topic is Topic.PREVIEW]
 
 
-def test_nobody_looks_and_nothing_is_asked_for(bench):
+def test_without_a_subscriber_no_preview_is_asked_for(bench):
     assert bench.wait(1) == []
     assert previews(bench) == []
 
 
-def test_one_is_asked_for_when_the_one_before_has_come(bench):
+def test_a_preview_is_asked_for_when_the_last_has_come(bench):
     bench.hub.want_previews(wanted=True)
     assert kinds(bench.wait(0.2)) == [(SENSOR, "take_preview")]
     assert bench.wait(0.05) == []
@@ -50,14 +50,14 @@ def test_one_is_asked_for_when_the_one_before_has_come(bench):
     assert first.epoch != bench.store.epoch
 
 
-def test_one_that_is_lost_is_asked_for_again(bench):
+def test_a_preview_that_is_lost_is_asked_for_again(bench):
     bench.hub.want_previews(wanted=True)
     bench.wait(0.2)
     bench.say(SENSOR, messages.Heartbeat())
     assert kinds(bench.wait(1.0)) == [(SENSOR, "take_preview")]
 
 
-def test_only_the_sensor_that_was_asked_is_believed(bench):
+def test_only_the_sensor_that_was_asked_may_send_a_preview(bench):
     bench.hub.want_previews(wanted=True)
     bench.wait(0.2)
     assert previews(bench, OTHER) == []
@@ -72,7 +72,7 @@ def test_no_preview_while_a_press_waits_for_its_frame(bench):
     assert kinds(bench.wait(0.2)) == [(SENSOR, "take_preview")]
 
 
-def test_who_looks_no_more_gets_no_more(bench):
+def test_without_subscribers_a_late_preview_is_dropped(bench):
     bench.hub.want_previews(wanted=True)
     bench.wait(0.2)
     bench.hub.want_previews(wanted=False)
@@ -80,7 +80,7 @@ def test_who_looks_no_more_gets_no_more(bench):
     assert bench.wait(0.2) == []
 
 
-def test_nothing_of_a_preview_is_kept(bench, tmp_path):
+def test_no_preview_is_stored(bench, tmp_path):
     before = sorted(tmp_path.rglob("*"))
     bench.hub.want_previews(wanted=True)
     bench.wait(0.2)

@@ -27,11 +27,11 @@ class Asked:
     """What the server asks when it is asked."""
 
     def __init__(self):
-        self.well = True
+        self.success = True
         self.missing = []
 
     def health(self):
-        return self.well, {"missing": self.missing}
+        return self.success, {"missing": self.missing}
 
 
 @pytest.fixture
@@ -79,7 +79,7 @@ def test_the_metrics_and_the_health(server, asked):
     assert (status, body.splitlines()[-1]) == (200, b"figures 1.0")
     assert kind.startswith("text/plain; version=")
     assert get(server, "/healthz")[::2] == (200, b'{"missing": []}\n')
-    asked.well, asked.missing = False, ["worker"]
+    asked.success, asked.missing = False, ["worker"]
     status, kind, body = get(server, "/healthz?verbose=1")
     assert (status, kind, json.loads(body)) == (503, "application/json", {"missing": ["worker"]})
     assert get(server, "/")[0] == 404

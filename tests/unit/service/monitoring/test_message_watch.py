@@ -11,7 +11,7 @@ from denseface.service.protocol.outgoing import send, steps
 from denseface.service.protocol.wire import Packet
 from denseface.service.storage import FolderStore
 from tests.unit.service.faces import small_face
-from tests.unit.service.hub.test_hub import (
+from tests.unit.service.hub.bench import (
     CLIENT,
     FACE_ARRAYS,
     HASH,
@@ -21,7 +21,7 @@ from tests.unit.service.hub.test_hub import (
     WORKER,
     Bench,
 )
-from tests.unit.service.hub.test_hub import FACE as HEADER
+from tests.unit.service.hub.bench import FACE as HEADER
 
 
 class WatchedBench(Bench):
@@ -94,9 +94,9 @@ def test_what_is_said_before_a_job_has_its_own_time(bench):
 def test_a_job_that_is_given_out_again_and_then_given_up(bench):
     bench.worker()
     bench.accepted("a")
-    bench.stumble()
+    bench.fail_job()
     bench.worker(credit=1)
-    bench.stumble()
+    bench.fail_job()
     assert bench.counted() == {"accepted": 1, "redelivered": 1, "dead": 1}
     assert bench.times()["accepted_to_dispatched"][0] == 1
     assert bench.times()["dispatched_to_result"][0] == 2
@@ -105,7 +105,7 @@ def test_a_job_that_is_given_out_again_and_then_given_up(bench):
 def test_no_face_is_a_failure(bench):
     bench.worker()
     bench.accepted("a")
-    bench.stumble(final=True)
+    bench.fail_job(final=True)
     assert bench.counted() == {"accepted": 1, "failed": 1}
 
 

@@ -87,8 +87,8 @@ def test_all_is_well(snapshot):
     ({"free_bytes": None}, "disk: its free room is not known"),
 ])
 def test_what_is_missing_has_a_name(snapshot, changed, missing):
-    well, said = judged(Snapshot(100.0, status(**changed), (), {}))
-    assert (well, said["healthy"], said["missing"]) == (False, False, [missing])
+    success, said = judged(Snapshot(100.0, status(**changed), (), {}))
+    assert (success, said["healthy"], said["missing"]) == (False, False, [missing])
 
 
 def test_a_hub_that_is_silent_a_store_and_everything(snapshot):

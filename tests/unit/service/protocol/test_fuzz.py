@@ -156,7 +156,7 @@ def test_a_broken_key_file_is_named(tmp_path):
 
 
 @pytest.mark.parametrize("half", ["public_key", "secret_key"])
-def test_letters_of_z85_that_are_no_key(tmp_path, half):
+def test_z85_that_is_no_key_is_refused(tmp_path, half):
     secret, _ = new_pair(tmp_path, "me")
     secret.write_text(json.dumps(json.loads(secret.read_text()) | {half: "#" * 40}))
     with pytest.raises(KeyFileError, match=r"me\.secret: its"):

@@ -133,7 +133,7 @@ def test_every_kind_is_covered_by_the_two_tests_above():
 
 @given(to_hub)
 @settings(deadline=None, max_examples=30)
-def test_the_hub_s_own_words_are_not_taken_from_others(packet):
+def test_messages_of_the_hub_are_not_taken_from_others(packet):
     with pytest.raises(RemoteProtocolError):
         decode_from_hub(encode(packet))
 
