@@ -1,6 +1,7 @@
-"""Images read between their points, on the crossings of some rows and columns, compiled.
+"""Images resampled on other grids, bilinear, compiled.
 
-Bilinear: along the rows first, once for each row of the image, then from row to row.
+Along the rows first, once for each row of the image, then from row to row. Coordinates are
+fractional rows, (m,), and columns, (k,), of the image: inside it and rising.
 """
 
 import numpy as np
@@ -10,8 +11,8 @@ from denseface.recon.numerics.jit import compiled
 
 __all__ = ["add_resampled", "column_positions", "exceeds", "read_row"]
 
-# Indices without a sign spare the compiler's question whether one counts from the end.
 _0, _1 = np.uint64(0), np.uint64(1)
+"""Unsigned: an index that might be negative costs a check at each access."""
 
 
 @compiled
@@ -19,10 +20,7 @@ def add_resampled(
     image: NDArray[np.float32], coarse: NDArray[np.float32], rows: NDArray[np.float32],
     columns: NDArray[np.float32],
 ) -> None:
-    """Add another image, bilinear, to one, (m, k).
-
-    rows, columns : (m,), (k,), places in `coarse`, inside it, rising
-    """
+    """Add a resampled image to another, (m, k)."""
     left, part = column_positions(columns, coarse.shape[1])
     lines, known = np.empty((2, len(columns)), np.float32), -2
     for i in range(len(rows)):
@@ -41,7 +39,7 @@ def exceeds(
     coarse: NDArray[np.float32], rows: NDArray[np.float32], columns: NDArray[np.float32],
     level: float,
 ) -> NDArray[np.bool_]:
-    """Say where an image is above a level between its points, (m, k); places of `add_resampled`."""
+    """Say where a resampled image is above a level, (m, k)."""
     left, part = column_positions(columns, coarse.shape[1])
     lines, known = np.empty((2, len(columns)), np.float32), -2
     out = np.empty((len(rows), len(columns)), np.bool_)
@@ -63,10 +61,10 @@ def _read_rows(
     image: NDArray[np.float32], first: int, known: int, left: NDArray[np.uint32],
     part: NDArray[np.float32], lines: NDArray[np.float32],
 ) -> None:
-    """Read a row of an image and the next between its points.
+    """Read a row of an image and the next at some columns.
 
-    known : which row and its next were read before
-    lines : (2, k), in which an even row stands first, an odd one last
+    known : the row that was read before, with its next
+    lines : (2, k), the even row, then the odd one
     """
     flat, wide, count = image.ravel(), np.uint64(image.shape[1]), np.uint64(len(left))
     if first != known + 1:
@@ -78,7 +76,7 @@ def _read_rows(
 def column_positions(
     columns: NDArray[np.float32], width: int
 ) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
-    """Give `read_row`'s places for columns of an image so wide."""
+    """Split columns into the pixel to the left, and how far each is from it."""
     left, part = np.empty(len(columns), np.uint32), np.empty(len(columns), np.float32)
     for j in range(len(columns)):
         left[j] = min(int(columns[j]), width - 2)
@@ -92,9 +90,9 @@ def read_row(
     part: NDArray[np.float32], channels: np.uint64, first: np.uint64, end: np.uint64,
     out: NDArray[np.float32],
 ) -> None:
-    """Read a row of a flat image between its points; `left` and `part` of each value.
+    """Read a row of a flat image, which starts at `begin`, at `column_positions`.
 
-    first, end : the first value that is wanted, and the first behind those
+    first, end : range of the wanted values
     """
     for j in range(first, end):
         at = begin + left[j]

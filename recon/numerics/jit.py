@@ -23,7 +23,7 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def compiled(function: _F) -> _F:
-    """Compile a function of arrays and numbers when it is first called, without strict IEEE."""
+    """Compile a function of arrays and numbers when it is first called, with fast math."""
     try:
         return cast("_F", njit(cache=True, fastmath=True, error_model="numpy")(function))
     except RuntimeError:  # numba found no folder for its cache
@@ -36,8 +36,8 @@ def inlined(function: _F) -> _F:
 
 
 @intrinsic
-def _room(_: Any) -> tuple[Any, Any]:
-    """Point to room for `STACK_FLOATS` float32 on the stack."""
+def _stack_pointer(_: Any) -> tuple[Any, Any]:
+    """Allocate `STACK_FLOATS` float32 on the stack."""
     def code(context: Any, builder: Any, _signature: Any, _args: Any) -> Any:
         return cgutils.alloca_once(  # type: ignore[no-untyped-call]
             builder, context.get_value_type(types.float32),
@@ -50,7 +50,6 @@ def _room(_: Any) -> tuple[Any, Any]:
 def stack_floats() -> NDArray[np.float32]:
     """Give (`STACK_FLOATS`,) float32 on the stack, for compiled functions alone.
 
-    Of these the compiler knows that no other array shares their memory: what is read elsewhere
-    while they are written need not be read anew, and a loop is vectorised without questions.
+    The compiler knows that no other array aliases them, and vectorises loops without checks.
     """
-    return carray(_room(), (STACK_FLOATS,))  # type: ignore[call-arg]
+    return carray(_stack_pointer(), (STACK_FLOATS,))  # type: ignore[call-arg]

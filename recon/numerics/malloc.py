@@ -1,8 +1,7 @@
 """Memory that one frame frees is kept for the next.
 
-glibc gives freed memory back to the kernel at once where a block was large or at the heap's end.
-A frame needs the same few tens of megabytes as the one before; fetched anew, page by page, they
-cost as much time as a fifth of the computation.
+glibc returns freed memory to the kernel where a block was large or at the heap's end. Every frame
+needs the same few tens of megabytes: fetched anew, page by page, they cost a fifth of its time.
 """
 
 import ctypes
@@ -10,12 +9,14 @@ from functools import cache
 
 __all__ = ["keep_freed_memory"]
 
-# mallopt(3): from what size a block is mapped by itself, and how much free memory the heap keeps.
 _M_TRIM_THRESHOLD = -1
+"""mallopt(3): how much free memory at its end the heap keeps."""
 _M_MMAP_THRESHOLD = -3
-# glibc takes no larger one for blocks.
+"""mallopt(3): from what size on a block is mapped by itself."""
 _LARGEST_BLOCK = 32 * 1024**2
+"""Bytes; glibc takes no larger threshold."""
 _KEPT = 64 * 1024**2
+"""Bytes."""
 
 
 @cache

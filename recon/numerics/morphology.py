@@ -1,4 +1,4 @@
-"""Binary images: discs, holes, openings; what an image holds where one is set."""
+"""Binary morphology: discs, holes, openings; the pixels of an image under a mask."""
 
 from typing import TypeVar
 

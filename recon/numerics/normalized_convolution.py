@@ -15,6 +15,7 @@ __all__ = ["normalized", "normalized_convolution"]
 Image = NDArray[np.float32]
 
 _LEAST_WEIGHT = np.float32(1e-6)
+"""Weights are divided by as if they were at least this."""
 _QUARTER = np.float32(0.25)
 
 
@@ -32,11 +33,11 @@ def normalized_convolution(weight: Image, sigma: float, *values: Image) -> list[
 
 @compiled
 def _downsampled_products(weight: Image, values: tuple[Image, ...]) -> Image:
-    """Average a weight, and each value times the weight, over each four pixels.
+    """Average a weight, and its product with each value, over each four pixels.
 
     weight, values : (rows, columns) each; beyond the edge the weight is zero
 
-    Gives (rows, columns, 1 + values), half of the rows and columns, rounded up.
+    Returns (rows, columns, 1 + values), half of the rows and columns, rounded up.
     """
     rows, columns = weight.shape
     out = np.zeros(((rows + 1) // 2, (columns + 1) // 2, 1 + len(values)), np.float32)
@@ -51,7 +52,6 @@ def _downsampled_products(weight: Image, values: tuple[Image, ...]) -> Image:
             for j in range(np.uint64(columns)):
                 line[j >> np.uint64(1), k + 1] += _QUARTER * given[j] * shown[j]
     return out
-
 
 
 @compiled

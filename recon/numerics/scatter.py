@@ -1,4 +1,4 @@
-"""Between scattered points and the pixels around them, compiled."""
+"""Scattered points to pixels and back, compiled."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ __all__ = ["BILINEAR_VARIANCE", "interpolate", "occupancy", "pixel_coordinates",
 
 _1 = np.uint64(1)
 BILINEAR_VARIANCE = 1 / 6
-"""What bilinear weights blur by on average, squared pixels."""
+"""Mean variance of the blur by bilinear weights, squared pixels."""
 
 
 @compiled
@@ -28,10 +28,10 @@ def xy_bounds(points: NDArray[np.float32]) -> tuple[float, float, float, float]:
 def occupancy(
     points: NDArray[np.float32], origin: tuple[float, float], step: float, rows: int, columns: int
 ) -> NDArray[np.uint8]:
-    """Set the pixel nearest to each point, (n, 3); gives (rows, columns), 0 or 1.
+    """Set the pixel nearest to each point, (n, 3): (rows, columns), 0 or 1.
 
-    origin, step : where the first pixel's middle is, (x, y), and the distance of pixels, mm; no
-        point is farther than half of it outside of the image
+    origin, step : centre of pixel (0, 0), (x, y), and distance of pixels, mm; no point is farther
+        than half a pixel outside of the image
     """
     image = np.zeros((rows, columns), np.uint8)
     per_step = 1 / step
@@ -46,9 +46,9 @@ def occupancy(
 def pixel_coordinates(
     points: NDArray[np.float32], origin: tuple[float, float], step: float
 ) -> NDArray[np.float32]:
-    """Give (row, column) of each point, (n, 3), between pixels: (n, 2); none before the first.
+    """Give the fractional (row, column) of each point, (n, 3) to (n, 2), at least 0.
 
-    origin, step : where the first pixel's middle is, (x, y), and the distance of pixels, mm
+    origin, step : as of `occupancy`
     """
     out = np.empty((len(points), 2), np.float32)
     for i in range(len(points)):
@@ -62,13 +62,13 @@ def splat(
     columns: NDArray[np.float32], rows: NDArray[np.float32], values: NDArray[np.float32],
     counts: NDArray[np.float32], sums: NDArray[np.float32],
 ) -> None:
-    """Add 1, and each value, to the four pixels around its place, by bilinear weights.
+    """Add 1, and each value, to the four pixels around its coordinates, by bilinear weights.
 
-    columns, rows : (n,), places inside the images, not on their last row or column
+    columns, rows : (n,), inside the images, not on their last row or column
     """
     flat, same, width = sums.ravel(), counts.ravel(), np.uint64(sums.shape[1])
     for i in range(len(values)):
-        # Unsigned: a number that might be negative costs a question at each look.
+        # Unsigned: an index that might be negative costs a check at each access.
         left, above = np.uint64(columns[i]), np.uint64(rows[i])
         right_part, low = columns[i] - np.float32(left), rows[i] - np.float32(above)
         value, at = values[i], above * width + left
@@ -87,7 +87,7 @@ def splat(
 def interpolate(
     image: NDArray[np.float32], columns: NDArray[np.float32], rows: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Read an image at places, (n,), bilinear; places as of `splat`."""
+    """Read an image at the coordinates of `splat`, bilinear: (n,)."""
     out = np.empty(len(columns), np.float32)
     for i in range(len(columns)):
         left, above = np.uint32(columns[i]), np.uint32(rows[i])

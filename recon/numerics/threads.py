@@ -1,6 +1,6 @@
 """One thread for the linear algebra.
 
-The matrices here are thin: more threads only wait for each other, and round otherwise.
+The matrices here are thin: more threads only wait for each other, and sum in another order.
 """
 
 from collections.abc import Callable

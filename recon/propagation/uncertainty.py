@@ -23,8 +23,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.numerics._push_pull_kernels import blur
-from denseface.recon.numerics.filters import gaussian_taps
+from denseface.recon.numerics.filters import filtered, gaussian_taps
 from denseface.recon.propagation._uncertainty_kernels import node_statistics
 from denseface.recon.settings import Settings
 
@@ -114,7 +113,7 @@ def variance_components(
     nodes = node_statistics(points, support, surface, origin, step, every)
     far = cv2.distanceTransform((nodes[..., 2] == 0).astype(np.uint8), cv2.DIST_L2, 5)
     seeds, squares = nodes[..., 2].sum(dtype=np.float64), nodes[..., 3].sum(dtype=np.float64)
-    covered, slope, count, square = cv2.split(blur(nodes, gaussian_taps(_WINDOW / node)))
+    covered, slope, count, square = cv2.split(filtered(nodes, gaussian_taps(_WINDOW / node)))
     prior = np.float32(_PRIOR * node**2)
     noise = (square + prior * np.float32(squares / max(seeds, 1.0))) / (count + prior)
     hole = noise * np.maximum(np.float32(node) * far - 1, np.float32(0))

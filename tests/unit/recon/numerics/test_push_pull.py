@@ -12,15 +12,15 @@ LEFT, RIGHT = (210, 150, 120), (40, 70, 200)
 
 def two_tones(every: int, shape: tuple[int, int] = (60, 80)) -> tuple[np.ndarray, np.ndarray]:
     """Colours on every so many pixels, another one on each side of the middle."""
-    places = np.stack(np.mgrid[:shape[0]:every, :shape[1]:every], axis=-1).reshape(-1, 2)
-    left = places[:, 1] < shape[1] / 2
-    return np.where(left[:, None], LEFT, RIGHT).astype(np.uint8), places
+    coordinates = np.stack(np.mgrid[:shape[0]:every, :shape[1]:every], axis=-1).reshape(-1, 2)
+    left = coordinates[:, 1] < shape[1] / 2
+    return np.where(left[:, None], LEFT, RIGHT).astype(np.uint8), coordinates
 
 
 @pytest.mark.parametrize("every", [1, 3, 4])
 def test_each_side_keeps_its_colour(every):
-    colors, places = two_tones(every)
-    image = interpolate_colors(colors, places, np.ones((60, 80), bool), 0.5 * every, every)
+    colors, coordinates = two_tones(every)
+    image = interpolate_colors(colors, coordinates, np.ones((60, 80), bool), 0.5 * every, every)
     away = 2 * every + 1
     assert (image[:, :40 - away] == LEFT).all()
     assert (image[:, 40 + away:] == RIGHT).all()
@@ -31,9 +31,9 @@ def test_each_side_keeps_its_colour(every):
 
 
 def test_a_hole_takes_the_colours_around_it():
-    colors, places = two_tones(3)
-    hole = np.hypot(places[:, 0] - 30, places[:, 1] - 40) < 20
-    image = interpolate_colors(colors[~hole], places[~hole], np.ones((60, 80), bool), 1.5, 3)
+    colors, coordinates = two_tones(3)
+    hole = np.hypot(coordinates[:, 0] - 30, coordinates[:, 1] - 40) < 20
+    image = interpolate_colors(colors[~hole], coordinates[~hole], np.ones((60, 80), bool), 1.5, 3)
     assert np.abs(image[30, 24].astype(int) - LEFT).max() < 10
     assert np.abs(image[30, 56].astype(int) - RIGHT).max() < 10
     middle = image[30, 39].astype(int)
@@ -61,8 +61,8 @@ def test_what_is_not_wanted_stays_black():
 def test_a_mean_is_within_what_it_is_of(seed, count, low, span, radius):
     rng = np.random.default_rng(seed)
     colors = rng.integers(low, low + span + 1, (count, 3)).astype(np.uint8)
-    places = np.column_stack([rng.integers(0, 30, count), rng.integers(0, 40, count)])
-    image = interpolate_colors(colors, places, np.ones((30, 40), bool), radius, 2 * radius)
+    coordinates = np.column_stack([rng.integers(0, 30, count), rng.integers(0, 40, count)])
+    image = interpolate_colors(colors, coordinates, np.ones((30, 40), bool), radius, 2 * radius)
     assert (image >= colors.min(axis=0)).all()
     assert (image <= colors.max(axis=0)).all()
 

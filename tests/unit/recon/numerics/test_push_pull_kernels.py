@@ -1,28 +1,14 @@
-"""The compiled loops that average colours against NumPy and OpenCV."""
+"""The steps of push-pull against NumPy."""
 
-import cv2
 import numpy as np
-import pytest
 
 from denseface.recon.numerics._push_pull_kernels import (
-    blur,
     divide,
-    fill,
     halve,
-    planes,
-    scatter,
-    widen,
+    masked_sums,
+    pull,
+    splat_colors,
 )
-
-
-@pytest.mark.parametrize("shape", [(40, 60), (3, 5), (1, 1), (200, 2)])
-@pytest.mark.parametrize("radius", [0.5, 1.6, 3])
-def test_the_blur_is_opencvs(shape, radius):
-    image = np.random.default_rng(0).uniform(0, 255, (*shape, 4)).astype(np.float32)
-    size = 2 * round(4 * radius) + 1
-    taps = np.asarray(cv2.getGaussianKernel(size, radius, cv2.CV_32F), np.float32).ravel()
-    expected = cv2.GaussianBlur(image, (size, size), radius, borderType=cv2.BORDER_CONSTANT)
-    np.testing.assert_allclose(blur(image, taps), expected.reshape(image.shape), atol=1e-3)
 
 
 def test_means_are_given_where_wanted_and_known():
@@ -51,13 +37,13 @@ def test_what_is_missing_is_filled_from_half_the_size():
     coarse = np.ascontiguousarray(ramp.reshape(3, 2, 4, 2, 3).mean(axis=(1, 3)))
     missing = np.random.default_rng(3).random((6, 8)) < 0.5
     mean = np.where(missing[..., None], np.float32(0), ramp)
-    fill(mean, missing, coarse)
+    pull(mean, missing, coarse)
     np.testing.assert_allclose(mean[1:-1, 1:-1], ramp[1:-1, 1:-1], atol=1e-5)
     np.testing.assert_array_equal(mean[~missing], ramp[~missing])
 
 
 def test_a_colour_is_shared_among_the_pixels_around_it():
-    sums = scatter(np.array([[100, 0, 40], [8, 16, 4]], np.uint8),
+    sums = splat_colors(np.array([[100, 0, 40], [8, 16, 4]], np.uint8),
                    np.array([[1.25, 2.5], [3, 4]], np.float32), 4, 5)
     np.testing.assert_allclose(sums[1, 2], (37.5, 0, 15, 0.375))
     np.testing.assert_allclose(sums[2, 3], (12.5, 0, 5, 0.125))
@@ -68,13 +54,6 @@ def test_a_colour_is_shared_among_the_pixels_around_it():
 def test_known_pixels_are_counted():
     image = np.random.default_rng(4).integers(0, 256, (6, 7, 3), np.uint8)
     known = np.random.default_rng(5).random((6, 7)) < 0.5
-    sums = planes(image, known)
+    sums = masked_sums(image, known)
     np.testing.assert_array_equal(sums[..., 3], known)
     np.testing.assert_array_equal(sums[..., :3], np.where(known[..., None], image, 0))
-
-
-@pytest.mark.parametrize("shape", [(20, 30), (3, 2), (1, 1)])
-def test_widening_is_opencvs_dilation(shape):
-    mask = np.random.default_rng(6).random(shape) < 0.05
-    expected = cv2.dilate(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-    np.testing.assert_array_equal(widen(mask, 2), expected.reshape(shape))
