@@ -35,7 +35,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    # OpenCV and SciPy take most of a second: who only handles faces shall not wait for them.
+    # Loading OpenCV and SciPy takes most of a second, and who only handles faces needs neither.
     if name == "reconstruct":
         from denseface.recon.pipeline import reconstruct
 

@@ -1,4 +1,4 @@
-"""The result: initial cloud, dense cloud, report."""
+"""Seeds, and the result: initial cloud, dense cloud, report."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -114,7 +114,7 @@ class Report(_Model):
     capture_id: str = ""
     face_box: Box
     """x, y, width, height; pixels of the colour image."""
-    # Of a face from elsewhere: one complaint is enough, each costs a thousand bytes.
+    # FailFast: of an invalid report one error is enough, each costs a thousand bytes.
     candidates: Annotated[tuple[FaceCandidate, ...], FailFast()]
     """Every box the detector weighed, the chosen one first. Nobody farther is looked for."""
     initial_points: int
@@ -150,7 +150,7 @@ def _check(name: str, array: NDArray[Any], dtype: type[np.generic], shape: tuple
         )
     if array.dtype.kind == "f":
         flat = array.ravel()
-        # A finite sum of squares has finite parts, and takes half the time to tell.
+        # A finite sum of squares has finite parts, and takes half the time of isfinite.
         with np.errstate(over="ignore", invalid="ignore"):
             squares = flat @ flat
         if not (np.isfinite(squares) or np.isfinite(flat).all()):

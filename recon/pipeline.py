@@ -28,10 +28,11 @@ from denseface.recon.surface import MIN_SEEDS, fit_surface, mean_spacing
 __all__ = ["reconstruct", "surface_of"]
 
 _FEW_SEEDS = 2000
-# Every so many pixels are enough to find a face and weigh its depth.
+"""With fewer seeds, the report warns."""
 _SPARSE = 4
-# A whole frame at 30 frames a second: the face may have moved in between.
+"""Every so many pixels are enough to find a face and weigh its depth."""
 _MUCH_SKEW_US = 33_000
+"""A whole frame at 30 frames a second: the face may have moved in between."""
 
 
 @one_blas_thread
@@ -95,7 +96,7 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
 
 
 def _overview(frame: RgbdFrame, depth_offset_mm: float) -> Registration:
-    """Every so many pixels registered, or all where none of those has a depth."""
+    """Register every k-th pixel, or all where none of those has a depth."""
     sparse = slice(None, None, _SPARSE)
     try:
         return register(frame, depth_offset_mm, sparse, sparse, colors=False)

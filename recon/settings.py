@@ -1,4 +1,4 @@
-"""The knobs of the reconstruction, and the presets that set them."""
+"""The settings of the reconstruction, and the presets that choose them."""
 
 from enum import StrEnum
 from typing import Annotated, Any, Self
@@ -6,17 +6,6 @@ from typing import Annotated, Any, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 __all__ = ["Neighbors", "Preset", "Settings"]
-
-
-class Preset(StrEnum):
-    """A named choice of all settings; a setting given beside it wins."""
-
-    PAPER = "paper"
-    """The paper's R0 and the little smoothing that meets its reported error."""
-    FAITHFUL = "faithful"
-    """The paper's R0 with the smoothing that a sensor's noise asks for."""
-    BEST = "best"
-    """The most accurate found; chosen on other heads than the reported ones."""
 
 
 class Neighbors(StrEnum):
@@ -30,13 +19,27 @@ class Neighbors(StrEnum):
     """The depth image's own pixels: exact where the seeds come from one image."""
 
 
-_PRESETS: dict[Preset, dict[str, Any]] = {
-    Preset.PAPER: {"r0_factor": 6.0, "smoothing": 0.1, "neighbors": Neighbors.RANDOMIZED,
-                   "depth_offset_mm": 0.0},
-    Preset.FAITHFUL: {"r0_factor": 6.0, "smoothing": 3.0, "neighbors": Neighbors.RANDOMIZED},
-    Preset.BEST: {"r0_factor": 14.0, "smoothing": 12.0, "detail_factor": 1.5, "symmetry": True,
-                  "shading": True, "neighbors": Neighbors.LATTICE},
-}
+class Preset(StrEnum):
+    """A named choice of all settings, one row each; a setting given beside it wins."""
+
+    settings: dict[str, Any]
+    """What differs from the defaults of `Settings`."""
+
+    def __new__(cls, name: str, settings: dict[str, Any] | None = None) -> Self:
+        """Attach the settings to the name."""
+        preset = str.__new__(cls, name)
+        preset._value_ = name
+        preset.settings = settings or {}
+        return preset
+
+    PAPER = "paper", {"r0_factor": 6.0, "smoothing": 0.1, "neighbors": Neighbors.RANDOMIZED,
+                      "depth_offset_mm": 0.0}
+    """The paper's R0 and the little smoothing that meets its reported error."""
+    FAITHFUL = "faithful", {"r0_factor": 6.0, "smoothing": 3.0, "neighbors": Neighbors.RANDOMIZED}
+    """The paper's R0 with the smoothing that a sensor's noise asks for."""
+    BEST = "best", {"r0_factor": 14.0, "smoothing": 12.0, "detail_factor": 1.5, "symmetry": True,
+                    "shading": True, "neighbors": Neighbors.LATTICE}
+    """The most accurate found; chosen on other heads than the reported ones."""
 
 
 class Settings(BaseModel):
@@ -74,7 +77,7 @@ class Settings(BaseModel):
             preset = Preset(given.get("preset", Preset.BEST))
         except ValueError:
             return given  # the field's own validation says what is wrong
-        return _PRESETS[preset] | given
+        return preset.settings | given
 
     @classmethod
     def of(cls, preset: Preset | str, **changes: Any) -> Self:

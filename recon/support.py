@@ -16,33 +16,34 @@ from denseface.recon.numerics.scatter import occupancy, xy_bounds
 
 __all__ = ["Support"]
 
-# Points of its grid for each spacing.
 _FINENESS = 2
-# In units of the mean spacing. Gaps narrower than twice the closing are none; the support ends at
-# the rim, counted outward from the outermost seeds.
+"""Points of the grid for each mean spacing."""
 _CLOSING = 1.2
+"""Half the width of gaps that are closed, mean spacings."""
 _RIM = 0.2
-# The sensor leaves an edge frayed, over several pixels at once: its outline is evened out by a
-# Gaussian of this radius, where seeds are few by no more than the second: a share of the side of a
-# square as large as they are. It grows into bays by no more than the third.
+"""How far outside of the outermost seeds the support ends, mean spacings."""
 _EVEN = 4.0
+"""Standard deviation of the Gaussian that evens out the outline, mean spacings: the sensor leaves
+an edge frayed over several pixels."""
 _EVEN_PART = 0.1
-_GROWTH = 1.0
-# Pixels for that radius: more change nothing.
+"""Where seeds are few: the same, at most, as a part of the side of a square of their area."""
 _EVEN_PX = 3
+"""The same, in pixels of the image that is filtered; more change nothing."""
+_GROWTH = 1.0
+"""How far the support may grow into bays of the outline, mean spacings."""
 
 
 @dataclass(frozen=True, eq=False)
 class Support:
-    """The places over the seeds, with enclosed holes but nothing past the rim.
+    """The region over the seeds, with enclosed holes but nothing past the rim.
 
     Attributes
     ----------
     xs, ys : (columns,), (rows,) float64, mm, a grid of two points for each spacing
     step : distance of its points, mm
     seeded : (rows, columns) uint8, 1 at the points nearest to the seeds, 0 elsewhere
-    margin : (rows, columns) float32, above 0 where supported, between the points above `level`
-    level : a disc of so few pixels reaches farther than its radius
+    margin : (rows, columns) float32, above 0 at supported points, above `level` between points
+    level : what a disc of few pixels reaches farther than its radius adds to the margin
     """
 
     xs: NDArray[np.float64]
@@ -70,7 +71,7 @@ class Support:
         around = disc(_CLOSING * _FINENESS)
         closed = binary_fill_holes(np.asarray(cv2.dilate(seeded, around), np.uint8))
         even = min(_EVEN * _FINENESS, _EVEN_PART * math.sqrt(np.count_nonzero(closed)))
-        # Of a Gaussian that far inside a straight edge, so much is inside.
+        # What of a Gaussian centred so far inside a straight edge lies inside.
         least, pixels = (0.5 + 0.5 * math.erf((closing - _RIM * _FINENESS) / (even * math.sqrt(2)))
                          for closing in (_CLOSING * _FINENESS,
                                          math.sqrt(np.count_nonzero(around) / math.pi)))
@@ -85,21 +86,21 @@ class Support:
 
     @property
     def area(self) -> float:
-        """Of the supported places, mm^2."""
+        """Area of the supported points, mm^2."""
         return float(np.count_nonzero(self.inside) * self.step**2)
 
     def near_seeds(self, radius: float) -> NDArray[np.uint8]:
         """Which of the grid's points have a seed within a radius, mm; 0 or 1."""
         return np.asarray(cv2.dilate(self.seeded, disc(radius / self.step)), np.uint8)
 
-    def without(self, places: NDArray[np.bool_]) -> Self:
-        """Give the same without some of the grid's points, up to half of the way to the next."""
-        return replace(self, margin=_left_out(self.margin, places, self.level))
+    def without(self, removed: NDArray[np.bool_]) -> Self:
+        """Remove some of the grid's points, up to half of the way to the next."""
+        return replace(self, margin=_without(self.margin, removed, self.level))
 
     def coordinates(
         self, xs: NDArray[np.float64], ys: NDArray[np.float64]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Give where on the grid columns and rows are, (k,), (m,) mm, in its points, inside it."""
+        """Turn x and y, (k,), (m,) mm, into fractional columns and rows, clipped to the grid."""
         columns, rows = (
             np.clip((values - own[0]) / self.step, 0, len(own) - 1).astype(np.float32)
             for values, own in ((xs, self.xs), (ys, self.ys)))
@@ -108,7 +109,7 @@ class Support:
     def on_grid(
         self, step: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-        """Tell it on another grid over the same places.
+        """Sample on another grid over the same region.
 
         Parameters
         ----------
@@ -139,20 +140,20 @@ def _broadly_blurred(image: NDArray[np.uint8], sigma: float) -> NDArray[np.float
 
 
 def _axis(low: float, high: float, step: float) -> NDArray[np.float64]:
-    """Points from the least value to behind the largest, an even number."""
+    """Points from `low` to beyond `high`, an even number."""
     return low + step * np.arange(2 * (int((high - low) / step) // 2 + 1), dtype=np.float64)
 
 
 
 @compiled
-def _left_out(
-    margin: NDArray[np.float32], places: NDArray[np.bool_], level: float
+def _without(
+    margin: NDArray[np.float32], removed: NDArray[np.bool_], level: float
 ) -> NDArray[np.float32]:
-    """Give a support's margin without some places: `Support.without`."""
+    """Give a support's margin without some points."""
     flat, out = margin.ravel(), np.empty(margin.shape, np.float32)
-    some, given, middle = places.ravel(), out.ravel(), np.float32(level)
+    mask, given, middle = removed.ravel(), out.ravel(), np.float32(level)
     for i in range(np.uint64(len(flat))):
         value = flat[i]
         less = min(middle - abs(value - middle), np.float32(0))
-        given[i] = less if some[i] else value
+        given[i] = less if mask[i] else value
     return out

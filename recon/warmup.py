@@ -19,18 +19,19 @@ from denseface.recon.surface import mean_spacing
 
 __all__ = ["warm"]
 
-_WIDTH, _HEIGHT = 160, 120
-_FOCAL_PX = 150.0
-_BOX = (58, 38, 44, 44)
+_WIDTH, _HEIGHT, _FOCAL_PX = 160, 120, 150.0
+"""The camera, pixels."""
 _NEAREST_MM = 700.0
+"""Depth of the ball's front."""
+_BOX = (58, 38, 44, 44)
+"""x, y, width, height of the ball in the image, pixels."""
 _HOLE = np.s_[66:76, 82:92]
+"""Its hole, which is filled: rows, columns."""
 
 
 @cache
 def warm() -> None:
-    """Go once through every stage, with a ball for a face; does nothing when repeated.
-
-    The ball has a hole, which is filled.
+    """Run every stage once, with a ball for a face; when repeated, does nothing.
 
     From then on the process keeps memory that a frame frees for the next: `recon.numerics.malloc`.
     """
