@@ -1,9 +1,13 @@
 """How long tests may take, and how property tests choose their examples."""
 
+import inspect
+import os
+
 import pytest
 from hypothesis import settings
 
-from tests.waiting import PATIENCE
+from denseface.service.client import AsyncClient, Client, Operator
+from tests.waiting import PATIENCE, SERVICE
 
 # No time limit for one example: a machine that is busy for a moment proves nothing. The same
 # examples in every run, so that what passes once passes again; others are looked for with
@@ -11,6 +15,14 @@ from tests.waiting import PATIENCE
 settings.register_profile("same", deadline=None, derandomize=True)
 settings.register_profile("search", deadline=None)
 settings.load_profile("same")
+
+# The service, and the clients' requests that a test gives no time-out, may take longer, too.
+os.environ.update({name: value for name, value in SERVICE.items() if name not in os.environ})
+for _method in {method for client in (AsyncClient, Client, Operator)
+                for _, method in inspect.getmembers(client, inspect.isfunction)}:
+    _defaults = _method.__kwdefaults__ or {}
+    if isinstance(_defaults.get("timeout"), float):
+        _defaults["timeout"] *= PATIENCE
 
 
 @pytest.hookimpl(tryfirst=True)

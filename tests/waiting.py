@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
-__all__ = ["LIMIT_S", "PATIENCE", "until"]
+__all__ = ["LIMIT_MS", "LIMIT_S", "PATIENCE", "SERVICE", "until"]
 
 _T = TypeVar("_T")
 
@@ -17,16 +17,26 @@ def _patience() -> float:
         factor = float(text)
     except ValueError:
         factor = math.nan
-    if not 1 <= factor <= 100:
-        raise ValueError(f"DENSEFACE_TEST_PATIENCE={text!r}: expected a number from 1 to 100")
+    if not 1 <= factor <= 60:
+        raise ValueError(f"DENSEFACE_TEST_PATIENCE={text!r}: expected a number from 1 to 60")
     return factor
 
 
 PATIENCE = _patience()
 """How much slower than an idle machine this one may be: DENSEFACE_TEST_PATIENCE, or 1."""
 
-LIMIT_S = 40.0 * PATIENCE
+LIMIT_S = 60.0 * PATIENCE
 """Seconds to wait for what is to come about. Only a failure takes as long."""
+LIMIT_MS = round(LIMIT_S * 1000)
+"""The same in milliseconds."""
+
+
+SERVICE = {
+    "DENSEFACE_LIVENESS": f"{min(3 * PATIENCE, 100):.0f}",
+    "DENSEFACE_TAKE_TIMEOUT_S": f"{10 * PATIENCE:g}",
+    "DENSEFACE_JOB_TIMEOUT_S": f"{60 * PATIENCE:g}",
+} if PATIENCE > 1 else {}
+"""The service's own defaults, scaled: set for all tests but those of these very time-outs."""
 
 
 def until(true: Callable[[], _T], within_s: float = LIMIT_S) -> _T:

@@ -21,20 +21,22 @@ from denseface.service.runtime.failpoints import (
     FAILPOINTS_VARIABLE,
     TOKENS_VARIABLE,
 )
+from tests.waiting import LIMIT_S, PATIENCE
 
 __all__ = ["PACE", "Cluster", "Nursery", "Part", "until"]
 
 _REPOSITORY = Path(__file__).resolve().parents[2]
 _WATCH_S = 0.01
-_STOPPING_S = 15.0
 
 PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_RESEND_S": "0.3",
-        "DENSEFACE_TAKE_TIMEOUT_S": "3", "DENSEFACE_JOB_TIMEOUT_S": "10",
+        "DENSEFACE_LIVENESS": f"{min(3 * PATIENCE, 100):.0f}",
+        "DENSEFACE_TAKE_TIMEOUT_S": f"{3 * PATIENCE:g}",
+        "DENSEFACE_JOB_TIMEOUT_S": f"{10 * PATIENCE:g}",
         "DENSEFACE_ATTEMPTS": "10", "DENSEFACE_RETENTION": "off"}
 """Settings of the service that let a fault show in tenths of seconds."""
 
 
-def until(true: Callable[[], bool], what: str, within_s: float = 60.0) -> None:
+def until(true: Callable[[], bool], what: str, within_s: float = LIMIT_S) -> None:
     """Look again and again until something is so."""
     deadline = time.monotonic() + within_s
     while not true():
@@ -132,7 +134,7 @@ class Part:
         self.wanted = False
         self.send(signal.SIGCONT)
         self.send(number)
-        until(lambda: not self.running(), f"end of {self.name}", _STOPPING_S)
+        until(lambda: not self.running(), f"end of {self.name}")
 
 
 class Cluster:
@@ -204,7 +206,7 @@ class Cluster:
         with Client(self.address) as client:
             def there() -> bool:
                 try:
-                    status = client.status(timeout=2)
+                    status = client.status(timeout=2 * PATIENCE)
                 except ServiceError:
                     return False
                 return bool(status.sensors) and len(status.workers) >= len(self.workers)

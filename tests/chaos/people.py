@@ -14,10 +14,11 @@ from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import decode_from_hub
 from denseface.service.transport.addresses import publications_of
 from tests.chaos.history import Answer, Seen
+from tests.waiting import LIMIT_S, PATIENCE
 
 __all__ = ["Follower", "Listener", "Presser"]
 
-_ASK_S = 3.0
+_ASK_S = 3.0 * PATIENCE
 """Longest wait of one try, seconds."""
 _PAUSE_S = 0.05
 _LOOK_S = 0.005
@@ -40,7 +41,7 @@ class _Person:
     def leave(self) -> None:
         """End, and raise what went wrong."""
         self._leave.set()
-        self._thread.join(60)
+        self._thread.join(LIMIT_S)
         if self._thread.is_alive():
             raise TimeoutError(f"{type(self).__name__} does not come to an end")
         if self.error:

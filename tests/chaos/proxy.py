@@ -9,6 +9,8 @@ from typing import Self
 
 import zmq
 
+from tests.waiting import LIMIT_S
+
 __all__ = ["Proxy"]
 
 _LONGEST_S = 0.15
@@ -49,7 +51,7 @@ class Proxy:
         traceback: TracebackType | None,
     ) -> None:
         self._leave.set()
-        self._thread.join(10)
+        self._thread.join(LIMIT_S)
 
     def _run(self) -> None:
         context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()

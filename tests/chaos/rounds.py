@@ -18,11 +18,12 @@ from tests.chaos.proxy import Proxy
 from tests.chaos.scene import Scene
 from tests.chaos.source import CHEAP
 from tests.chaos.storm import Storm, random_actions
+from tests.waiting import PATIENCE
 
 __all__ = ["Outcome", "play"]
 
 _PRESSERS, _AHEAD = 4, 2
-_PRESSES_S, _SETTLE_S = 1800.0, 180.0
+_PRESSES_S, _SETTLE_S = 1800.0 * PATIENCE, 180.0 * PATIENCE
 """Longest time for all presses in the storm, and for the rest after it; seconds."""
 
 

@@ -10,6 +10,7 @@ from tests.chaos.cluster import Cluster, Nursery, until
 from tests.chaos.history import Answer, History
 from tests.chaos.kept import read_kept
 from tests.chaos.people import Follower, Listener, Presser
+from tests.waiting import LIMIT_S
 
 __all__ = ["Scene"]
 
@@ -62,7 +63,7 @@ class Scene:
             self.follower.saw(capture_id) for presser in self.pressers
             for capture_id, answer in presser.answers.items() if answer is Answer.ACCEPTED)
 
-    def settle(self, within_s: float = 60.0) -> None:
+    def settle(self, within_s: float = LIMIT_S) -> None:
         """Wait until all that was accepted was seen to end."""
         until(self.all_seen, "an end of all that was accepted", within_s)
 

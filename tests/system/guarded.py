@@ -24,10 +24,9 @@ from denseface.service.transport.addresses import publications_of
 from tests.ports import free_port
 from tests.system.running import REPOSITORY
 from tests.unit.service.faces import small_face, small_frame
-from tests.waiting import until
+from tests.waiting import LIMIT_MS, LIMIT_S, PATIENCE, until
 
-WAIT_MS = 10_000
-_PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_LIVENESS": "100"}
+_PACE = {"DENSEFACE_HEARTBEAT_S": f"{0.2 * PATIENCE:g}", "DENSEFACE_LIVENESS": "100"}
 """The peers here send no heartbeats: none is to count as gone before its test is through."""
 
 
@@ -57,7 +56,7 @@ class Peer:
 
     def receive(self, kind: str) -> Packet:
         """Wait for a message of a kind."""
-        while self.socket.poll(WAIT_MS):
+        while self.socket.poll(LIMIT_MS):
             packet = decode_from_hub(self.socket.recv_multipart())
             if packet.message.kind == kind:
                 return packet
@@ -65,7 +64,7 @@ class Peer:
 
     def request(self, message: messages.BaseRequest) -> messages.BaseMessage:
         self.send(message)
-        while self.socket.poll(WAIT_MS):
+        while self.socket.poll(LIMIT_MS):
             answer = decode_from_hub(self.socket.recv_multipart()).message
             if getattr(answer, "request", None) == message.request:
                 return answer
@@ -126,7 +125,7 @@ class GuardedHub:
 
     def status(self) -> messages.Status:
         with Client(self.local) as client:
-            return client.status(timeout=20)
+            return client.status(timeout=LIMIT_S)
 
     def refused(self, reason: str) -> int:
         return self.status().refused.get(reason, 0)
@@ -166,7 +165,7 @@ def guarded_hub(folder: Path, host: str = "127.0.0.1", port: int | None = None,
             with contextlib.suppress(ProcessLookupError):
                 process.terminate()
             try:
-                process.wait(10)
+                process.wait(LIMIT_S)
             finally:
                 process.kill()
 
@@ -182,7 +181,7 @@ def press_through(hub: GuardedHub, capture_id: str) -> None:
     try:
         subscriber.socket.subscribe("faces")
         subscriber.socket.subscribe("status")
-        assert subscriber.socket.poll(WAIT_MS)  # the first status
+        assert subscriber.socket.poll(LIMIT_MS)  # the first status
         sensor.send(messages.SensorReady(name="s", source="x"))
         worker.send(messages.WorkerReady(name="w", credit=0))
         until(lambda: hub.status().ready)
@@ -214,7 +213,7 @@ def leave(hub: GuardedHub, *peers: Peer) -> None:
     until(lambda: not hub.status().sensors + hub.status().workers)
 
 
-def happened(peer: Peer, *events: zmq.Event, within_ms: int = 15_000) -> bool:
+def happened(peer: Peer, *events: zmq.Event, within_ms: int = LIMIT_MS) -> bool:
     """Wait for one of some things to happen to a peer's connection."""
     while peer.monitor.poll(within_ms):
         if parse_monitor_message(peer.monitor.recv_multipart())["event"] in events:

@@ -13,11 +13,11 @@ import psutil
 
 from denseface.service.client import Client
 from denseface.service.protocol.messages import Status
-from tests.waiting import until
+from tests.waiting import LIMIT_S, PATIENCE, until
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 RECORDINGS = REPOSITORY / "fixtures" / "recorded_oni"
-PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_LIVENESS": "15"}
+PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_LIVENESS": f"{min(15 * PATIENCE, 100):.0f}"}
 """Short heartbeats, so that a test soon sees a change; a process counts as gone after the default
 3 s, since a busy machine stops one for longer than three of these heartbeats."""
 
@@ -26,7 +26,7 @@ def denseface(*arguments: object, **environment: str) -> "subprocess.CompletedPr
     """Run one command to its end."""
     return subprocess.run(
         [sys.executable, "-m", "denseface", *map(str, arguments)], cwd=REPOSITORY, check=False,
-        capture_output=True, text=True, timeout=60, env=os.environ | environment)
+        capture_output=True, text=True, timeout=1.5 * LIMIT_S, env=os.environ | environment)
 
 
 @dataclass
@@ -77,18 +77,18 @@ def service(
                 [sys.executable, "-m", "denseface", "up", "--source", str(source), "--data",
                  str(data), "--address", address, "--workers", "1", *map(str, arguments)],
                 cwd=REPOSITORY, stderr=stderr, text=True,
-                env=os.environ | (environment or {}) | PACE)
+                env=os.environ | PACE | (environment or {}))
         running = Service(process, address, data, log)
         try:
             if ready:
-                waited = running.run("status", "--wait", "40")
+                waited = running.run("status", "--wait", LIMIT_S)
                 assert waited.returncode == 0, waited.stderr + log.read_text()
             yield running
         finally:
             if process.poll() is None:
                 family = running.family()
                 process.terminate()
-                psutil.wait_procs(family, timeout=15)
+                psutil.wait_procs(family, timeout=LIMIT_S)
                 for one in family:
                     if one.is_running():
                         one.kill()
@@ -113,4 +113,4 @@ def hub_alone(address: str, data: Path, *arguments: str) -> Iterator[Path]:
         yield log
     finally:
         process.terminate()
-        assert process.wait(10) == 0
+        assert process.wait(LIMIT_S) == 0

@@ -33,7 +33,7 @@ from tests.system.guarded import (
     press_through,
 )
 from tests.system.running import REPOSITORY, denseface
-from tests.waiting import until
+from tests.waiting import LIMIT_MS, LIMIT_S, until
 
 # --- no way in without a hub key, an allowed key and an authenticator
 
@@ -81,7 +81,7 @@ def test_when_the_authenticator_ends_nobody_connects_and_the_hub_ends(tmp_path, 
         flag.touch()
         late = connect(*as_role(hub, "presser"))
         late.send(PRESS)
-        assert hub.process.wait(20) == 1
+        assert hub.process.wait(LIMIT_S) == 1
         assert "authenticator has stopped" in hub.log.read_text().splitlines()[-1]
         assert "pressed" not in hub.log.read_text()
         assert late.silent()
@@ -117,7 +117,7 @@ def test_an_unknown_key_is_refused(hub, connect, refused, tmp_path):
 def test_a_key_revoked_before_is_unknown(hub, refused):
     hub.new_key("former", Role.PRESSER)
     with hub.client("former") as client:
-        assert client.status(timeout=20)
+        assert client.status(timeout=LIMIT_S)
     revoke(hub.keys, "former")
     with hub.client("former") as client, pytest.raises(KeyRefusedError, match="revoked"):
         client.press()
@@ -165,7 +165,7 @@ def test_garbage_is_hung_up_on(hub, refused):
             b"\xff" + bytes(8) + b"\x7f\3\0NULL" + bytes(16) + b"\0" * 32 + b"\4\x19\5READY"]
     for offset in (0, 1):
         for text in said:
-            with socket.create_connection((host, port + offset), timeout=20) as raw:
+            with socket.create_connection((host, port + offset), timeout=LIMIT_S) as raw:
                 with suppress(OSError):  # it may be hung up on meanwhile
                     raw.sendall(text)
                     raw.shutdown(socket.SHUT_WR)
@@ -176,11 +176,11 @@ def test_garbage_is_hung_up_on(hub, refused):
 def test_a_slow_drip_is_hung_up_on(hub, refused):
     """Of many connections that dribble, all are ended in 10 s, and others connect meanwhile."""
     port = int(hub.address.rpartition(":")[2])
-    drips = [socket.create_connection(("127.0.0.1", port), timeout=30) for _ in range(20)]
+    drips = [socket.create_connection(("127.0.0.1", port), timeout=LIMIT_S) for _ in range(20)]
     for drip in drips:
         drip.sendall(b"\xff")
     with hub.client("presser") as client:
-        assert client.status(timeout=20)
+        assert client.status(timeout=LIMIT_S)
     for drip in drips:
         with drip:
             _read_to_the_end(drip)
@@ -203,7 +203,7 @@ def test_more_connections_than_the_hub_may_have_are_cut(tmp_path):
                 with suppress(OSError):  # while the port is closed
                     drip = flood.enter_context(socket.create_connection(("127.0.0.1", port), 5))
                     drip.sendall(b"\xff")
-            assert beats.poll(20_000)
+            assert beats.poll(LIMIT_MS)
             while beats.poll(0):
                 beats.recv_multipart()
         until(lambda: hub.refused("connections") >= 1)

@@ -12,7 +12,7 @@ import pytest
 from denseface.service.export import load_face
 from tests.ports import free_port
 from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone
-from tests.waiting import until
+from tests.waiting import LIMIT_S, until
 
 FRONTAL = RECORDINGS / "frontal_700.oni"
 SHARED = Path(os.environ.get("DENSEFACE_SHARED", REPOSITORY.parent / "shared"))
@@ -65,7 +65,7 @@ def test_ctrl_c_ends_a_waiting_command_quietly(command, tmp_path):
         stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     until(lambda: _threads(waiting.pid) > 2)  # ZeroMQ's own: it is waiting, or nearly
     waiting.send_signal(signal.SIGINT)
-    out, err = waiting.communicate(timeout=20)
+    out, err = waiting.communicate(timeout=LIMIT_S)
     assert (out, err) == (b"", b"")
     # Where the signal came inside an exec(), CPython ends by the signal itself: 130 to a shell too.
     assert waiting.returncode in {130, -signal.SIGINT}

@@ -19,6 +19,7 @@ from tests.chaos.proxy import Proxy
 from tests.chaos.scene import Scene
 from tests.chaos.source import CHEAP, write_small_frame
 from tests.system.running import REPOSITORY
+from tests.waiting import PATIENCE
 
 PATIENT = {"DENSEFACE_LIVENESS": "15"}
 """For scenes in which a press is refused only for the reason at hand: a sensor that a busy machine
@@ -207,7 +208,8 @@ def test_a_worker_told_to_stop_hands_back_what_it_cannot_finish(scene):
 def test_a_storm_prints_its_table(tmp_path):
     ended = subprocess.run(
         [sys.executable, "-m", "tests.chaos", "--presses", "40", "--seed", "3", "--keep",
-         str(tmp_path)], cwd=REPOSITORY, capture_output=True, text=True, timeout=280, check=False)
+         str(tmp_path)], cwd=REPOSITORY, capture_output=True, text=True, check=False,
+        timeout=280 * PATIENCE)
     assert ended.returncode == 0, ended.stderr
     assert "| presses accepted | 40 |" in ended.stdout
     assert "| **promises broken** | **0** |" in ended.stdout

@@ -12,6 +12,7 @@ from denseface.service.protocol.roles import Role
 from denseface.service.security import revoke
 from tests.system.guarded import guarded_hub, press_through
 from tests.unit.service.faces import small_face
+from tests.waiting import LIMIT_S
 
 
 @pytest.fixture(scope="module")
@@ -31,14 +32,15 @@ def _run(main):
 def test_a_subscriber_follows_what_is_published(hub):
     async def main():
         async with _client(hub, "subscriber") as client:
-            after = (await client.status(timeout=20)).sequence
-            async with aclosing(client.published(after=after, timeout=30)) as published:
+            after = (await client.status(timeout=LIMIT_S)).sequence
+            async with aclosing(client.published(after=after, timeout=LIMIT_S)) as published:
                 pressing = asyncio.create_task(asyncio.to_thread(press_through, hub, "awaited"))
                 outcome = await anext(published)
                 await pressing
             assert outcome.capture_id == "awaited"
             np.testing.assert_array_equal(outcome.face.dense.points, small_face().dense.points)
-            assert len((await client.get("awaited", timeout=20)).dense) == len(outcome.face.dense)
+            face = await client.get("awaited", timeout=LIMIT_S)
+            assert len(face.dense) == len(outcome.face.dense)
 
     _run(main())
 
@@ -47,7 +49,7 @@ def test_the_wrong_role_is_told_so(hub):
     async def main():
         async with _client(hub, "subscriber") as client:
             with pytest.raises(RequestFailedError, match="press needs the role presser"):
-                await client.press("never", timeout=20)
+                await client.press("never", timeout=LIMIT_S)
         async with _client(hub, "presser") as client, aclosing(client.previews()) as previews:
             with pytest.raises(KeyRefusedError, match="not allowed there for this"):
                 await anext(previews)
@@ -61,7 +63,7 @@ def test_a_key_that_is_not_allowed_is_told_so(hub):
     async def main():
         async with _client(hub, "aio-stranger") as client:
             with pytest.raises(KeyRefusedError, match="not allowed"):
-                await client.status(timeout=20)
+                await client.status(timeout=LIMIT_S)
 
     _run(main())
 
@@ -71,9 +73,9 @@ def test_a_key_revoked_while_it_follows_ends_the_iteration(hub):
 
     async def main():
         async with _client(hub, "aio-former") as client, aclosing(
-                client.published(timeout=60)) as published:
+                client.published(timeout=LIMIT_S)) as published:
             following = asyncio.create_task(anext(published))
-            assert (await client.status(timeout=20)).epoch
+            assert (await client.status(timeout=LIMIT_S)).epoch
             revoke(hub.keys, "aio-former")
             with pytest.raises(KeyRefusedError, match="revoked"):
                 await following

@@ -31,7 +31,7 @@ from denseface.service.storage import FolderStore
 from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, service
 from tests.unit.service.faces import small_face, small_frame
 from tests.unit.service.storing import accept, finish
-from tests.waiting import until
+from tests.waiting import LIMIT_S, until
 
 FRAME, FRAME_ARRAYS = FrameHeader.of(small_frame())
 FACE, FACE_ARRAYS = FaceHeader.of(small_face())
@@ -84,8 +84,8 @@ def test_an_operator_s_day(tmp_path):
 
         before = datetime.now(UTC)
         client.get(client.press("second"))
-        assert [next(client.published(last=2, timeout=10)).capture_id,
-                next(client.published(since=before, timeout=10)).capture_id] == [
+        assert [next(client.published(last=2, timeout=LIMIT_S)).capture_id,
+                next(client.published(since=before, timeout=LIMIT_S)).capture_id] == [
                     "mishap", "second"]
         listed = up.run("subscribe", "--since", before.isoformat(), "--count", "1")
         assert listed.stdout.startswith("3 second ")
@@ -94,7 +94,7 @@ def test_an_operator_s_day(tmp_path):
         assert (purged.returncode, purged.stdout) == (0, "1 capture removed\n")
         with pytest.raises(UnknownCaptureError):
             client.get("mishap")
-        assert next(client.published(after=0, timeout=10)).capture_id == "second"
+        assert next(client.published(after=0, timeout=LIMIT_S)).capture_id == "second"
         assert up.run("purge", "--all", "--yes").stdout == "1 capture removed\n"
         assert files(up.data) == []
         assert client.status().sequence == 3
@@ -114,8 +114,8 @@ def test_a_damaged_folder_is_mended_at_the_start(tmp_path, address):
     (face,) = (data / "faces").glob("b.*")
     face.write_bytes(face.read_bytes()[:-100])
     with hub_alone(address, data) as log, Client(address) as client:
-        assert client.get("a", timeout=20).report.dense_points == len(small_face().dense)
-        assert next(client.published(after=0, timeout=10)).capture_id == "a"
+        assert client.get("a", timeout=LIMIT_S).report.dense_points == len(small_face().dense)
+        assert next(client.published(after=0, timeout=LIMIT_S)).capture_id == "a"
         status = client.status()
         assert (status.queued, status.done) == (1, 1)
     assert "the database is made again" in log.read_text()
@@ -175,7 +175,7 @@ def test_a_full_disk_refuses_presses_and_no_more(tmp_path, address):
     seen = Path(f"/proc/{hub.pid}/root") / data.relative_to("/")
     try:
         with sensor(address) as accepted, Operator(address) as client:
-            until(lambda: client.status(timeout=20).sensors != ())
+            until(lambda: client.status(timeout=LIMIT_S).sensors != ())
             client.press("before")
             with pytest.raises(OSError, match="No space left"):
                 write_for_ever(seen / "other")
@@ -189,7 +189,7 @@ def test_a_full_disk_refuses_presses_and_no_more(tmp_path, address):
             until(lambda: accepted == ["before", "after"])
     finally:
         hub.terminate()
-        assert hub.wait(10) == 0
+        assert hub.wait(LIMIT_S) == 0
 
 
 def test_purging_asks_first(address):

@@ -13,6 +13,7 @@ import pytest
 from tests.system.running import RECORDINGS, REPOSITORY, denseface
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.process import environment
+from tests.waiting import LIMIT_S
 
 FRONTAL = RECORDINGS / "frontal_700.oni"
 EMPTY = RECORDINGS / "empty_room.oni"
@@ -65,7 +66,7 @@ def test_a_signal_ends_it_with_the_summary(number, status):
     while b"points in" not in shown:  # the status line: it is under way
         shown += os.read(ours, 4096)
     running.send_signal(number)
-    out, _ = running.communicate(timeout=30)
+    out, _ = running.communicate(timeout=LIMIT_S)
     os.close(ours)
     assert running.returncode == status
     assert json.loads(out)["frames"] >= 1

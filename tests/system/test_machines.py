@@ -19,7 +19,7 @@ from denseface.service.protocol.roles import Role
 from denseface.service.security import allow, new_pair, read_public
 from tests.ports import free_port
 from tests.system.running import PACE, RECORDINGS, REPOSITORY
-from tests.waiting import until
+from tests.waiting import LIMIT_S, until
 
 # Of this run alone: another on the same machine has addresses of its own.
 _HERE, _THERE = (f"10.231.{os.getpid() % 256}.{os.getpid() // 256 % 63 * 4 + end}"
@@ -82,10 +82,10 @@ def test_a_face_is_made_on_another_machine(machines, tmp_path):
         start("capture", "--address", local, "--source", RECORDINGS / "frontal_700.oni")
         start("worker", *to_hub, before=there)
         with Client(local) as client:
-            until(lambda: client.status(timeout=20).ready, within_s=60)
+            until(lambda: client.status(timeout=LIMIT_S).ready)
         pressed = subprocess.run(
             [*there, sys.executable, "-m", "denseface", "press", *to_hub, "--save",
              str(tmp_path / "face.npz")], cwd=REPOSITORY, env=environment, check=False,
-            capture_output=True, text=True, timeout=60)
+            capture_output=True, text=True, timeout=LIMIT_S)
         assert (pressed.returncode, pressed.stderr) == (0, ""), hub_log.read_text()
     assert len(load_face(tmp_path / "face.npz").dense) > 10_000

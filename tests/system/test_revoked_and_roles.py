@@ -25,7 +25,7 @@ from tests.system.guarded import (
     happened,
     leave,
 )
-from tests.waiting import until
+from tests.waiting import LIMIT_MS, LIMIT_S, until
 
 # --- revoked while connected
 
@@ -81,7 +81,7 @@ def test_a_revoked_key_that_floods_is_cut_off(hub, connect, refused):
 def test_a_revoked_presser_presses_no_more(hub, refused):
     hub.new_key("leaver", Role.PRESSER)
     with hub.client("leaver") as client:
-        assert client.status(timeout=20)
+        assert client.status(timeout=LIMIT_S)
         revoke(hub.keys, "leaver")
         until(lambda: hub.log.read_text() and _unanswered(client))
         with pytest.raises(ClientTimeoutError, match="revoked"):
@@ -102,7 +102,7 @@ def test_a_revoked_subscriber_receives_no_more_and_the_others_do(hub, connect, r
     spy, other = (connect(*as_role(hub, name, zmq.SUB)) for name in ("spy", "subscriber"))
     for one in (spy, other):
         one.socket.subscribe("status")
-        assert one.socket.poll(10_000)
+        assert one.socket.poll(LIMIT_MS)
     revoke(hub.keys, "spy")
     assert happened(spy, zmq.Event.DISCONNECTED)
     assert happened(spy, zmq.Event.HANDSHAKE_FAILED_AUTH)
@@ -112,7 +112,7 @@ def test_a_revoked_subscriber_receives_no_more_and_the_others_do(hub, connect, r
     while other.socket.poll(0):
         other.socket.recv_multipart()
     for _ in range(3):
-        assert other.socket.poll(10_000)
+        assert other.socket.poll(LIMIT_MS)
         other.socket.recv_multipart()
     assert spy.silent(0)
 
@@ -120,11 +120,11 @@ def test_a_revoked_subscriber_receives_no_more_and_the_others_do(hub, connect, r
 def test_a_client_that_follows_is_told(hub):
     hub.new_key("reader", Role.SUBSCRIBER)
     with hub.client("reader") as client:
-        after = client.status(timeout=20).sequence
+        after = client.status(timeout=LIMIT_S).sequence
         revoked = threading.Timer(0.5, revoke, (hub.keys, "reader"))
         revoked.start()
         with pytest.raises(KeyRefusedError, match="revoked"):
-            next(client.published(after=after, timeout=30))
+            next(client.published(after=after, timeout=LIMIT_S))
         revoked.join()
 
 

@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from tests.system.running import REPOSITORY
+from tests.waiting import LIMIT_S, PATIENCE
 
 _NEEDING_A_HEAD = ("tests/unit/simulator/test_heads.py", "tests/unit/recon/test_pipeline.py")
 _UNWANTED = {
@@ -24,7 +25,7 @@ def test_heads_and_faces_need_no_shared_folder(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *_NEEDING_A_HEAD],
         cwd=REPOSITORY, env=kept | {"DENSEFACE_SHARED": str(tmp_path)}, check=False,
-        capture_output=True, text=True, timeout=390)
+        capture_output=True, text=True, timeout=390 * PATIENCE)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
     assert re.search(r"\d+ passed", done.stdout)
     assert "skipped" not in done.stdout
@@ -35,7 +36,7 @@ def committed():
     """Every committed file that is still there."""
     try:
         done = subprocess.run(["git", "ls-files", "-z"], cwd=REPOSITORY, check=False,
-                              capture_output=True, timeout=30)
+                              capture_output=True, timeout=LIMIT_S)
     except FileNotFoundError:
         pytest.skip("git is not installed")
     if done.returncode:

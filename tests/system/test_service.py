@@ -23,7 +23,7 @@ from tests.ports import free_port
 from tests.system.running import RECORDINGS, denseface, hub_alone, service, sockets
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.process import environment, play
-from tests.waiting import until
+from tests.waiting import LIMIT_S, until
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_subscribers_get_every_face_in_order(running, tmp_path):
         with running.client() as client:
             after = client.status().sequence
             started.set()
-            for outcome in client.published(after=after, timeout=30):
+            for outcome in client.published(after=after, timeout=LIMIT_S):
                 found.append(outcome)
                 if len(found) == 3:
                     return
@@ -72,16 +72,16 @@ def test_subscribers_get_every_face_in_order(running, tmp_path):
     started = threading.Event()
     thread = threading.Thread(target=follow)
     thread.start()
-    assert started.wait(20)
+    assert started.wait(LIMIT_S)
     with running.client() as client:
         refused = client.status().refused
         pressed = [client.press() for _ in range(3)]
-        thread.join(60)
+        thread.join(LIMIT_S)
         assert [outcome.capture_id for outcome in found] == pressed
         assert all(isinstance(outcome, PublishedFace) for outcome in found)
         assert [b.sequence - a.sequence for a, b in itertools.pairwise(found)] == [1, 1]
         assert client.status().refused == refused  # nothing in an ordinary day looks like an attack
-        missed = client.published(after=found[0].sequence, timeout=10)
+        missed = client.published(after=found[0].sequence, timeout=LIMIT_S)
         assert [next(missed).capture_id, next(missed).capture_id] == pressed[1:]
     saved = running.run("subscribe", "--save", tmp_path, "--count", "1", "--after",
                         found[0].sequence - 1)
@@ -98,7 +98,7 @@ def test_a_killed_worker_s_job_is_done_by_the_next(running):
         client.press("survivor")
         until(lambda: client.status().working == 1)
         worker.kill()
-        assert client.get("survivor", timeout=60).report.capture_id == "survivor"
+        assert client.get("survivor", timeout=LIMIT_S).report.capture_id == "survivor"
 
 
 def test_a_hung_worker_s_job_is_done_by_another(running):
@@ -110,7 +110,7 @@ def test_a_hung_worker_s_job_is_done_by_another(running):
             client.get("hung", timeout=3)
         until(lambda: not client.status().workers)
         worker.resume()
-        assert client.get("hung", timeout=60).report.capture_id == "hung"
+        assert client.get("hung", timeout=LIMIT_S).report.capture_id == "hung"
 
 
 def test_what_was_accepted_survives_a_killed_hub(running):
@@ -120,12 +120,12 @@ def test_what_was_accepted_survives_a_killed_hub(running):
         client.press("kept")
         epoch = client.status().epoch
         hub.kill()
-        hub.wait(10)
+        hub.wait(LIMIT_S)
         client.press("at-once")  # a hub that is starting refuses nobody
         for one in running.family():
             if "worker" in one.cmdline():
                 one.resume()
-        assert client.get("kept", timeout=60).report.capture_id == "kept"
+        assert client.get("kept", timeout=LIMIT_S).report.capture_id == "kept"
         assert client.status().epoch == epoch
 
 
@@ -157,7 +157,7 @@ def test_nothing_stays_after_a_stop(tmp_path, stop):
         assert [one.name() for one in family] == ["denseface"] * 4
         assert len(sockets(up)) == 2
         up.process.send_signal(stop)
-        assert up.process.wait(15) == {signal.SIGTERM: 0, signal.SIGINT: 130}[stop]
+        assert up.process.wait(LIMIT_S) == {signal.SIGTERM: 0, signal.SIGINT: 130}[stop]
         assert not [one for one in family if one.is_running()]
         assert sockets(up) == []
         assert "killed" not in up.log.read_text()
@@ -167,7 +167,7 @@ def test_the_children_of_a_killed_supervisor_end_by_themselves(tmp_path):
     with service(RECORDINGS / "empty_room.oni", tmp_path / "data") as up:
         children = up.family()[1:]
         up.process.kill()
-        gone, alive = psutil.wait_procs(children, timeout=15)
+        gone, alive = psutil.wait_procs(children, timeout=LIMIT_S)
         assert (len(gone), alive) == (3, [])
         assert sockets(up) == []
 
@@ -181,7 +181,7 @@ def test_a_frame_without_a_face_fails_the_capture(tmp_path):
         assert "NoFaceError" in line
         assert not (tmp_path / "face.ply").exists()
         with up.client() as client:
-            outcome = next(client.published(after=0, timeout=10))
+            outcome = next(client.published(after=0, timeout=LIMIT_S))
             assert isinstance(outcome, PublishedFailure)
             assert (outcome.capture_id, outcome.error.error) == ("room", "NoFaceError")
             with pytest.raises(CaptureFailedError):
@@ -191,7 +191,7 @@ def test_a_frame_without_a_face_fails_the_capture(tmp_path):
 
 def test_up_with_an_unreadable_source_ends_with_one_line(tmp_path):
     with service(tmp_path / "missing.oni", tmp_path / "data", ready=False) as up:
-        assert up.process.wait(30) == 2
+        assert up.process.wait(LIMIT_S) == 2
         lines = [line for line in up.log.read_text().splitlines() if "missing.oni" in line]
         assert len(lines) == 1
         assert sockets(up) == []
@@ -228,7 +228,7 @@ def test_a_press_without_a_sensor_is_refused(tmp_path):
     address = f"tcp://127.0.0.1:{free_port()}"
     with hub_alone(address, tmp_path / "data"), Client(address) as client:
         with pytest.raises(PressRefusedError, match="no sensor"):
-            client.press(timeout=20)
+            client.press(timeout=LIMIT_S)
         assert not client.status().ready
 
 
@@ -261,7 +261,7 @@ def test_an_unplugged_sensor_refuses_the_press_and_comes_back(clip, tmp_path):
 
 def _pressed(client, refused):
     try:
-        client.press(timeout=20)
+        client.press(timeout=LIMIT_S)
     except PressRefusedError as error:
         refused.append(str(error))
         return False

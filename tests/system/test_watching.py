@@ -15,7 +15,7 @@ from denseface import AsyncClient
 from tests.system.running import RECORDINGS, REPOSITORY, service
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.process import environment, play
-from tests.waiting import until
+from tests.waiting import LIMIT_S, until
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def page(running, name):
     (url,) = [one["url"] for one in events(running) if one["event"] == "metrics"]
     assert url.startswith("http://127.0.0.1:")
     try:
-        with urllib.request.urlopen(url.replace("/metrics", name), timeout=10) as answer:  # noqa: S310
+        with urllib.request.urlopen(url.replace("/metrics", name), timeout=LIMIT_S) as answer:  # noqa: S310
             return answer.status, answer.read().decode()
     except urllib.error.HTTPError as error:
         return error.code, error.read().decode()
@@ -95,7 +95,7 @@ def test_previews_go_on_while_pressing_and_end_with_the_subscriber(running):
             found = []
 
             async def look():
-                async for preview in client.previews(timeout=20):
+                async for preview in client.previews(timeout=LIMIT_S):
                     found.append(preview)  # noqa: PERF401
 
             looks = asyncio.ensure_future(look())
@@ -120,7 +120,7 @@ def test_previews_go_on_while_pressing_and_end_with_the_subscriber(running):
 
 def test_the_preview_of_a_recording_goes_on_when_its_frame_was_taken(running):
     with running.client() as client:
-        previews = client.previews(timeout=20)
+        previews = client.previews(timeout=LIMIT_S)
         shown = next(previews)
         face = client.get(client.press())
         until(lambda: next(previews).timestamp_us != shown.timestamp_us)
@@ -133,7 +133,7 @@ def test_the_example_presses_and_gets_its_face(running, tmp_path):
     assert len(example.read_text().splitlines()) <= 15
     done = subprocess.run(
         [sys.executable, str(example)], cwd=tmp_path, check=False, capture_output=True, text=True,
-        timeout=90, env={"DENSEFACE_ADDRESS": running.address, "PYTHONPATH": str(REPOSITORY)})
+        timeout=LIMIT_S, env={"DENSEFACE_ADDRESS": running.address, "PYTHONPATH": str(REPOSITORY)})
     assert (done.returncode, done.stderr) == (0, "")
     (written,) = tmp_path.glob("*.ply")
     points = re.search(rf"^{written.stem}: (\d+) points", done.stdout, re.MULTILINE).group(1)
@@ -143,7 +143,7 @@ def test_the_example_presses_and_gets_its_face(running, tmp_path):
 def test_every_line_of_every_process_is_json(running):
     worker = running.worker()
     worker.kill()
-    worker.wait(10)
+    worker.wait(LIMIT_S)
     until(lambda: running.status().ready)
     found = events(running)
     assert {one["process"] for one in found} >= {"up", "hub", "capture", "worker"}
@@ -156,7 +156,7 @@ def test_a_live_sensor_shows_itself_between_presses(tmp_path):
     write_clip(tmp_path / "clip", [(frame.depth, frame.color) for frame in frames])
     with service("openni2:", tmp_path / "data", environment=environment(tmp_path / "clip")) as up, \
             up.client() as client:
-        previews = client.previews(timeout=20)
+        previews = client.previews(timeout=LIMIT_S)
         first = next(previews)
         face = client.get(client.press())
         assert len(face.initial) > 10_000

@@ -23,6 +23,7 @@ from typing import Any
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.npz import load_frame
 from tests.virtual_sensor.build import build
+from tests.waiting import LIMIT_S
 
 __all__ = ["environment", "play", "record_clip", "run_python"]
 
@@ -65,7 +66,7 @@ def run_python(
     *arguments: object,
     env: dict[str, str],
     cwd: Path | None = None,
-    timeout_s: float = 60,
+    timeout_s: float = LIMIT_S,
 ) -> subprocess.CompletedProcess[str]:
     """Run Python code in a process of its own and give what it said."""
     return subprocess.run(

@@ -14,6 +14,7 @@ from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, decode_to_hub, encode
 from denseface.service.transport.addresses import publications_of
 from tests.unit.service.faces import small_face
+from tests.waiting import LIMIT_S
 
 
 class FakeHub:
@@ -45,7 +46,7 @@ class FakeHub:
 
     def wait(self, true: Callable[[], bool]) -> None:
         with self._changed:
-            assert self._changed.wait_for(true, 20), (self.received, self.subscriptions)
+            assert self._changed.wait_for(true, LIMIT_S), (self.received, self.subscriptions)
 
     def subscribers(self, topic: Topic) -> int:
         name = topic.encode()

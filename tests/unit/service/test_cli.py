@@ -11,6 +11,7 @@ import pytest
 from denseface.capture.npz import save_frame
 from denseface.service.cli import main
 from tests.unit.frames import calibration, frame
+from tests.waiting import LIMIT_S
 
 
 @pytest.fixture
@@ -149,7 +150,7 @@ def test_a_sigterm_while_the_interpreter_ends_leaves_no_traceback():
             "atexit.register(os.kill, os.getpid(), signal.SIGTERM)\n"
             "sys.exit(main(['status', '--address', 'ipc:///tmp/none', '--wait', '0.01']))\n")
     ended = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False,
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=LIMIT_S, check=False,
         env=os.environ | {"PYTHONPATH": ":".join(sys.path)})
     assert ended.returncode == -signal.SIGTERM
     assert "Traceback" not in ended.stderr

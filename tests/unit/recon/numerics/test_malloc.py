@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from denseface.recon.numerics.malloc import keep_freed_memory
+from tests.waiting import LIMIT_S
 
 _PROGRAM = """
 import resource, sys
@@ -29,7 +30,7 @@ print(min(faults() for _ in range(3)))
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc's heap is known")
 def test_freed_memory_is_not_fetched_again():
     """8 MB are 1,900 pages: fetched once, where kept; a process of its own, as it is for good."""
-    kept = subprocess.run([sys.executable, "-c", _PROGRAM, "keep"], check=True, timeout=60,
+    kept = subprocess.run([sys.executable, "-c", _PROGRAM, "keep"], check=True, timeout=LIMIT_S,
                           capture_output=True, text=True).stdout
     assert int(kept) < 100
 

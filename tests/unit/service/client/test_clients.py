@@ -19,7 +19,7 @@ from denseface.service.errors import (
 )
 from denseface.service.protocol.topics import Topic
 from tests.unit.service.fake_hub import fake_hub
-from tests.waiting import until
+from tests.waiting import LIMIT_S, until
 
 
 @pytest.fixture
@@ -99,7 +99,7 @@ def test_what_is_missed_is_fetched(hub):
     async def main():
         hub.conclude("a1")
         async with AsyncClient(hub.address) as client:
-            published = client.published(after=0, timeout=20)
+            published = client.published(after=0, timeout=LIMIT_S)
             assert (await anext(published)).capture_id == "a1"
             await waited(hub, lambda: hub.subscribers(Topic.FACES) == 1)
             hub.conclude("a2", published=False)
@@ -156,7 +156,7 @@ def test_previews_are_always_the_newest(hub):
 
 def test_the_blocking_client_s_previews_pass_over_what_is_old(hub):
     with Client(hub.address) as client:
-        previews = client.previews(timeout=20)
+        previews = client.previews(timeout=LIMIT_S)
         started = threading.Thread(target=lambda: (
             hub.wait(lambda: hub.subscribers(Topic.PREVIEW) == 1), hub.preview(1)))
         started.start()

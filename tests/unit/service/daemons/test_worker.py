@@ -14,6 +14,7 @@ from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 from denseface.service.settings import ServiceSettings
 from tests.unit.service.faces import small_face, small_frame
+from tests.waiting import LIMIT_S
 
 FRAME, ARRAYS = FrameHeader.of(small_frame())
 SETTINGS = ServiceSettings(address="ipc:///unused", heartbeat_s=0.05)
@@ -50,7 +51,7 @@ class Connection:
         for one in self.script:
             if one is DONE:
                 self.gate.release()
-                assert self.compute.wait(20)
+                assert self.compute.wait(LIMIT_S)
                 yield None
             elif one is BOTH_DONE:
                 self.gate.release(2)
@@ -68,7 +69,7 @@ def run(monkeypatch):
     gate = threading.Semaphore(0)
 
     def reconstruct(job, _):
-        assert gate.acquire(timeout=20)
+        assert gate.acquire(timeout=LIMIT_S)
         if job.capture_id == "faceless":
             raise NoFaceError("none")
         return small_face()

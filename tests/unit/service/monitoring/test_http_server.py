@@ -17,6 +17,7 @@ from structlog.testing import capture_logs
 from denseface.service.errors import AddressError
 from denseface.service.monitoring.http_server import MetricsServer
 from denseface.service.runtime.parsing import parse_loopback_address
+from tests.waiting import LIMIT_S
 
 REGISTRY = CollectorRegistry()
 Gauge("figures", "Of a test.", registry=REGISTRY).set(1)
@@ -51,7 +52,7 @@ def place(server):
 
 
 def get(server, path):
-    connection = http.client.HTTPConnection(*place(server), timeout=10)
+    connection = http.client.HTTPConnection(*place(server), timeout=LIMIT_S)
     try:
         connection.request("GET", path)
         answer = connection.getresponse()
@@ -62,7 +63,7 @@ def get(server, path):
 
 def raw(server, data):
     found = b""
-    with socket.create_connection(place(server), timeout=10) as one, \
+    with socket.create_connection(place(server), timeout=LIMIT_S) as one, \
             suppress(BrokenPipeError, ConnectionResetError):  # it may hang up at any time
         try:
             one.sendall(data)
@@ -121,7 +122,7 @@ def test_garbage_and_endless_requests_leave_no_trace(server, capfd):
 
 def test_slow_clients_are_cut_off_and_hold_nobody_up(server):
     with ExitStack() as stack:
-        slow = [stack.enter_context(socket.create_connection(place(server), timeout=10))
+        slow = [stack.enter_context(socket.create_connection(place(server), timeout=LIMIT_S))
                 for _ in range(3)]
         for one in slow:
             one.sendall(b"GET /metr")
@@ -131,7 +132,7 @@ def test_slow_clients_are_cut_off_and_hold_nobody_up(server):
 
 
 def test_a_client_that_sends_a_byte_now_and_then_is_cut_off_too(server):
-    with socket.create_connection(place(server), timeout=10) as one:
+    with socket.create_connection(place(server), timeout=LIMIT_S) as one:
         one.settimeout(0.02)
         for _ in range(500):
             try:
@@ -148,11 +149,11 @@ def test_a_client_that_sends_a_byte_now_and_then_is_cut_off_too(server):
 
 def test_more_clients_than_there_is_room_for_are_turned_away(server):
     with ExitStack() as stack:
-        many = [stack.enter_context(socket.create_connection(place(server), timeout=10))
+        many = [stack.enter_context(socket.create_connection(place(server), timeout=LIMIT_S))
                 for _ in range(30)]
         assert threading.active_count() < 20
         for one in many:
-            one.settimeout(10)
+            one.settimeout(LIMIT_S)
             with suppress(ConnectionResetError):
                 assert one.recv(100) == b""
     assert get(server, "/metrics")[0] == 200

@@ -6,6 +6,7 @@ import time
 import pytest
 
 from denseface.service.runtime.background import Background
+from tests.waiting import LIMIT_S
 
 
 @pytest.fixture
@@ -16,13 +17,13 @@ def calls():
 
 def test_the_call_that_waits_begins_when_the_one_before_ends(calls):
     first, second = threading.Event(), threading.Event()
-    calls.start(lambda: first.wait(20) and "first")
+    calls.start(lambda: first.wait(LIMIT_S) and "first")
     calls.start(lambda: second.set() or "second")
     with pytest.raises(RuntimeError, match="waits already"):
         calls.start(lambda: "third")
     assert not second.is_set()
     first.set()
-    assert second.wait(20)  # though nobody took the first
+    assert second.wait(LIMIT_S)  # though nobody took the first
     assert calls.result() == "first"
     assert calls
     assert calls.result() == "second"
@@ -31,8 +32,8 @@ def test_the_call_that_waits_begins_when_the_one_before_ends(calls):
 
 def test_a_call_that_waits_can_be_withdrawn_one_that_has_begun_cannot(calls):
     gate, begun = threading.Event(), threading.Event()
-    calls.start(lambda: begun.set() or gate.wait(20))
-    assert begun.wait(20)
+    calls.start(lambda: begun.set() or gate.wait(LIMIT_S))
+    assert begun.wait(LIMIT_S)
     assert not calls.cancel_queued()
     calls.start(lambda: pytest.fail("was withdrawn"))
     assert calls.cancel_queued()
@@ -44,8 +45,8 @@ def test_a_call_that_waits_can_be_withdrawn_one_that_has_begun_cannot(calls):
 def test_a_call_that_has_begun_by_itself_cannot_be_withdrawn(calls):
     gate, begun = threading.Event(), threading.Event()
     calls.start(lambda: "first")
-    calls.start(lambda: begun.set() or gate.wait(20))
-    assert begun.wait(20)
+    calls.start(lambda: begun.set() or gate.wait(LIMIT_S))
+    assert begun.wait(LIMIT_S)
     assert not calls.cancel_queued()
     gate.set()
     assert calls.result() == "first"
@@ -56,14 +57,14 @@ def test_the_time_is_that_of_the_call_under_way(calls):
     assert calls.elapsed_s == 0
     gates, begun = [threading.Event(), threading.Event()], [threading.Event(), threading.Event()]
     for number in range(2):
-        calls.start(lambda number=number: begun[number].set() or gates[number].wait(20))
-    assert begun[0].wait(20)
+        calls.start(lambda number=number: begun[number].set() or gates[number].wait(LIMIT_S))
+    assert begun[0].wait(LIMIT_S)
     before = calls.elapsed_s
     while calls.elapsed_s < 2 * before + 0.01:
         pass
     since = time.monotonic() - calls.elapsed_s
     gates[0].set()
-    assert begun[1].wait(20)
+    assert begun[1].wait(LIMIT_S)
     assert time.monotonic() - calls.elapsed_s > since + 0.01
     gates[1].set()
     assert calls.result()

@@ -19,6 +19,7 @@ from denseface.service.runtime.failpoints import (
     arm,
     failpoint,
 )
+from tests.waiting import LIMIT_S
 
 SERVICE = Path(failpoints.__file__).parents[1]
 
@@ -89,10 +90,10 @@ def test_a_process_ends_or_stops_at_the_third_time(action, number):
         if action == "stop":
             os.waitid(os.P_PID, process.pid, os.WSTOPPED)
             process.send_signal(signal.SIGCONT)
-            assert process.wait(20) == 0
+            assert process.wait(LIMIT_S) == 0
             said.append(process.stdout.readline())
         else:
-            assert process.wait(20) == -number
+            assert process.wait(LIMIT_S) == -number
         assert said == [f"{time}\n" for time in range(4 if action == "stop" else 3)]
         assert "failpoints are set" in process.stderr.read()
 

@@ -13,6 +13,7 @@ import pytest
 import structlog
 
 from denseface.service.runtime.logging import configure
+from tests.waiting import LIMIT_S
 
 
 def lines(text):
@@ -86,7 +87,7 @@ def test_what_python_and_libraries_say_is_json_too():
         raise RuntimeError("at last")
     """
     ended = subprocess.run([sys.executable, "-W", "always", "-c", code], check=False,
-                           capture_output=True, text=True, timeout=60)
+                           capture_output=True, text=True, timeout=LIMIT_S)
     found = lines(ended.stderr)
     assert ended.returncode == 1
     assert [one["event"] for one in found] == [
@@ -100,7 +101,7 @@ def test_what_python_and_libraries_say_is_json_too():
 def test_a_daemon_that_cannot_start_says_so_in_json(tmp_path):
     ended = subprocess.run(
         [sys.executable, "-m", "denseface", "hub", "--address", "nowhere", "--data", str(tmp_path),
-         "--log", "json"], check=False, capture_output=True, text=True, timeout=60)
+         "--log", "json"], check=False, capture_output=True, text=True, timeout=LIMIT_S)
     (line,) = lines(ended.stderr)
     assert ended.returncode == 2
     assert (line["event"], line["process"]) == ("ended", "hub")

@@ -12,6 +12,7 @@ from denseface.service.errors import DiskFullError
 from denseface.service.storage import FolderStore, WriterThreads, write
 from tests.unit.service.storage.test_folder_store import frame, result
 from tests.unit.service.storing import accept
+from tests.waiting import LIMIT_S
 
 
 @pytest.fixture
@@ -89,13 +90,13 @@ def test_frames_do_not_wait_for_a_face_and_each_kind_stays_in_order(store, monke
     def slow_for_faces(self):
         if self is face:
             waits.set()
-            assert go.wait(20)
+            assert go.wait(LIMIT_S)
         return real(self)
 
     monkeypatch.setattr(type(face), "write", slow_for_faces)
     with WriterThreads() as writer:
         writer.start(face)
-        assert waits.wait(20)
+        assert waits.wait(LIMIT_S)
         frames = [pending(store, name) for name in "abc"]
         for one in frames:
             writer.start(one)

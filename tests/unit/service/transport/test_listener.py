@@ -16,6 +16,7 @@ from denseface.service.transport.connection import Credentials, connect
 from denseface.service.transport.listener import Listener
 from denseface.service.transport.listeners import Listeners
 from tests.ports import free_port
+from tests.waiting import LIMIT_MS, LIMIT_S
 
 
 class _Never:
@@ -47,7 +48,7 @@ def _address(host="127.0.0.1"):
 
 
 def _until(listeners, true):
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + LIMIT_S
     received = []
     while not true(received):
         assert time.monotonic() < deadline
@@ -65,12 +66,12 @@ def test_a_listener_on_the_other_loopback(context):
     dealer, monitor = connect(context, zmq.DEALER, address, None)
     try:
         dealer.send(b"hello")
-        assert listener.sockets[0].poll(10_000)
+        assert listener.sockets[0].poll(LIMIT_MS)
         (incoming,) = listener.receive()
         assert incoming.parts == [b"hello"]
         assert incoming.sender.roles == frozenset(Role)
         assert listener.send(incoming.peer, [b"back"])
-        assert dealer.poll(10_000)
+        assert dealer.poll(LIMIT_MS)
     finally:
         monitor.close()
         dealer.close()

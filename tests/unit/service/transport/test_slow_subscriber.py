@@ -7,6 +7,7 @@ import pytest
 import zmq
 
 from denseface.service.transport.sockets import open_socket, publish_parts
+from tests.waiting import LIMIT_MS
 
 LARGE = bytes(200_000)
 
@@ -34,7 +35,7 @@ def subscribe(publisher):
             socket.set(zmq.LINGER, 0)
             socket.subscribe(topic)
             socket.connect(address)
-            assert publisher.poll(5000)
+            assert publisher.poll(LIMIT_MS)
             assert publisher.recv() == b"\1" + topic
             return socket
 
@@ -46,7 +47,7 @@ def publish(publisher, quick):
     full = []
     for number in range(200):
         full.append(not publish_parts(publisher, [b"faces", LARGE, b"%d" % number]))
-        assert quick.poll(5000)
+        assert quick.poll(LIMIT_MS)
         assert quick.recv_multipart()[2] == b"%d" % number
     return full
 
@@ -73,10 +74,10 @@ def test_who_has_caught_up_gets_what_comes_next(publisher, subscribe):
     quick, slow = (subscribe(context=publisher.context) for _ in range(2))
     full = publish(publisher, quick)
     for number in range(full.index(True)):
-        assert slow.poll(5000)
+        assert slow.poll(LIMIT_MS)
         assert slow.recv_multipart()[2] == b"%d" % number
     assert publish_parts(publisher, [b"faces", LARGE, b"new"])
-    assert slow.poll(5000)
+    assert slow.poll(LIMIT_MS)
     assert slow.recv_multipart()[2] == b"new"
 
 
