@@ -6,7 +6,7 @@ from denseface.service.client import Client
 from denseface.service.errors import UnknownCaptureError
 from denseface.service.security import read_pair
 from tests.system.guarded import Peer, guarded_hub, press_through
-from tests.waiting import until
+from tests.waiting import LIMIT_S, until
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,7 @@ def hub(tmp_path_factory):
         yield hub
         press_through(hub, "last")
         with pytest.raises(UnknownCaptureError), Client(hub.local) as client:
-            client.get("attack", timeout=5)  # nothing of any attack became a capture
+            client.get("attack", timeout=LIMIT_S)  # nothing of any attack became a capture
         # Garbage does not fill the disk, and no secret reaches the log.
         assert len(hub.log.read_text().splitlines()) < 300
         for path in hub.keys.glob("*.secret"):
