@@ -1,4 +1,4 @@
-"""A store and a writer to which things happen."""
+"""A store and a writer that fail, or wait, when a test says so."""
 
 from collections import deque
 from collections.abc import Callable
@@ -14,7 +14,7 @@ class KilledError(BaseException):
 
 
 class FaultyStore(FolderStore):
-    """Has no room where it is told so."""
+    """Finds its disk full while `full` is set."""
 
     full = False
 
@@ -40,7 +40,7 @@ class FaultyStore(FolderStore):
 
 
 class StepWriter:
-    """Writes when it is told to, some files at a time; with `immediate`, as soon as it can.
+    """Writes when `step` says so; while `immediate`, at once.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class StepWriter:
             self.wait()
 
     def step(self, count: int) -> None:
-        """Write so many that wait, as one batch."""
+        """Write that many of those that wait, as one batch."""
         batch = [self.waiting.popleft() for _ in range(min(count, len(self.waiting)))]
         try:
             self._room()

@@ -1,4 +1,4 @@
-"""Keeps a frame or a face in one go: its file, then its row."""
+"""Stores a frame or a face in one call: its file, then its row."""
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import StoreError
@@ -10,7 +10,7 @@ __all__ = ["accept", "finish"]
 
 
 def accept(store: FolderStore, frame: Packet, settings: Settings, settings_hash: str) -> None:
-    """Keep a `Frame`; raises what the disk says."""
+    """Store a `Frame`; raises what the writer or the store does."""
     (written,) = write([store.prepare_frame(frame, settings, settings_hash)])
     if written.error:
         raise written.error
@@ -22,7 +22,7 @@ def accept(store: FolderStore, frame: Packet, settings: Settings, settings_hash:
 
 
 def finish(store: FolderStore, result: Packet) -> None:
-    """Keep a `Result`; raises what the disk says."""
+    """Store a `Result`; raises as `accept`."""
     (written,) = write([store.prepare_face(result)])
     if written.error:
         raise written.error

@@ -23,26 +23,26 @@ def test_the_call_that_waits_begins_when_the_one_before_ends(calls):
         calls.start(lambda: "third")
     assert not second.is_set()
     first.set()
-    assert second.wait(LIMIT_S)  # though nobody took the first
+    assert second.wait(LIMIT_S)  # though nobody asked for the first result
     assert calls.result() == "first"
     assert calls
     assert calls.result() == "second"
     assert not calls
 
 
-def test_a_call_that_waits_can_be_withdrawn_one_that_has_begun_cannot(calls):
+def test_a_call_that_waits_can_be_cancelled_one_that_has_begun_cannot(calls):
     gate, begun = threading.Event(), threading.Event()
     calls.start(lambda: begun.set() or gate.wait(LIMIT_S))
     assert begun.wait(LIMIT_S)
     assert not calls.cancel_queued()
-    calls.start(lambda: pytest.fail("was withdrawn"))
+    calls.start(lambda: pytest.fail("was cancelled"))
     assert calls.cancel_queued()
     gate.set()
     assert calls.result()
     assert not calls.cancel_queued()
 
 
-def test_a_call_that_has_begun_by_itself_cannot_be_withdrawn(calls):
+def test_a_call_that_has_begun_by_itself_cannot_be_cancelled(calls):
     gate, begun = threading.Event(), threading.Event()
     calls.start(lambda: "first")
     calls.start(lambda: begun.set() or gate.wait(LIMIT_S))
@@ -71,7 +71,7 @@ def test_the_time_is_that_of_the_call_under_way(calls):
     assert calls.result()
 
 
-def test_what_a_call_raises_is_raised_by_take_and_the_next_goes_on(calls):
+def test_what_a_call_raises_is_raised_by_result_and_the_next_goes_on(calls):
     def fails():
         raise ValueError("no")
 

@@ -106,6 +106,6 @@ def test_every_failpoint_is_somewhere_and_none_else():
                          if isinstance(one, ast.Constant) and isinstance(one.value, str)
                          and one.value.startswith(("hub.", "worker.", "capture."))
                          and one.value.count(".") == 2)
-    spool = {f"{steps}.{step}" for steps in ("hub.frame", "hub.face")
+    of_files = {f"{steps}.{step}" for steps in ("hub.frame", "hub.face")
              for step in ("written", "synced", "renamed", "named")}
-    assert found | spool == set(FAILPOINT_NAMES)
+    assert found | of_files == set(FAILPOINT_NAMES)

@@ -47,12 +47,12 @@ def test_an_accepted_frame_survives_closing(tmp_path):
     with FolderStore(tmp_path / "data") as store:
         assert store.epoch == epoch
         assert store.unfinished() == ["a", "b"]
-        stored = store.find("a")
-        assert stored is not None
-        assert (stored.state, stored.attempts) == (CaptureState.ACCEPTED, 0)
-        kept = store.frame("a")
-        assert Settings.model_validate_json(kept.metadata.settings) == settings
-        depth = kept.message.frame.join(kept.arrays).depth
+        row = store.find("a")
+        assert row is not None
+        assert (row.state, row.attempts) == (CaptureState.ACCEPTED, 0)
+        record = store.frame("a")
+        assert Settings.model_validate_json(record.metadata.settings) == settings
+        depth = record.message.frame.join(record.arrays).depth
         np.testing.assert_array_equal(depth, small_frame().depth)
         assert store.start_attempt("a") == 1
         assert store.start_attempt("a") == 2
@@ -185,14 +185,14 @@ def test_a_full_disk_leaves_nothing_half_written(tmp_path, monkeypatch):
 def test_frames_are_held_in_memory_as_far_as_there_is_room(store, monkeypatch):
     size = sum(array.nbytes for array in frame("a").arrays.values())
     monkeypatch.setattr("denseface.service.storage._frame_cache._MAX_BYTES", 2 * size)
-    fresh = FrameCache()
-    kept = {}
+    cache = FrameCache()
+    records = {}
     for name in "abc":
         accept(store, frame(name), Settings(), "0f")
-        kept[name] = store.frame(name)
-    fresh.add(kept.values())
-    assert fresh.pop("c") is None
-    assert fresh.pop("a") is kept["a"]
-    assert fresh.pop("a") is None
-    fresh.add([kept["c"]])
-    assert [fresh.pop(name) for name in "bc"] == [kept["b"], kept["c"]]
+        records[name] = store.frame(name)
+    cache.add(records.values())
+    assert cache.pop("c") is None
+    assert cache.pop("a") is records["a"]
+    assert cache.pop("a") is None
+    cache.add([records["c"]])
+    assert [cache.pop(name) for name in "bc"] == [records["b"], records["c"]]

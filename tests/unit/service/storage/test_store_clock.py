@@ -18,7 +18,7 @@ def test_time_is_counted_whatever_the_wall_clock_says():
     assert store_clock.now() == 20
 
 
-def test_a_hub_that_was_away_counts_on():
+def test_a_hub_that_was_stopped_counts_on():
     clock = FakeClock()
     saved = StoreClock(clock, None).save()
     clock.pass_time(100)
@@ -46,7 +46,7 @@ def test_a_clock_far_ahead_after_a_start_waits_for_someone_to_see_it():
     assert store_clock.trusted(DAY)
 
 
-def test_a_clock_that_starts_in_the_past_takes_nothing_back():
+def test_a_clock_that_starts_in_the_past_makes_no_store_younger():
     clock = FakeClock()
     store_clock = StoreClock(clock, None)
     clock.pass_time(50)
@@ -59,7 +59,7 @@ def test_a_clock_that_starts_in_the_past_takes_nothing_back():
     "x", "{}", "[]", '{"seconds": 1, "wall": "x", "boot": "b", "at": 1}',
     '{"seconds": NaN, "wall": "2026-01-01T00:00:00+00:00", "boot": "b", "at": 1}',
     '{"seconds": 1, "wall": "2026-01-01T00:00:00", "boot": "b", "at": 1}'])
-def test_a_damaged_mark_is_named(saved):
+def test_a_damaged_state_is_named(saved):
     with pytest.raises(ValueError, match="saved clock"):
         StoreClock(FakeClock(), saved)
 
