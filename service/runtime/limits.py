@@ -18,6 +18,7 @@ OUT_OF_DESCRIPTORS = (errno.EMFILE, errno.ENFILE)
 """Error numbers where this process, or the machine, has no descriptor left."""
 
 _OPEN_DESCRIPTORS = Path("/proc/self/fd")
+"""One entry for each open descriptor; see proc(5)."""
 _WANTED_DESCRIPTORS = 65_536
 """Limit that is asked of the system."""
 _SPARE_DESCRIPTORS = 128

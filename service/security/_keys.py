@@ -22,12 +22,14 @@ __all__ = ["HUB_NAME", "KeyPair", "check_key", "check_name", "fingerprint", "new
            "read_public", "write_key_file"]
 
 HUB_NAME = "hub"
+"""Name of a key, and of its file."""
 """Name of the hub's own pair of keys."""
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 _OTHERS = 0o077
 """Mode bits that a file with a secret key may not have."""
 _Z85 = re.compile(r"[0-9A-Za-z.\-:+=^!/*?&<>()\[\]{}@%$#]{40}")
+"""32 bytes in Z85 (ZeroMQ RFC 32)."""
 
 
 class _File(BaseModel):

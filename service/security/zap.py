@@ -18,7 +18,9 @@ MESSAGES_DOMAIN, PUBLICATIONS_DOMAIN = b"denseface", b"denseface.topics"
 """ZAP domains of the sockets for messages and of those for publications."""
 
 _ENDPOINT = "inproc://zeromq.zap.01"
+"""Where libzmq asks (RFC 27)."""
 _VERSION = b"1.0"
+"""Version of ZAP."""
 _MAX_BURST = 64
 """Requests answered before the loop looks at other sockets."""
 

@@ -12,6 +12,7 @@ from denseface.service.errors import DiskFullError
 __all__ = ["DiskReserve"]
 
 _BYTES = 2**20
+"""Enough for SQLite to mark rows."""
 
 
 class DiskReserve:

@@ -10,8 +10,11 @@ from denseface.service.runtime.files import private_folder, sync_folder
 __all__ = ["FolderLayout"]
 
 _FRAME_NAME = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.frame")
+"""Capture id."""
 _FACE_NAME = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.[0-9a-f]{1,64}\.face")
+"""Capture id and settings hash."""
 _TEMPORARY_NAME = re.compile(r"\..*\.tmp")
+"""As `write_atomically` names it."""
 
 
 class FolderLayout:

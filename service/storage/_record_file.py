@@ -1,4 +1,4 @@
-"""Files of several byte strings, its parts, under one checksum.
+"""Files of several byte strings, their parts, under one checksum.
 
 Layout: the magic line, the checksum (32 bytes), the index, which is the number of parts (uint32)
 and the length of each (uint64), then the parts. The checksum is the SHA-256 of the index and of the
@@ -24,7 +24,9 @@ from denseface.service.runtime.files import write_atomically
 __all__ = ["read_parts", "store_error", "wrap_os_errors", "write_parts"]
 
 _MAGIC = b"denseface spool 3\n"
+"""With the version of the layout."""
 _DIGEST_BYTES = hashlib.sha256().digest_size
+"""Size of a checksum."""
 _MAX_BYTES = 128 * 2**20
 """Of a file; larger than any message."""
 

@@ -27,6 +27,7 @@ __all__ = [
 ]
 
 _Time = Annotated[str, Field(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}\+00:00$")]
+"""As `format_timestamp` writes it: ISO 8601, milliseconds, UTC."""
 
 
 class _Metadata(BaseModel):
