@@ -26,18 +26,18 @@ class Captures:
         self._in_memory: dict[str, CaptureState] = {}
 
     def state(self, capture_id: str) -> CaptureState | None:
-        """Give a capture's state, None where it is unknown; StoreError where that is unreadable."""
+        """Return a capture's state, None for an unknown one; StoreError where it is unreadable."""
         if state := self._in_memory.get(capture_id):
             return state
         row = self._store.find(capture_id)
         return row.state if row else None
 
     def allows(self, capture_id: str, event: CaptureEvent) -> bool:
-        """Say whether an event can happen to a capture now; raises as `state`."""
+        """Whether an event can happen to a capture now; raises as `state`."""
         return (self.state(capture_id), event) in TRANSITIONS
 
     def advance(self, capture_id: str, event: CaptureEvent) -> None:
-        """Note an event that changes no row.
+        """Change a state by an event that changes no row.
 
         Raises
         ------
@@ -48,9 +48,9 @@ class Captures:
 
     @contextmanager
     def transition(self, event: CaptureEvent, *capture_ids: str) -> Iterator[CaptureState]:
-        """Give the state that the store is to write of captures, which have it from the end on.
+        """Change states by an event that changes rows: within, the store writes the state given.
 
-        Where what is done within raises, they stay as they were. Raises as `advance`.
+        Where it raises, the captures stay as they were. Raises as `advance`.
         """
         (after,) = {advance(self.state(capture_id), event) for capture_id in capture_ids}
         yield after
@@ -60,12 +60,11 @@ class Captures:
     def save(
         self, event: CaptureEvent, written: Sequence[WriteResult]
     ) -> Iterator[tuple[WriteResult, Exception | None]]:
-        """Give files that were written their rows and say of each in order what came of it.
+        """Give written files their rows, and yield each with its error or None; errors come first.
 
         Parameters
         ----------
         event : FRAME_SAVED or FACE_SAVED
-        written : what a writer gave back; what failed comes first
         """
         yield from ((one, one.error) for one in written if one.error)
         good = [one for one in written if one.error is None]

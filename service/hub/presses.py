@@ -20,6 +20,7 @@ from denseface.service.storage import WriteResult
 __all__ = ["Presses", "settings_hash"]
 
 _MIB = 2**20
+"""Bytes."""
 _MAX_REFUSALS = 1000
 """Refusals that are remembered for a repeat of their request."""
 _MAX_SAVING = 32
