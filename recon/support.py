@@ -43,7 +43,7 @@ class Support:
     step : distance of its points, mm
     seeded : (rows, columns) uint8, 1 at the points nearest to the seeds, 0 elsewhere
     margin : (rows, columns) float32, above 0 at supported points, above `level` between points
-    level : what a disc of few pixels reaches farther than its radius adds to the margin
+    level : not 0, since a disc of few pixels reaches farther than its radius
     """
 
     xs: NDArray[np.float64]
@@ -142,7 +142,6 @@ def _broadly_blurred(image: NDArray[np.uint8], sigma: float) -> NDArray[np.float
 def _axis(low: float, high: float, step: float) -> NDArray[np.float64]:
     """Points from `low` to beyond `high`, an even number."""
     return low + step * np.arange(2 * (int((high - low) / step) // 2 + 1), dtype=np.float64)
-
 
 
 @compiled

@@ -1,6 +1,6 @@
 """The linear system of the RBF fit, solved by preconditioned conjugate gradients, compiled.
 
-Grids are flat: row after row, each followed by unused places, so that a step to any neighbour
+Grids are flat: row after row, each followed by unused entries, so that a step to any neighbour
 within reach is one number, and one long loop serves the whole grid.
 """
 
@@ -19,7 +19,7 @@ Floats = NDArray[np.float32]
 class NodeSystem(NamedTuple):
     """The matrix H + lambda I - G^T G over the nodes, with H[t, t'] = decay[t - t'] D((t + t')/2).
 
-    n counts the places of the padded grid.
+    n counts the entries of the padded grid.
     """
 
     density: Floats
@@ -31,13 +31,13 @@ class NodeSystem(NamedTuple):
     G: Floats
     """(6, n)."""
     used: Floats
-    """(n,), 1 on the grid, 0 on unused places."""
+    """(n,), 1 on the grid, 0 on unused entries."""
     width: int
-    """Places from row to row."""
+    """Entries from row to row."""
     first: int
     """Where the grid begins."""
     size: int
-    """Its places, from the first to the last."""
+    """Its entries, from the first to the last."""
 
 
 @compiled
@@ -94,7 +94,7 @@ def conjugate_gradients(
 ) -> tuple[Floats, int]:
     """Solve a system for its right side, preconditioned by the diagonal.
 
-    right : (n,), 0 on unused places; tolerance : of the preconditioned residual's norm, relative
+    right : (n,), 0 on unused entries; tolerance : of the preconditioned residual's norm, relative
 
     Returns alpha, (n,), and the number of iterations.
     """

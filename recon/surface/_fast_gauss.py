@@ -1,8 +1,8 @@
 """Sums of Gaussians over scattered points, by way of a regular grid.
 
-The fast Gauss transform of Greengard and Strain, 1991, doi:10.1137/0912004, in the plane form
-that spreading by Gaussians allows (Greengard and Lee, 2004, doi:10.1137/S003614450343200X). A
-Gaussian is the product of narrower ones, summed over a regular grid of points s with step d:
+A fast Gauss transform (Greengard and Strain, 1991, doi:10.1137/0912004), by Gaussian gridding
+(Greengard and Lee, 2004, doi:10.1137/S003614450343200X) instead of Hermite expansions. A Gaussian
+is the product of narrower ones, summed over a regular grid of points s with step d:
 
     exp(-b (x - t)^2) = d sqrt((a + e) / pi) sum_s exp(-a (x - s)^2) exp(-e (s - t)^2),
     e = a b / (a - b),

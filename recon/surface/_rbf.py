@@ -265,7 +265,7 @@ def _density(
 
 @dataclass(frozen=True)
 class _PaddedGrid:
-    """The kernels' flat layout of a (height, breadth) grid: `reach` unused places around it."""
+    """The kernels' flat layout of a (height, breadth) grid: `reach` unused entries around it."""
 
     height: int
     breadth: int

@@ -120,7 +120,7 @@ def test_a_sensor_on_its_side_registers_the_same_points(shot):
     assert colors.mean() < 0.2
 
 
-def test_looking_up_is_the_same_on_its_side(shot, face):
+def test_sampled_colours_are_the_same_on_its_side(shot, face):
     aside = turned_frame(shot.frame)
     points = face.dense.points[::7]
     straight, seen = sample_colors(shot.frame, register(shot.frame), points)

@@ -169,7 +169,7 @@ def test_other_resolutions(shot, factor, error_mm):
     assert one.report.mean_spacing_mm == pytest.approx(1.22 / factor, rel=0.15)
 
 
-def test_depth_that_is_tiedalready(shot, face):
+def test_depth_that_is_registered_already(shot, face):
     frame = registered(shot.frame)
     one = reconstruct(frame)
     check_sound(one)

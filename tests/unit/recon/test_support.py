@@ -116,25 +116,25 @@ def test_both_grids_agree_and_the_area_is_that_of_the_disc():
         support.inside, exceeds(support.margin, rows, columns, 0.0))
 
 
-def test_what_is_left_out_is_below_both_levels():
+def test_what_is_removed_is_below_both_levels():
     rng = np.random.default_rng(2)
     margin = rng.normal(size=(9, 13)).astype(np.float32)
-    places = rng.random((9, 13)) < 0.5
+    removed = rng.random((9, 13)) < 0.5
     found = Support(np.arange(13.0), np.arange(9.0), 1.0, np.zeros((9, 13), np.uint8), margin,
-                    0.3).without(places).margin
-    np.testing.assert_array_equal(found[~places], margin[~places])
+                    0.3).without(removed).margin
+    np.testing.assert_array_equal(found[~removed], margin[~removed])
     level = np.float32(0.3)
     np.testing.assert_allclose(
-        found[places], np.minimum(level - np.abs(margin[places] - level), 0), atol=1e-6)
+        found[removed], np.minimum(level - np.abs(margin[removed] - level), 0), atol=1e-6)
 
 
-def test_what_is_left_out_ends_half_way_to_the_next_point():
+def test_what_is_removed_ends_half_way_to_the_next_point():
     support = Support.of(disc_seeds(1.0, 20), 1.0)
-    left_out = np.zeros(support.inside.shape, bool)
+    removed = np.zeros(support.inside.shape, bool)
     middle = np.argmin(np.abs(support.ys)), np.argmin(np.abs(support.xs))
-    left_out[middle[0] - 2:middle[0] + 3, middle[1] - 2:middle[1] + 3] = True
-    without = support.without(left_out)
-    np.testing.assert_array_equal(without.inside, support.inside & ~left_out)
+    removed[middle[0] - 2:middle[0] + 3, middle[1] - 2:middle[1] + 3] = True
+    without = support.without(removed)
+    np.testing.assert_array_equal(without.inside, support.inside & ~removed)
     step = 0.02
     _, _, inside = without.on_grid(step)
     _, _, before = support.on_grid(step)

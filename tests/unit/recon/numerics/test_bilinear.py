@@ -5,7 +5,7 @@ import numpy as np
 from denseface.recon.numerics.bilinear import add_resampled
 
 
-def test_what_is_added_is_read_between_its_points():
+def test_a_resampled_image_is_added():
     image = np.random.default_rng(0).normal(size=(9, 13)).astype(np.float32)
     ramp = np.add.outer(0.2 * np.arange(4), 0.05 * np.arange(5)).astype(np.float32)
     rows, columns = (np.linspace(0, last, count).astype(np.float32)

@@ -14,5 +14,5 @@ def test_it_solves_what_numpy_solves():
         np.testing.assert_allclose(solve_small(matrix, right), expected, rtol=1e-5)
 
 
-def test_what_is_left_open_is_finite():
+def test_the_solution_of_a_singular_system_is_finite():
     assert np.isfinite(solve_small(np.zeros((3, 3)), np.zeros(3))).all()

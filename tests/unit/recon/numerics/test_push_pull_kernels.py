@@ -30,7 +30,7 @@ def test_half_the_size_is_the_mean_of_four():
     np.testing.assert_array_equal(wanted, [[0, 0, 0], [0, 1, 0], [1, 0, 0]])
 
 
-def test_what_is_missing_is_filled_from_half_the_size():
+def test_what_is_missing_is_pulled_from_half_the_size():
     row, column = np.mgrid[:6, :8]
     ramp = np.dstack([row, column, 30 - row - column]).astype(np.float32)
     # The middle of each four.
@@ -42,7 +42,7 @@ def test_what_is_missing_is_filled_from_half_the_size():
     np.testing.assert_array_equal(mean[~missing], ramp[~missing])
 
 
-def test_a_colour_is_shared_among_the_pixels_around_it():
+def test_a_colour_is_splat_on_the_pixels_around_it():
     sums = splat_colors(np.array([[100, 0, 40], [8, 16, 4]], np.uint8),
                    np.array([[1.25, 2.5], [3, 4]], np.float32), 4, 5)
     np.testing.assert_allclose(sums[1, 2], (37.5, 0, 15, 0.375))

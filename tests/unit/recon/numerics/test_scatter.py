@@ -18,7 +18,7 @@ def test_bounds_are_the_least_and_the_largest():
     assert xy_bounds(points[:1]) == (*points[0, [0, 0]], *points[0, [1, 1]])
 
 
-def test_the_pixel_nearest_to_a_point_is_marked():
+def test_the_pixel_nearest_to_a_point_is_occupied():
     rng = np.random.default_rng(0)
     points = rng.uniform(-0.4, 3.4, (20, 3)).astype(np.float32) * 2 + (10, -20, 0)
     points = points.astype(np.float32)
@@ -29,13 +29,13 @@ def test_the_pixel_nearest_to_a_point_is_marked():
     np.testing.assert_array_equal(image, expected)
 
 
-def test_places_count_pixels_and_begin_at_the_first():
+def test_coordinates_count_pixels_and_are_never_negative():
     points = np.array([[10, -20, 700], [11, -17, 700], [9.999, -20.001, 0]], np.float32)
     np.testing.assert_allclose(pixel_coordinates(points, (10.0, -20.0), 2.0),
                                [[0, 0], [1.5, 0.5], [0, 0]])
 
 
-def test_what_is_shared_out_keeps_its_sum_and_its_middle():
+def test_a_splat_keeps_its_sum_and_its_centroid():
     rng = np.random.default_rng(1)
     columns, rows = rng.uniform(0, 5.9, (2, 30)).astype(np.float32)
     values = rng.normal(size=30).astype(np.float32)
@@ -48,7 +48,7 @@ def test_what_is_shared_out_keeps_its_sum_and_its_middle():
             np.testing.assert_allclose(found.sum(), expected.sum(), atol=1e-4)
 
 
-def test_between_pixels_a_ramp_goes_on():
+def test_interpolation_is_exact_on_a_ramp():
     rng = np.random.default_rng(2)
     columns, rows = rng.uniform(0, 5.9, (2, 30)).astype(np.float32)
     i, j = np.mgrid[:7, :7].astype(np.float32)

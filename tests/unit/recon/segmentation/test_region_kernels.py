@@ -59,7 +59,7 @@ def seen_at(count):
     return np.dstack([3 * column - 10, 3 * row + 40]).astype(np.float32)
 
 
-def test_the_reach_is_a_superellipse():
+def test_the_mask_is_a_superellipse():
     pixels = seen_at(81)
     (u, v), (side, up, down) = (100.0, 150.0), (75, 60, 100)
     valid = pixels[..., 0] < 150
@@ -100,7 +100,7 @@ def test_each_second_of_the_rows_that_hold_some_has_a_median():
 
 
 @pytest.mark.parametrize("degrees", [-60, -20, 0, 35, 80])
-def test_the_long_axis_is_that_of_an_ellipse(degrees):
+def test_the_principal_axis_is_that_of_an_ellipse(degrees):
     row, column = np.mgrid[-60:60, -70:80]
     down, right = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     along, across = down * row + right * column, right * row - down * column
@@ -112,7 +112,7 @@ def test_without_a_longer_way_the_axis_points_down():
     assert principal_axis(np.ones((9, 9), bool)) == (1.0, 0.0)
 
 
-def test_depth_is_cut_downward_or_along_the_axis_whichever_is_farther():
+def test_depth_is_trimmed_downward_or_along_the_axis_whichever_is_farther():
     pixels = seen_at(60)
     z = np.full((60, 60), 750, np.float32)
     middle, axis = (80.0, 130.0), (np.cos(0.5), np.sin(0.5))
@@ -134,14 +134,14 @@ def stepped(drop_mm, *, gap=0, at=12):
     return face
 
 
-def test_what_lies_behind_a_step_down_is_cut_on_straight_ways_alone():
+def test_what_lies_behind_a_step_down_is_dropped_on_straight_rays_alone():
     row, column = np.mgrid[:24, :21]
     beside = np.abs(column - 10) > row - 2
     np.testing.assert_array_equal(stepped(40), (row < 12) | beside)
     assert stepped(25).all()
 
 
-def test_a_step_counts_below_a_place_and_over_a_narrow_gap():
+def test_a_step_counts_below_the_start_and_over_a_narrow_gap():
     assert stepped(40, at=6).all()
     assert not stepped(40, gap=3)[15:, 10].any()
     assert stepped(40, gap=4)[16:].all()
@@ -157,7 +157,7 @@ def test_beyond_a_step_nothing_comes_back():
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_what_comes_nearer_again_beside_a_face_is_cut_on_straight_ways_alone(mirrored):
+def test_what_comes_nearer_again_beside_a_face_is_dropped_on_straight_rays_alone(mirrored):
     row, column = np.mgrid[:21, :41]
     aside = column - 10
     z = np.interp(aside, [0, 8, 14, 30], [700, 740, 760, 700]).astype(np.float32)
