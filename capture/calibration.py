@@ -6,7 +6,7 @@ in pixels with (0, 0) the centre of the top left pixel.
 
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from denseface.capture.errors import CalibrationError
 
-__all__ = ["MAX_SIDE", "Calibration", "CameraModel", "DepthToColor"]
+__all__ = ["MAX_SIDE", "Calibration", "CameraModel", "ChosenCalibration", "DepthToColor",
+           "choose_calibration"]
 
 MAX_SIDE = 16384
 """Pixels: the widest and the highest image."""
@@ -23,6 +24,7 @@ _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Side = Annotated[int, Field(gt=0, le=MAX_SIDE)]
 _Row = tuple[_Finite, _Finite, _Finite]
+_Array = NDArray[np.float64]
 
 _UNDISTORT_ITERATIONS = 20
 """Newton steps, at most."""
@@ -56,7 +58,7 @@ class CameraModel(_Model):
     distortion: tuple[_Finite, _Finite, _Finite, _Finite, _Finite] = (0.0, 0.0, 0.0, 0.0, 0.0)
     """(k1, k2, p1, p2, k3), OpenCV's order."""
 
-    def project(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+    def project(self, points: NDArray[np.floating]) -> _Array:
         """Project points to pixels, distortion included.
 
         Parameters
@@ -73,9 +75,7 @@ class CameraModel(_Model):
         x, y = self._distort(points[..., 0] / points[..., 2], points[..., 1] / points[..., 2])
         return np.stack([self.fx * x + self.cx, self.fy * y + self.cy], axis=-1)
 
-    def back_project(
-        self, pixels: NDArray[np.floating], depth_mm: NDArray[Any] | float
-    ) -> NDArray[np.float64]:
+    def back_project(self, pixels: NDArray[np.floating], depth_mm: NDArray[Any] | float) -> _Array:
         """Back-project pixels at a depth: x / (u - u0) = y / (v - v0) = z / f, paper Eq. (1).
 
         Parameters
@@ -95,7 +95,7 @@ class CameraModel(_Model):
         x, y = self._undistort(centered[..., 0] / self.fx, centered[..., 1] / self.fy)
         return np.stack([x * z, y * z, z], axis=-1)
 
-    def rays(self) -> NDArray[np.float64]:
+    def rays(self) -> _Array:
         """Give the point at z = 1 that each pixel's centre sees: (height, width, 2) float64.
 
         The array is computed once for each camera and is read-only.
@@ -110,9 +110,7 @@ class CameraModel(_Model):
             "cx": (self.cx + 0.5) * factor - 0.5, "cy": (self.cy + 0.5) * factor - 0.5,
         })
 
-    def _distort(
-        self, x: NDArray[np.float64], y: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _distort(self, x: _Array, y: _Array) -> tuple[_Array, _Array]:
         if not any(self.distortion):
             return x, y
         k1, k2, p1, p2, k3 = self.distortion
@@ -121,9 +119,7 @@ class CameraModel(_Model):
         return (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
                 y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y)
 
-    def _undistort(
-        self, xd: NDArray[np.float64], yd: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _undistort(self, xd: _Array, yd: _Array) -> tuple[_Array, _Array]:
         """Invert `_distort` by Newton's method."""
         if not any(self.distortion):
             return xd, yd
@@ -163,9 +159,9 @@ def _folds(camera: CameraModel) -> bool:
 
 
 @lru_cache(maxsize=8)
-def _rays(camera: CameraModel) -> NDArray[np.float64]:
+def _rays(camera: CameraModel) -> _Array:
     v, u = np.mgrid[:camera.height, :camera.width]
-    rays = camera.back_project(np.stack([u, v], axis=-1).astype(np.float64), 1.0)[..., :2].copy()
+    rays = camera.back_project(np.stack([u, v], axis=-1), 1.0)[..., :2].copy()
     rays.setflags(write=False)
     return rays
 
@@ -180,13 +176,13 @@ class DepthToColor(_Model):
     @classmethod
     def _proper(cls, rows: tuple[_Row, _Row, _Row]) -> tuple[_Row, _Row, _Row]:
         R = np.array(rows)
-        if (np.abs(R @ R.T - np.eye(3)).max() > _ROTATION_TOLERANCE or np.linalg.det(R) < 0):
+        if np.abs(R @ R.T - np.eye(3)).max() > _ROTATION_TOLERANCE or np.linalg.det(R) < 0:
             raise ValueError("must be a proper rotation (orthonormal rows, determinant +1)")
         return rows
 
-    def apply(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+    def apply(self, points: NDArray[np.floating]) -> _Array:
         """Take (..., 3) points, mm, from the depth camera's frame to the colour camera's."""
-        moved: NDArray[np.float64] = points @ np.array(self.rotation).T + self.translation_mm
+        moved: _Array = points @ np.array(self.rotation).T + self.translation_mm
         return moved
 
 
@@ -231,3 +227,30 @@ class Calibration(_Model):
     def to_json(self) -> str:
         """Write the JSON of the frame format."""
         return self.model_dump_json()
+
+
+class ChosenCalibration(NamedTuple):
+    """A calibration that wins over what the source says of itself, and where it came from."""
+
+    calibration: Calibration
+    origin: str
+
+
+def choose_calibration(
+    path: Path | None, argument: Calibration | str | Path | None
+) -> ChosenCalibration | None:
+    """Take the argument, else ``NAME.calibration.json`` beside the file, else none.
+
+    Raises
+    ------
+    CalibrationError
+        The chosen file cannot be read.
+    """
+    if isinstance(argument, Calibration):
+        return ChosenCalibration(argument, "argument")
+    if argument is not None:
+        return ChosenCalibration(Calibration.from_file(argument), f"argument {argument}")
+    beside = path and path.with_name(f"{path.stem}.calibration.json")
+    if beside and beside.exists():
+        return ChosenCalibration(Calibration.from_file(beside), f"beside: {beside.name}")
+    return None

@@ -3,14 +3,8 @@
 Each error is also the builtin kind that a caller would expect to catch.
 """
 
-__all__ = [
-    "CalibrationError",
-    "CaptureError",
-    "FrameError",
-    "SensorError",
-    "SensorTimeoutError",
-    "UnreadableSourceError",
-]
+__all__ = ["CalibrationError", "CaptureError", "FrameError", "SensorError", "SensorTimeoutError",
+           "UnreadableSourceError"]
 
 
 class CaptureError(Exception):

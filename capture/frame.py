@@ -1,7 +1,6 @@
 """A synchronized depth + colour frame with its calibration."""
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -46,16 +45,12 @@ class RgbdFrame:
         _check("color", self.color, np.uint8, 3)
         if self.color.shape[2] != 3:
             raise FrameError(f"color must have 3 channels (RGB), found shape {self.color.shape}")
-        for name, shape, camera in (
-            ("depth", self.depth.shape, self.depth_camera),
-            ("color", self.color.shape, self.calibration.color),
-        ):
-            expected = (camera.height, camera.width)
-            if shape[:2] != expected:
-                raise FrameError(
-                    f"{name} is {shape[1]}x{shape[0]}, its calibration says "
-                    f"{expected[1]}x{expected[0]}"
-                )
+        for name, image, camera in (("depth", self.depth, self.depth_camera),
+                                    ("color", self.color, self.calibration.color)):
+            height, width = image.shape[:2]
+            if (width, height) != (camera.width, camera.height):
+                raise FrameError(f"{name} is {width}x{height}, its calibration says "
+                                 f"{camera.width}x{camera.height}")
 
     @property
     def depth_camera(self) -> CameraModel:
@@ -67,7 +62,7 @@ class RgbdFrame:
         """From the frame of `depth_camera` to the colour camera's: identity where registered."""
         return DepthToColor() if self.registered else self.calibration.depth_to_color
 
-    @cached_property
+    @property
     def skew_us(self) -> int:
         """How much later the depth was taken than the colour, microseconds."""
         return self.depth_timestamp_us - self.color_timestamp_us
@@ -79,7 +74,7 @@ class RgbdFrame:
 
 def _check(name: str, array: NDArray[Any], dtype: type[np.generic], ndim: int) -> None:
     if not isinstance(array, np.ndarray) or array.dtype != dtype or array.ndim != ndim:
-        found = (f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray)
-                 else type(array).__name__)
+        is_array = isinstance(array, np.ndarray)
+        found = f"{array.dtype} {array.shape}" if is_array else type(array).__name__
         raise FrameError(
             f"{name} must be a {ndim}-dimensional {np.dtype(dtype)} array, found {found}")

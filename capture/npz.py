@@ -18,8 +18,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from denseface.capture._calibration_choice import ChosenCalibration
-from denseface.capture.calibration import MAX_SIDE, Calibration
+from denseface.capture.calibration import MAX_SIDE, Calibration, ChosenCalibration
 from denseface.capture.errors import CaptureError, FrameError, UnreadableSourceError
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.source import Source
@@ -94,12 +93,7 @@ def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> Rgb
             RuntimeError, ValueError, struct.error) as error:
         why = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise UnreadableSourceError(f"{path}: not a readable .npz file: {why}") from error
-    if chosen is None:
-        own = Calibration.from_json(_text(path, arrays["calibration"]),
-                                    name=f"{path}: calibration")
-        calibration, origin = own, "npz file"
-    else:
-        calibration, origin = chosen
+    calibration, origin = chosen or (_own_calibration(path, arrays["calibration"]), "npz file")
     try:
         return RgbdFrame(
             arrays["depth"], arrays["color"],
@@ -132,11 +126,12 @@ def save_frame(path: str | Path, frame: RgbdFrame) -> None:
         raise
 
 
-def _text(path: str | Path, array: NDArray[Any]) -> str:
+def _own_calibration(path: str | Path, array: NDArray[Any]) -> Calibration:
     try:
-        return str(array)
+        text = str(array)
     except (ValueError, SystemError) as error:
         raise FrameError(f"{path}: calibration: not Unicode text") from error
+    return Calibration.from_json(text, name=f"{path}: calibration")
 
 
 def _read_arrays(

@@ -6,8 +6,8 @@ their stamps differ by no more than a tolerance of about half a frame period.
 """
 
 from collections import deque
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from dataclasses import dataclass, field
+from typing import Any, Generic, TypeVar
 
 __all__ = ["HALF_FRAME_US", "Pair", "Pairer"]
 
@@ -19,8 +19,6 @@ _CAPACITY = 4
 
 D = TypeVar("D")
 C = TypeVar("C")
-T = TypeVar("T")
-U = TypeVar("U")
 
 
 @dataclass(frozen=True)
@@ -40,6 +38,10 @@ class Pairer(Generic[D, C]):
     ----------
     tolerance_us : the largest difference of two stamps that belong together, microseconds
     capacity : how many items of a stream wait at most; the oldest is dropped beyond that
+
+    Attributes
+    ----------
+    depth, color : the two streams: what waits for a partner, and how many found none
     """
 
     def __init__(self, tolerance_us: int = HALF_FRAME_US, capacity: int = _CAPACITY) -> None:
@@ -49,43 +51,27 @@ class Pairer(Generic[D, C]):
             raise ValueError(f"capacity must be at least 1, got {capacity}")
         self.tolerance_us = tolerance_us
         self.capacity = capacity
-        self._depth: _Stream[D] = _Stream()
-        self._color: _Stream[C] = _Stream()
-
-    @property
-    def waiting(self) -> tuple[int, int]:
-        """How many depth and colour items wait for a partner."""
-        return len(self._depth.items), len(self._color.items)
-
-    @property
-    def dropped_depth(self) -> int:
-        """How many depth items found no partner."""
-        return self._depth.dropped
-
-    @property
-    def dropped_color(self) -> int:
-        """How many colour items found no partner."""
-        return self._color.dropped
+        self.depth, self.color = _Stream(), _Stream()
 
     def add_depth(self, stamp_us: int, item: D) -> Pair[D, C] | None:
         """Take a depth item; give the pair that it completes, if any."""
-        partner = self._add(self._depth, self._color, stamp_us, item)
+        partner = self._add(self.depth, self.color, stamp_us, item)
         return partner and Pair(item, partner[1], stamp_us, partner[0])
 
     def add_color(self, stamp_us: int, item: C) -> Pair[D, C] | None:
         """Take a colour item; give the pair that it completes, if any."""
-        partner = self._add(self._color, self._depth, stamp_us, item)
+        partner = self._add(self.color, self.depth, stamp_us, item)
         return partner and Pair(partner[1], item, partner[0], stamp_us)
 
     def clear(self) -> None:
         """Drop what waits, as at a press: what comes next is newer."""
-        for stream in (self._depth, self._color):
+        for stream in (self.depth, self.color):
             stream.drop(len(stream.items))
             stream.last_us = None
 
     def _add(
-        self, own: "_Stream[T]", other: "_Stream[U]", stamp_us: int, item: T
-    ) -> tuple[int, U] | None:
+        self, own: "_Stream", other: "_Stream", stamp_us: int, item: Any
+    ) -> tuple[int, Any] | None:
         """Take the nearest partner from the other stream, or let the item wait."""
         if own.last_us is not None and stamp_us <= own.last_us:
             self.clear()  # the sensor's clock started over
@@ -100,13 +86,13 @@ class Pairer(Generic[D, C]):
         return other.items.popleft()
 
 
-class _Stream(Generic[T]):
-    """What waits of one stream, oldest first, with its stamps."""
+@dataclass
+class _Stream:
+    """What waits of one stream, oldest first, with its stamps, and how many were dropped."""
 
-    def __init__(self) -> None:
-        self.items: deque[tuple[int, T]] = deque()
-        self.last_us: int | None = None
-        self.dropped = 0
+    items: deque[tuple[int, Any]] = field(default_factory=deque)
+    last_us: int | None = None
+    dropped: int = 0
 
     def drop(self, count: int) -> None:
         """Drop the oldest `count`, if any."""

@@ -10,24 +10,19 @@ URI                what it opens
 ================== ===============================================================================
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Protocol, Self, runtime_checkable
+from typing import Protocol, Self, runtime_checkable
 
-from denseface.capture._calibration_choice import ChosenCalibration, choose_calibration
-from denseface.capture.calibration import Calibration
+from denseface.capture.calibration import Calibration, choose_calibration
 from denseface.capture.errors import UnreadableSourceError
 from denseface.capture.frame import RgbdFrame
 
 __all__ = ["Source", "open_source"]
 
-_SOURCES = {
-    ".npz": "npz:NpzSource",
-    ".oni": "openni2:RecordingSource",
-    "openni2:": "openni2:LiveSource",
-}
+_SOURCES = {".npz": "npz:NpzSource", ".oni": "openni2:RecordingSource",
+            "openni2:": "openni2:LiveSource"}
 """A file's ending or a sensor's scheme, and which class of which module of `capture` opens it.
 
 The class is imported when first needed, and called with the file's path (of a sensor: with what
@@ -56,18 +51,11 @@ class Source(Protocol):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
-def open_source(
-    uri: str | Path, calibration: Calibration | str | Path | None = None
-) -> Source:
+def open_source(uri: str | Path, calibration: Calibration | str | Path | None = None) -> Source:
     """Open a recording, a frame file or a live sensor.
 
     Parameters
@@ -89,25 +77,20 @@ def open_source(
         The OpenNI2 library, the device or one of its streams is missing.
     """
     text = str(uri)
-    for scheme in filter(lambda kind: kind.endswith(":"), _SOURCES):
-        if text.lower().startswith(scheme):
-            address = text[len(scheme):] or None
-            return _opener(scheme)(address, choose_calibration(None, calibration))
-    path = Path(text)
-    ending = path.suffix.lower()
-    if ending not in _SOURCES:
-        raise UnreadableSourceError(f"{text}: not a known kind of source; {_accepted()}")
-    if not path.is_file():
-        found = "is a folder, not a file" if path.is_dir() else "no such file"
-        raise UnreadableSourceError(f"{text}: {found}")
-    return _opener(ending)(path, choose_calibration(path, calibration))
-
-
-def _opener(kind: str) -> Callable[[Any, ChosenCalibration | None], Source]:
+    scheme, colon, address = text.partition(":")
+    kind, path = scheme.lower() + colon, None
+    if not colon or kind not in _SOURCES:
+        path = Path(text)
+        kind = path.suffix.lower()
+        if kind not in _SOURCES:
+            raise UnreadableSourceError(f"{text}: not a known kind of source; {_accepted()}")
+        if not path.is_file():
+            found = "is a folder, not a file" if path.is_dir() else "no such file"
+            raise UnreadableSourceError(f"{text}: {found}")
     module, name = _SOURCES[kind].split(":")
-    opener: Callable[[Any, ChosenCalibration | None], Source] = getattr(
-        import_module(f"denseface.capture.{module}"), name)
-    return opener
+    opener = getattr(import_module(f"denseface.capture.{module}"), name)
+    source: Source = opener(path or address or None, choose_calibration(path, calibration))
+    return source
 
 
 def _accepted() -> str:

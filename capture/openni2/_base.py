@@ -1,20 +1,15 @@
 """What recordings and live sensors share: a device, its streams, a calibration, pairs."""
 
-from abc import abstractmethod
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
-from denseface.capture._calibration_choice import ChosenCalibration
+from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.errors import FrameError, SensorError
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.openni2._calibration import derive_calibration
-from denseface.capture.openni2._library import close_at_exit, close_handle
+from denseface.capture.openni2._library import close_handle, open_sources
 from denseface.capture.openni2._streams import COLOR, DEPTH, Image, Streams
 from denseface.capture.pairing import Pair, Pairer
 from denseface.capture.source import Source
-
-__all__ = ["OpenNI2Source"]
 
 
 class OpenNI2Source(Source):
@@ -36,10 +31,6 @@ class OpenNI2Source(Source):
     def __del__(self) -> None:
         self.close()
 
-    @abstractmethod
-    def __iter__(self) -> Iterator[RgbdFrame]:
-        """Give the pairs as frames."""
-
     def close(self) -> None:
         """Stop the streams and close the device; harmless when repeated."""
         if self._streams is not None:
@@ -49,15 +40,11 @@ class OpenNI2Source(Source):
             close_handle(self._device)
             self._device = None
 
-    def holds(self, path: Path) -> bool:  # noqa: ARG002
-        """Say whether this is an open source of that file."""
-        return False
-
-    def _open_streams(self, openni2: Any, device: Any) -> Streams:
+    def _open_streams(self, device: Any) -> Streams:
         self._device = device
-        close_at_exit(self)
+        open_sources.add(self)
         try:
-            streams = self._streams = Streams(openni2, device, self._name, live=self._live)
+            streams = self._streams = Streams(device, self._name, live=self._live)
             if self._chosen is None:
                 calibration, derivation = derive_calibration(
                     streams.properties, streams.size(DEPTH), streams.size(COLOR))

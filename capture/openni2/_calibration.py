@@ -10,8 +10,6 @@ from typing import TypeGuard
 
 from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
 
-__all__ = ["SensorProperties", "derive_calibration"]
-
 _ZPPS_COLUMNS = 1280
 """Columns of the image whose pixels ZPPS is given in."""
 _KINECT_FOCAL, _XTION_FOCAL, _COLOR_FOCAL = 575.8, 570.3, 525.0
@@ -55,9 +53,7 @@ def derive_calibration(
     -------
     the calibration, and in words what it was derived from
     """
-    derivation = []
-    p = properties
-    width = depth_size[0]
+    derivation, p, width = [], properties, depth_size[0]
     if _positive(p.zpd_mm) and _positive(p.zpps_mm):
         depth_focal = p.zpd_mm / p.zpps_mm * width / _ZPPS_COLUMNS
         derivation += [f"ZPD {p.zpd_mm}", f"ZPPS {p.zpps_mm:.6g}"]
@@ -69,12 +65,9 @@ def derive_calibration(
                          else ("Kinect v1", _KINECT_FOCAL))
         depth_focal = focal * width / _FOCAL_COLUMNS
         derivation.append(f"default depth f {depth_focal:.1f} ({sensor})")
-    baseline_cm = _BASELINE_CM
-    if _positive(p.dcrcdis_cm):
-        baseline_cm = p.dcrcdis_cm
-        derivation.append(f"DCRCDIS {baseline_cm:.6g}")
-    else:
-        derivation.append(f"default DCRCDIS {baseline_cm}")
+    known = _positive(p.dcrcdis_cm)
+    baseline_cm = p.dcrcdis_cm if _positive(p.dcrcdis_cm) else _BASELINE_CM
+    derivation.append(f"{'' if known else 'default '}DCRCDIS {baseline_cm:.6g}")
     if _is_angle(p.color_fov):
         color_focal = color_size[0] / 2 / math.tan(p.color_fov / 2)
         derivation.append(f"color field of view {math.degrees(p.color_fov):.1f} deg")

@@ -4,14 +4,22 @@ import atexit
 import os
 import sysconfig
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from weakref import WeakSet
 
-from denseface.capture.errors import SensorError
+from primesense import _openni2 as c_api
+from primesense import openni2
+from primesense.utils import OpenNIError
 
-__all__ = ["close_at_exit", "close_handle", "error_text", "find_library", "load", "lost_devices",
-           "open_sources"]
+from denseface.capture.errors import CaptureError, SensorError
+
+open_sources: WeakSet[Any] = WeakSet()
+"""Sources that may be open: closed before the library is unloaded, where their owner forgets to."""
+lost_devices: set[bytes] = set()
+"""URIs of the devices that were unplugged or failed since they were opened."""
 
 _NAME = "libOpenNI2.so"
 """File name of the library."""
@@ -23,7 +31,6 @@ _ERRORS_ONLY = 3
 _lock = threading.Lock()
 _loaded_pid: int | None = None
 _listener: Any = None
-_sources: WeakSet[Any] = WeakSet()
 
 
 def find_library() -> Path:
@@ -44,9 +51,8 @@ def find_library() -> Path:
                 return folder
             raise SensorError(f"{variable}={value}: no {_NAME} in that folder")
     multiarch = sysconfig.get_config_var("MULTIARCH")
-    folders = [Path("/usr/lib"), Path("/usr/local/lib")]
-    if multiarch:
-        folders = [root / str(multiarch) for root in folders] + folders
+    roots = [Path("/usr/lib"), Path("/usr/local/lib")]
+    folders = [root / str(multiarch) for root in roots if multiarch] + roots
     for folder in folders:
         if (folder / _NAME).is_file():
             return folder
@@ -55,10 +61,8 @@ def find_library() -> Path:
         f"libopenni2-dev (apt install libopenni2-dev), or name the folder in OPENNI2_REDIST")
 
 
-def load() -> Any:
-    """Give the `primesense.openni2` module, initialised.
-
-    It stays loaded until the process ends: a second initialisation crashes.
+def load() -> None:
+    """Load and initialise the library, until the process ends: a second initialisation crashes.
 
     Raises
     ------
@@ -67,57 +71,44 @@ def load() -> Any:
     """
     global _loaded_pid, _listener
     with _lock:
-        from primesense import _openni2 as c_api
-        from primesense import openni2
-        from primesense.utils import OpenNIError
-
         if _loaded_pid is not None:
             if _loaded_pid != os.getpid():
                 raise SensorError("OpenNI2 was loaded before this process was forked: start "
                                   "processes by spawn, or open the sensor in the child alone")
-            return openni2
+            return
         folder = find_library()
         try:
             c_api.load_dll(str(folder / _NAME))
-            _silence_logging(c_api)
+            _silence_logging()
             # The binding's own loading would change the working directory.
             openni2.loaded_dll_directory = str(folder)
             openni2.initialize()
-            _silence_logging(c_api)
-            _listener = _make_listener(openni2)
+            _silence_logging()
+            _listener = _Listener()
         except (OSError, AttributeError, ValueError, OpenNIError) as error:
             raise SensorError(f"{folder / _NAME}: OpenNI2 cannot be loaded: "
                               f"{error_text(error)}") from error
         # Before the binding's own clean-up, which destroys streams in any order.
         atexit.register(_close_all)
         _loaded_pid = os.getpid()
-        return openni2
-
-
-def close_at_exit(source: Any) -> None:
-    """Close a source before the library is unloaded, where its owner forgets to."""
-    _sources.add(source)
-
-
-def open_sources() -> list[Any]:
-    """Give the sources that may be open."""
-    return list(_sources)
 
 
 def _close_all() -> None:
-    for source in open_sources():
+    for source in list(open_sources):
         source.close()
 
 
-def lost_devices() -> set[bytes]:
-    """Give the URIs of the devices that were unplugged or failed since they were opened."""
-    return _listener.lost if _listener is not None else set()
+@contextmanager
+def binding_errors(what: str, kind: type[CaptureError] = SensorError) -> Iterator[None]:
+    """Turn an error of the binding into one of `kind` that says what failed."""
+    try:
+        yield
+    except OpenNIError as error:
+        raise kind(f"{what}: {error_text(error)}") from error
 
 
 def close_handle(handle: Any) -> None:
     """Close a device or stream of the binding; one that is gone may refuse."""
-    from primesense.utils import OpenNIError
-
     try:
         handle.close()
     except OpenNIError:
@@ -134,29 +125,22 @@ def error_text(error: BaseException) -> str:
     return repr(code).split(".")[-1] if code is not None else str(error) or type(error).__name__
 
 
-def _silence_logging(c_api: Any) -> None:
+def _silence_logging() -> None:
     """Create no Log folder in the working directory and print nothing."""
     c_api.oniSetLogFileOutput(False)
     c_api.oniSetLogConsoleOutput(False)
     c_api.oniSetLogMinSeverity(_ERRORS_ONLY)
 
 
-def _make_listener(openni2: Any) -> Any:
-    class Listener(openni2.DeviceListener):  # type: ignore[misc]
-        """Records lost devices. The binding's own handlers use sets that do not exist yet."""
+class _Listener(openni2.DeviceListener):  # type: ignore[misc]
+    """Records lost devices. The binding's own handlers use sets that do not exist yet."""
 
-        def __init__(self) -> None:
-            self.lost: set[bytes] = set()
-            super().__init__()
+    def _on_connected(self, info: Any, _: Any) -> None:
+        """A device that came back has to be opened anew: it stays lost."""
 
-        def _on_connected(self, info: Any, _: Any) -> None:
-            """A device that came back has to be opened anew: it stays lost."""
+    def _on_disconnected(self, info: Any, _: Any) -> None:
+        lost_devices.add(bytes(info[0].uri))
 
-        def _on_disconnected(self, info: Any, _: Any) -> None:
-            self.lost.add(bytes(info[0].uri))
-
-        def _on_state_changed(self, info: Any, state: Any, _: Any) -> None:
-            if int(state) == 1:  # ONI_DEVICE_STATE_ERROR
-                self.lost.add(bytes(info[0].uri))
-
-    return Listener()
+    def _on_state_changed(self, info: Any, state: Any, _: Any) -> None:
+        if int(state) == 1:  # ONI_DEVICE_STATE_ERROR
+            lost_devices.add(bytes(info[0].uri))

@@ -3,14 +3,14 @@
 import time
 from collections.abc import Iterator
 
-from denseface.capture._calibration_choice import ChosenCalibration
+from primesense import openni2
+
+from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.errors import SensorError, SensorTimeoutError
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.openni2._base import OpenNI2Source
-from denseface.capture.openni2._library import error_text, load, lost_devices
+from denseface.capture.openni2._library import binding_errors, load, lost_devices
 from denseface.capture.openni2._streams import COLOR, DEPTH, Streams
-
-__all__ = ["LiveSource"]
 
 _SLICE_S = 0.1
 """Longest single wait, seconds: Ctrl-C and an unplugged sensor are noticed in between."""
@@ -50,9 +50,7 @@ class LiveSource(OpenNI2Source):
         super().__init__(f"openni2:{device_uri or ''}", chosen)
         self.timeout_s = timeout_s
         self._last_read = float("-inf")
-        openni2 = load()
-        from primesense.utils import OpenNIError
-
+        load()
         found = openni2.Device.enumerate_uris()
         if not found:
             raise SensorError(f"{self._name}: OpenNI2 finds no sensor")
@@ -61,13 +59,11 @@ class LiveSource(OpenNI2Source):
         if wanted not in found:
             known = ", ".join(uri.decode("utf-8", "replace") for uri in found)
             raise SensorError(f"{self._name}: no such sensor; found: {known}")
-        try:
+        with binding_errors(f"{self._name}: cannot be opened"):
             device = openni2.Device(wanted)
-        except OpenNIError as error:
-            raise SensorError(f"{self._name}: cannot be opened: {error_text(error)}") from error
         self._device_uri = bytes(device.uri)
-        lost_devices().discard(self._device_uri)
-        self._open_streams(openni2, device)
+        lost_devices.discard(self._device_uri)
+        self._open_streams(device)
         if start:
             self.start()
 
@@ -127,6 +123,6 @@ class LiveSource(OpenNI2Source):
         return self._streams
 
     def _check_present(self) -> None:
-        if self._device_uri in lost_devices():
-            raise SensorError(f"{self._name}: the sensor {self._device_uri.decode()} was unplugged "
-                              "or failed")
+        if self._device_uri in lost_devices:
+            raise SensorError(
+                f"{self._name}: the sensor {self._device_uri.decode()} was unplugged or failed")

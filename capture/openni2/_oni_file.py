@@ -6,6 +6,7 @@ file header; each is ``NIR\0``, uint32 type, node, size of fields, size of paylo
 position, fields, payload; all little-endian.
 """
 
+import os
 import struct
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -13,8 +14,6 @@ from pathlib import Path
 from typing import BinaryIO
 
 from denseface.capture.errors import UnreadableSourceError
-
-__all__ = ["DEPTH_NODE", "IMAGE_NODE", "OniNode", "check_oni", "written_frames"]
 
 DEPTH_NODE, IMAGE_NODE = 2, 3
 """Kinds of node, as in a record that adds one."""
@@ -69,17 +68,15 @@ def check_oni(path: Path) -> tuple[list[OniNode], int]:
     UnreadableSourceError
         The file is missing, not an `.oni`, damaged, or was never finished.
     """
+    nodes: dict[int, OniNode] = {}
     try:
         with path.open("rb") as file:
-            size = file.seek(0, 2)
-            file.seek(0)
-            nodes: dict[int, OniNode] = {}
-            end = _walk(str(path), file, size, nodes)
-            return list(nodes.values()), end
+            end = _walk(path, file, nodes)
+    except UnreadableSourceError:
+        raise
     except OSError as error:
-        if isinstance(error, UnreadableSourceError):
-            raise
         raise UnreadableSourceError(f"{path}: {error.strerror or error}") from error
+    return list(nodes.values()), end
 
 
 def written_frames(path: Path) -> int:
@@ -89,15 +86,14 @@ def written_frames(path: Path) -> int:
     """
     nodes: dict[int, OniNode] = {}
     with suppress(UnreadableSourceError, OSError), path.open("rb") as file:
-        size = file.seek(0, 2)
-        file.seek(0)
-        _walk(str(path), file, size, nodes)
+        _walk(path, file, nodes)
     found = {node.kind: node.frames for node in nodes.values()}
     return min(found.get(DEPTH_NODE, 0), found.get(IMAGE_NODE, 0))
 
 
-def _walk(name: str, file: BinaryIO, size: int, nodes: dict[int, OniNode]) -> int:
+def _walk(name: Path, file: BinaryIO, nodes: dict[int, OniNode]) -> int:
     """Fill in the nodes; give where the end record ends."""
+    size = os.fstat(file.fileno()).st_size
     header = file.read(_HEADER.size)
     if not header:
         raise UnreadableSourceError(f"{name}: the file is empty")
@@ -108,9 +104,8 @@ def _walk(name: str, file: BinaryIO, size: int, nodes: dict[int, OniNode]) -> in
     while True:
         raw = file.read(_RECORD.size)
         if len(raw) < _RECORD.size:
-            raise UnreadableSourceError(
-                f"{name}: ends after {size} bytes without an end record: cut off, or the "
-                f"recorder was not closed")
+            raise UnreadableSourceError(f"{name}: ends after {size} bytes without an end record: "
+                                        "cut off, or the recorder was not closed")
         magic, kind, node, fields, payload, _ = _RECORD.unpack(raw)
         body = fields - _RECORD.size
         if magic != b"NIR\0" or not 0 <= body <= _MAX_FIELDS:
@@ -135,13 +130,13 @@ def _walk(name: str, file: BinaryIO, size: int, nodes: dict[int, OniNode]) -> in
             nodes[node].frames += 1
 
 
-def _text(name: str, content: bytes) -> tuple[str, bytes]:
+def _text(name: Path, content: bytes) -> tuple[str, bytes]:
     """Split a counted, zero-ended string from what follows it."""
     length = _U32.unpack_from(content)[0] if len(content) >= _U32.size else 0
     end = _U32.size + length
-    text = content[_U32.size:end]
+    text = content[_U32.size:end].decode("latin-1")
     # OpenNI2 crashes on a byte outside ASCII: it indexes a hash table with it, signed.
-    if end > len(content) or text[-1:] != b"\0" or not text[:-1].decode("latin-1").isprintable() \
-            or not text.isascii():
+    if (end > len(content) or text[-1:] != "\0" or not text.isascii()
+            or not text[:-1].isprintable()):
         raise UnreadableSourceError(f"{name}: damaged: a record has no valid name")
-    return text[:-1].decode("ascii"), content[end:]
+    return text[:-1], content[end:]

@@ -10,8 +10,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["ascii_name"]
-
 _MAX_BYTES = 255
 """Bytes of a name."""
 

@@ -4,17 +4,16 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from denseface.capture._calibration_choice import ChosenCalibration
-from denseface.capture.calibration import MAX_SIDE
+from primesense import openni2
+
+from denseface.capture.calibration import MAX_SIDE, ChosenCalibration
 from denseface.capture.errors import SensorError, UnreadableSourceError
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.openni2._base import OpenNI2Source
-from denseface.capture.openni2._library import error_text, load, open_sources
+from denseface.capture.openni2._library import binding_errors, load, open_sources
 from denseface.capture.openni2._oni_file import DEPTH_NODE, IMAGE_NODE, OniNode, check_oni
 from denseface.capture.openni2._path import ascii_name
 from denseface.capture.openni2._streams import COLOR, DEPTH, Streams
-
-__all__ = ["RecordingSource"]
 
 _FILE_WAIT_S = 2.0
 """Longest wait for a frame of a file, seconds: longer, and the file is damaged."""
@@ -60,15 +59,13 @@ class RecordingSource(OpenNI2Source):
         return node
 
     def __iter__(self) -> Iterator[RgbdFrame]:
-        if not self._unread or self._streams is None:
+        streams = self._streams
+        if not self._unread or streams is None:
             # Seeking hangs, so each new pass opens the file again.
             self.close()
-            self._open()
+            streams = self._open()
         self._unread = False
         self.pairer.clear()
-        streams = self._streams
-        if streams is None:
-            raise SensorError(f"{self.uri}: is closed")
         streams.start()
         left = dict(self._expected)
         while max(left.values()) > 0 and self._streams is streams:
@@ -98,29 +95,23 @@ class RecordingSource(OpenNI2Source):
             time.sleep(_SETTLE_S)
         super().close()
 
-    def holds(self, path: Path) -> bool:
-        """Say whether this is an open source of that file."""
-        return self._streams is not None and Path(self.uri).absolute() == path
-
     def _open(self) -> Streams:
-        openni2 = load()
-        from primesense.utils import OpenNIError
-
+        load()
+        path = Path(self.uri).absolute()
+        # Devices that were opened by the same name share their position in the file.
+        again = any(other is not self and other._streams is not None
+                    and Path(other.uri).absolute() == path for other in list(open_sources))
         try:
-            # Devices that were opened by the same name share their position in the file.
-            path = Path(self.uri).absolute()
-            again = any(other is not self and other.holds(path) for other in open_sources())
-            with ascii_name(path, unique=again) as name:
-                device = openni2.Device.open_file(name)
-            if not device.is_file():
-                device.close()
-                raise UnreadableSourceError(f"{self.uri}: OpenNI2 does not take it as a recording")
-            # A float: the binding would reinterpret an int's bits as one.
-            device.playback.set_speed(-1.0)
-            device.playback.set_repeat_enabled(False)
-            return self._open_streams(openni2, device)
-        except OpenNIError as error:
-            raise UnreadableSourceError(
-                f"{self.uri}: OpenNI2 cannot open it: {error_text(error)}") from error
+            with binding_errors(f"{self.uri}: OpenNI2 cannot open it", UnreadableSourceError):
+                with ascii_name(path, unique=again) as name:
+                    device = openni2.Device.open_file(name)
+                if not device.is_file():
+                    device.close()
+                    raise UnreadableSourceError(
+                        f"{self.uri}: OpenNI2 does not take it as a recording")
+                # A float: the binding would reinterpret an int's bits as one.
+                device.playback.set_speed(-1.0)
+                device.playback.set_repeat_enabled(False)
+                return self._open_streams(device)
         except SensorError as error:
             raise UnreadableSourceError(str(error)) from error

@@ -7,13 +7,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from primesense import openni2
+from primesense.utils import OpenNIError
 
 from denseface.capture.calibration import MAX_SIDE
 from denseface.capture.errors import SensorError
 from denseface.capture.openni2._calibration import SensorProperties
-from denseface.capture.openni2._library import close_handle, error_text
-
-__all__ = ["COLOR", "DEPTH", "Image", "Streams"]
+from denseface.capture.openni2._library import binding_errors, close_handle
 
 DEPTH, COLOR = "depth", "color"
 """Kinds of stream."""
@@ -27,6 +27,10 @@ _ZPD, _ZPPS, _DCRCDIS = 0x1080100C, 0x1080100D, 0x1080100F
 _LIVE_SIZE, _LIVE_FPS = (640, 480), 30
 """Video mode of live sensors: pixels, frames a second."""
 _C = TypeVar("_C", bound="ctypes._SimpleCData[Any]")
+_1_MM, _100_UM = int(openni2.PIXEL_FORMAT_DEPTH_1_MM), int(openni2.PIXEL_FORMAT_DEPTH_100_UM)
+_PIXEL_FORMATS = {DEPTH: {_1_MM: "depth in 1 mm", _100_UM: "depth in 100 um"},
+                  COLOR: {int(openni2.PIXEL_FORMAT_RGB888): "RGB888"}}
+"""What can be read of each kind of stream, the best first, and how messages name it."""
 
 
 @dataclass
@@ -43,7 +47,6 @@ class Streams:
 
     Parameters
     ----------
-    openni2 : the loaded binding
     device : an open `openni2.Device`; it stays the caller's
     name : of the source, for messages
     live : ask for 640x480 at 30 frames a second; a recording has its own modes
@@ -54,13 +57,9 @@ class Streams:
         A stream is missing or has no mode that can be used.
     """
 
-    def __init__(self, openni2: Any, device: Any, name: str, *, live: bool) -> None:
-        self._openni2 = openni2
+    def __init__(self, device: Any, name: str, *, live: bool) -> None:
         self._name = name
         self._streams: dict[str, _Stream] = {}
-        from primesense.utils import OpenNIError
-
-        self._error = OpenNIError
         try:
             # Both are created before either starts: a sensor may send from the first start on.
             for kind in (DEPTH, COLOR):
@@ -73,16 +72,13 @@ class Streams:
     def start(self) -> None:
         """Start both, before any `wait` or `read`."""
         for kind, stream in self._streams.items():
-            try:
+            with binding_errors(f"{self._name}: the {kind} stream does not start"):
                 stream.handle.start()
-            except self._error as error:
-                raise SensorError(f"{self._name}: the {kind} stream does not start: "
-                                  f"{error_text(error)}") from error
 
     def stop(self) -> None:
         """Stop both; a device that is gone may refuse."""
         for stream in self._streams.values():
-            with suppress(self._error):
+            with suppress(OpenNIError):
                 stream.handle.stop()
 
     def handle(self, kind: str) -> Any:
@@ -99,21 +95,15 @@ class Streams:
         A `read` of what was not announced here may block for ever.
         """
         handles = [self.handle(kind) for kind in kinds]
-        try:
-            ready = self._openni2.wait_for_any_stream(handles, timeout_s)
-        except self._error as error:
-            raise SensorError(f"{self._name}: waiting for a frame failed: "
-                              f"{error_text(error)}") from error
+        with binding_errors(f"{self._name}: waiting for a frame failed"):
+            ready = openni2.wait_for_any_stream(handles, timeout_s)
         return next((k for k, h in zip(kinds, handles, strict=True) if h is ready), None)
 
     def read(self, kind: str) -> Image:
         """Copy the frame that `wait` announced out of the driver's memory."""
         stream = self._streams[kind]
-        try:
+        with binding_errors(f"{self._name}: reading a {kind} frame failed"):
             frame = stream.handle.read_frame()
-        except self._error as error:
-            raise SensorError(f"{self._name}: reading a {kind} frame failed: "
-                              f"{error_text(error)}") from error
         try:
             return int(frame.timestamp), self._copy(stream, frame)
         finally:
@@ -127,19 +117,13 @@ class Streams:
 
     def _create(self, device: Any, kind: str, *, live: bool) -> _Stream:
         make = device.create_depth_stream if kind == DEPTH else device.create_color_stream
-        try:
+        with binding_errors(f"{self._name}: the {kind} stream cannot be opened"):
             handle = make()
-        except self._error as error:
-            raise SensorError(f"{self._name}: the {kind} stream cannot be opened: "
-                              f"{error_text(error)}") from error
         if handle is None:
             raise SensorError(f"{self._name}: has no {kind} stream; depth and color are needed")
         try:
-            return self._configure(device, kind, handle, live=live)
-        except self._error as error:
-            close_handle(handle)
-            raise SensorError(f"{self._name}: the {kind} stream has no video mode: "
-                              f"{error_text(error)}") from error
+            with binding_errors(f"{self._name}: the {kind} stream has no video mode"):
+                return self._configure(device, kind, handle, live=live)
         except BaseException:
             close_handle(handle)
             raise
@@ -148,11 +132,10 @@ class Streams:
         if live:
             self._choose_mode(device, kind, handle)
         mode = handle.video_mode
-        accepted = _pixel_formats(self._openni2, kind)
-        if int(mode.pixelFormat) not in accepted:
-            raise SensorError(
-                f"{self._name}: the {kind} stream is {_format_name(mode.pixelFormat)}, "
-                f"expected {' or '.join(accepted.values())}")
+        if int(mode.pixelFormat) not in _PIXEL_FORMATS[kind]:
+            found = repr(mode.pixelFormat).split("PIXEL_FORMAT_")[-1]
+            raise SensorError(f"{self._name}: the {kind} stream is {found}, "
+                              f"expected {' or '.join(_PIXEL_FORMATS[kind].values())}")
         if not (0 < mode.resolutionX <= MAX_SIDE and 0 < mode.resolutionY <= MAX_SIDE):
             raise SensorError(f"{self._name}: the {kind} stream is {mode.resolutionX}x"
                               f"{mode.resolutionY}, expected sides of 1 to {MAX_SIDE}")
@@ -162,40 +145,31 @@ class Streams:
     def _choose_mode(self, device: Any, kind: str, handle: Any) -> None:
         modes = [(int(m.resolutionX), int(m.resolutionY), int(m.fps), int(m.pixelFormat))
                  for m in device.get_sensor_info(handle.sensor_type).videoModes]
-        for pixel_format in _pixel_formats(self._openni2, kind):
+        for pixel_format in _PIXEL_FORMATS[kind]:
             wanted = (*_LIVE_SIZE, _LIVE_FPS, pixel_format)
             if wanted in modes:
                 handle.configure_mode(*wanted)
                 return
         raise SensorError(
             f"{self._name}: the {kind} stream does not offer 640x480 at 30 frames a second as "
-            f"{' or '.join(_pixel_formats(self._openni2, kind).values())}")
+            f"{' or '.join(_PIXEL_FORMATS[kind].values())}")
 
     def _mirrored(self, handle: Any) -> bool:
         """Switch mirroring off; where that fails, as on recordings, say whether it is on."""
-        with suppress(self._error):
+        with suppress(OpenNIError):
             handle.set_mirroring_enabled(False)
-        try:
-            return bool(handle.get_property(_MIRRORING, ctypes.c_int).value)
-        except self._error:
-            return False
+        return bool(_property(handle, _MIRRORING, ctypes.c_int))
 
     def _read_properties(self, device: Any) -> SensorProperties:
         depth, color = self.handle(DEPTH), self.handle(COLOR)
         return SensorProperties(
-            zpd_mm=self._property(depth, _ZPD, ctypes.c_uint64),
-            zpps_mm=self._property(depth, _ZPPS, ctypes.c_double),
-            dcrcdis_cm=self._property(depth, _DCRCDIS, ctypes.c_double),
-            depth_fov=self._property(depth, _FOV, ctypes.c_float),
-            color_fov=self._property(color, _FOV, ctypes.c_float),
+            zpd_mm=_property(depth, _ZPD, ctypes.c_uint64),
+            zpps_mm=_property(depth, _ZPPS, ctypes.c_double),
+            dcrcdis_cm=_property(depth, _DCRCDIS, ctypes.c_double),
+            depth_fov=_property(depth, _FOV, ctypes.c_float),
+            color_fov=_property(color, _FOV, ctypes.c_float),
             usb_vendor=int(device.device_info.usbVendorId),
         )
-
-    def _property(self, handle: Any, number: int, kind: type[_C]) -> Any:
-        try:
-            return handle.get_property(number, kind).value
-        except self._error:
-            return None
 
     def _copy(self, stream: _Stream, frame: Any) -> NDArray[Any]:
         width, height = stream.size
@@ -208,23 +182,17 @@ class Streams:
                 f"bytes, expected {width}x{height} (cropping is not supported)")
         # The next read reuses this memory, and closing frees it.
         memory = ctypes.string_at(int(frame.data), size)
-        rows: NDArray[np.uint8] = np.ndarray(
-            (height, width * pixel), np.uint8, memory, 0, (stride, 1))
-        image: NDArray[Any] = rows.copy().reshape(height, width, pixel)
+        image: NDArray[Any] = np.ndarray((height, width, pixel), np.uint8, memory, 0,
+                                         (stride, pixel, 1)).copy()
         if stream.kind == DEPTH:
             image = image.view(np.uint16)[..., 0]
-            if stream.pixel_format == int(self._openni2.PIXEL_FORMAT_DEPTH_100_UM):
+            if stream.pixel_format == _100_UM:
                 image = ((image.astype(np.uint32) + 5) // 10).astype(np.uint16)
         return np.ascontiguousarray(image[:, ::-1]) if stream.mirrored else image
 
 
-def _pixel_formats(openni2: Any, kind: str) -> dict[int, str]:
-    if kind == DEPTH:
-        return {int(openni2.PIXEL_FORMAT_DEPTH_1_MM): "depth in 1 mm",
-                int(openni2.PIXEL_FORMAT_DEPTH_100_UM): "depth in 100 um"}
-    return {int(openni2.PIXEL_FORMAT_RGB888): "RGB888"}
-
-
-def _format_name(pixel_format: Any) -> str:
-    return repr(pixel_format).split("PIXEL_FORMAT_")[-1]
-
+def _property(handle: Any, number: int, kind: type[_C]) -> Any:
+    """Give a stream's property, None where it has none."""
+    with suppress(OpenNIError):
+        return handle.get_property(number, kind).value
+    return None

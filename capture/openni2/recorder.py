@@ -2,11 +2,14 @@
 
 import os
 import time
+from contextlib import closing
 from pathlib import Path
 
-from denseface.capture.errors import SensorError, SensorTimeoutError
+from primesense import openni2
+
+from denseface.capture.errors import SensorTimeoutError
 from denseface.capture.openni2 import LiveSource
-from denseface.capture.openni2._library import error_text, load
+from denseface.capture.openni2._library import binding_errors
 from denseface.capture.openni2._oni_file import check_oni, written_frames
 from denseface.capture.openni2._path import ascii_name
 from denseface.capture.openni2._streams import COLOR, DEPTH
@@ -63,32 +66,25 @@ def record(device_uri: str | None, path: str | Path, frames: int) -> int:
 
 
 def _record(device_uri: str | None, part: Path, frames: int) -> None:
-    openni2 = load()
-    from primesense.utils import OpenNIError
-
-    with LiveSource(device_uri, start=False) as source:
-        try:
-            with ascii_name(part) as name:
-                recorder = openni2.Recorder(name)
-            try:
-                # Both before the start: a stream that is attached later is not recorded.
-                for each in (DEPTH, COLOR):
-                    recorder.attach(source.streams.handle(each), each == COLOR)
-                recorder.start()
-                source.start()
-                left = {DEPTH: frames, COLOR: frames}
-                while max(left.values()) > 0:
-                    kind = source.streams.wait(_SILENCE_S)
-                    if kind is None:
-                        break
-                    source.streams.read(kind)
-                    left[kind] -= 1
-                _wait_until_written(part, frames)
-                recorder.stop()
-            finally:
-                recorder.close()
-        except OpenNIError as error:
-            raise SensorError(f"{part}: recording failed: {error_text(error)}") from error
+    with (LiveSource(device_uri, start=False) as source,
+          binding_errors(f"{part}: recording failed")):
+        with ascii_name(part) as name:
+            recorder = openni2.Recorder(name)
+        with closing(recorder):
+            # Both before the start: a stream that is attached later is not recorded.
+            for each in (DEPTH, COLOR):
+                recorder.attach(source.streams.handle(each), each == COLOR)
+            recorder.start()
+            source.start()
+            left = {DEPTH: frames, COLOR: frames}
+            while max(left.values()) > 0:
+                kind = source.streams.wait(_SILENCE_S)
+                if kind is None:
+                    break
+                source.streams.read(kind)
+                left[kind] -= 1
+            _wait_until_written(part, frames)
+            recorder.stop()
 
 
 def _wait_until_written(part: Path, frames: int) -> None:

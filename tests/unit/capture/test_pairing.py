@@ -44,12 +44,12 @@ def test_pairs_are_close_in_order_and_nothing_is_lost_uncounted(events, capacity
     for a, b in pairwise(pairs):
         assert a.depth_us < b.depth_us
         assert a.color_us < b.color_us
-    depth, color = pairer.waiting
+    depth, color = len(pairer.depth.items), len(pairer.color.items)
     assert depth <= capacity
     assert color <= capacity
     given_depth = sum(kind == "d" for kind, _ in events)
-    assert given_depth == len(pairs) + pairer.dropped_depth + depth
-    assert len(events) - given_depth == len(pairs) + pairer.dropped_color + color
+    assert given_depth == len(pairs) + pairer.depth.dropped + depth
+    assert len(events) - given_depth == len(pairs) + pairer.color.dropped + color
 
 
 @given(st.integers(1, 40), st.integers(-10_000, 10_000), st.data())
@@ -61,7 +61,7 @@ def test_every_frame_finds_its_partner_when_none_is_lost(length, skew, data):
         for i in range(length) for kind, offset in (("c", 0), ("d", skew)))
     pairs, pairer = feed([(kind, stamp) for stamp, kind in events])
     assert len(pairs) == length
-    assert pairer.dropped_depth == pairer.dropped_color == 0
+    assert pairer.depth.dropped == pairer.color.dropped == 0
     assert all(abs(pair.depth_us - pair.color_us - skew) <= 3_000 for pair in pairs)
 
 
@@ -83,13 +83,13 @@ def test_a_kinect_that_loses_frames_pairs_all_that_still_have_a_partner(length, 
 def test_the_nearest_partner_is_taken():
     pairs, pairer = feed([("c", 1_000), ("c", 12_000), ("d", 14_000)])
     assert [(pair.color_us, pair.depth_us) for pair in pairs] == [(12_000, 14_000)]
-    assert pairer.dropped_color == 1
+    assert pairer.color.dropped == 1
 
 
 def test_a_clock_that_starts_over_is_followed():
     pairs, pairer = feed([("d", 900_000), ("d", 10), ("c", 20), ("c", 900_001)])
     assert [(pair.depth_us, pair.color_us) for pair in pairs] == [(10, 20)]
-    assert pairer.dropped_depth == 1
+    assert pairer.depth.dropped == 1
 
 
 def test_clear_drops_what_waits():
@@ -97,7 +97,7 @@ def test_clear_drops_what_waits():
     pairer.add_depth(5, "old")
     pairer.clear()
     assert pairer.add_color(6, "new") is None
-    assert pairer.dropped_depth == 1
+    assert pairer.depth.dropped == 1
 
 
 @pytest.mark.parametrize("options", [{"tolerance_us": -1}, {"capacity": 0}])
