@@ -49,14 +49,14 @@ class Maintenance:
             return
         self._due = now + self._sweep_s
         try:
-            self._store.sweep(self._retention_s)
+            self._store.retention.sweep(self._retention_s)
             if self._retention_s is None:
                 return
-            old = self._store.expired(self._retention_s, _BATCH)
+            old = self._store.retention.expired(self._retention_s, _BATCH)
             if old:
                 with self._captures.transition(CaptureEvent.EXPIRED, *old) as state:
-                    self._store.remove(old, state)
-                self._store.erase(old)
+                    self._store.retention.remove(old, state)
+                self._store.retention.erase(old)
                 self._counters.add("removed", "retention", len(old))
                 self._log.info("removed after the retention", captures=len(old))
         except StoreError as error:
@@ -111,13 +111,13 @@ class Maintenance:
             known = self._store.find(message.capture_id)
             going = [message.capture_id] if known else []
         else:
-            going = self._store.accepted_before(message.before, _BATCH)
+            going = self._store.retention.accepted_before(message.before, _BATCH)
         if message.before is None:
             yield from self._presses.purge(message.capture_id)
         yield from self._remove(going)
         left = len(going) == _BATCH
         if message.everything and not left:
-            self._store.clear_quarantine()
+            self._store.retention.clear_quarantine()
         yield send(peer, messages.Removed(
             request=message.request, removed=len(going), left=left))
 
@@ -125,9 +125,9 @@ class Maintenance:
         if not capture_ids:
             return
         with self._captures.transition(CaptureEvent.PURGED, *capture_ids) as state:
-            self._store.remove(capture_ids, state)
+            self._store.retention.remove(capture_ids, state)
         self._jobs.forget(capture_ids)
-        self._store.erase(capture_ids)
+        self._store.retention.erase(capture_ids)
         self._counters.add("removed", "operator", len(capture_ids))
         self._log.info("removed by an operator", captures=len(capture_ids))
         yield from self._outcomes.removed(capture_ids)

@@ -19,7 +19,7 @@ __all__ = ["Retention"]
 
 
 class Retention:
-    """Removals of a `FolderStore`, which documents the methods of the same names.
+    """Removals of a `FolderStore`; errors are those of its methods.
 
     Parameters
     ----------
@@ -59,11 +59,19 @@ class Retention:
             " ORDER BY position LIMIT ?", CaptureState.REMOVED, until, limit)
 
     def remove(self, capture_ids: Sequence[str], state: CaptureState) -> None:
-        """Mark rows as removed."""
+        """Withdraw captures and their outcomes; `erase` or `sweep` does the rest.
+
+        Parameters
+        ----------
+        state : REMOVED, which no other method sees
+        """
         self._reserve.spend_on(lambda: self._mark(capture_ids, state))
 
     def erase(self, capture_ids: Sequence[str]) -> None:
-        """Erase the files of rows that are marked, then the rows."""
+        """Erase frames, faces, reports and rows of what was removed, so that none can be read.
+
+        Raises StoreError where a file cannot be erased: `sweep` tries again.
+        """
         self._reserve.spend_on(lambda: self._erase(capture_ids))
 
     def sweep(self, retention_s: float | None) -> None:

@@ -7,7 +7,6 @@ import os
 import shutil
 from collections.abc import Sequence
 from contextlib import suppress
-from datetime import datetime
 from pathlib import Path
 
 from denseface.recon.settings import Settings
@@ -33,7 +32,7 @@ from denseface.service.storage._capture_rows import (
 from denseface.service.storage._folder_layout import FolderLayout
 from denseface.service.storage._folder_lock import lock
 from denseface.service.storage._frame_cache import FrameCache
-from denseface.service.storage._record_file import store_error, wrap_os_errors
+from denseface.service.storage._record_file import wrap_os_errors
 from denseface.service.storage._recovery import recover
 from denseface.service.storage._retention import Retention
 from denseface.service.storage._store_clock import Clock, SystemClock, format_timestamp
@@ -86,19 +85,16 @@ class FolderStore(CaptureRows, Closing):
             database, store_clock, self._quarantine = recover(
                 self._layout, clock or SystemClock())
             super().__init__(database, store_clock)
-            self._epoch = database.meta("epoch") or ""
-            self._retention = Retention(
+            self.epoch = database.meta("epoch") or ""
+            """Name of this database; another one where it was rebuilt."""
+            self.retention = Retention(
                 self._layout, database, store_clock, self._quarantine, self._forget)
+            """Removals."""
         except OSError as error:
             os.close(self._lock)
             if isinstance(error, StoreError):
                 raise
             raise StoreError(f"{folder}: {error}") from error
-
-    @property
-    def epoch(self) -> str:
-        """Name of this database; another one where it was rebuilt."""
-        return self._epoch
 
     def close(self) -> None:
         """Save the store's clock, close the database and release the lock."""
@@ -109,10 +105,8 @@ class FolderStore(CaptureRows, Closing):
 
     def free_bytes(self) -> int:
         """Give the free space of the disk."""
-        try:
+        with wrap_os_errors(self._layout.frames):
             return shutil.disk_usage(self._layout.frames).free
-        except OSError as error:
-            raise store_error(self._layout.frames, error) from error
 
     def prepare_frame(
         self, frame: Packet, settings: Settings, settings_hash: str, pressed_by: str = ""
@@ -122,7 +116,7 @@ class FolderStore(CaptureRows, Closing):
         if not isinstance(message, Frame):
             raise TypeError(f"a Frame is accepted, found {message.kind}")
         capture_id = message.capture_id
-        self._retention.finish_erasing(capture_id)
+        self.retention.finish_erasing(capture_id)
         metadata = FrameMetadata(
             accepted_at=format_timestamp(self._clock.wall()), clock=self._clock.save(),
             settings=settings.model_dump_json(), settings_hash=settings_hash,
@@ -205,38 +199,6 @@ class FolderStore(CaptureRows, Closing):
         """Give the first outcome after a sequence number; raises as `outcome`."""
         return self._outcome("sequence > ? ORDER BY sequence", sequence)
 
-    def expired(self, retention_s: float, limit: int) -> list[str]:
-        """Give ids of what was finished longer ago than the retention, oldest first."""
-        return self._retention.expired(retention_s, limit)
-
-    def accepted_before(self, moment: datetime | None, limit: int) -> list[str]:
-        """Give ids of what was accepted before a time, oldest first; all where it is None."""
-        return self._retention.accepted_before(moment, limit)
-
-    def remove(self, capture_ids: Sequence[str], state: CaptureState) -> None:
-        """Withdraw captures and their outcomes; `erase` or `sweep` does the rest.
-
-        Parameters
-        ----------
-        state : REMOVED, which no other method sees
-        """
-        self._retention.remove(capture_ids, state)
-
-    def erase(self, capture_ids: Sequence[str]) -> None:
-        """Erase frames, faces, reports and rows of what was removed, so that none can be read.
-
-        Raises StoreError where a file cannot be erased: `sweep` tries again.
-        """
-        self._retention.erase(capture_ids)
-
-    def sweep(self, retention_s: float | None) -> None:
-        """Finish what `remove` began; remove what is in quarantine for longer than that."""
-        self._retention.sweep(retention_s)
-
-    def clear_quarantine(self) -> None:
-        """Remove all that is in quarantine."""
-        self._retention.clear_quarantine()
-
     def _forget(self, capture_ids: Sequence[str]) -> None:
         for capture_id in capture_ids:
             self._frame_cache.pop(capture_id)
@@ -250,7 +212,7 @@ class FolderStore(CaptureRows, Closing):
         if row is None:
             return None
         capture_id = row["capture_id"]
-        common = {"epoch": self._epoch, "sequence": row["sequence"], "capture_id": capture_id}
+        common = {"epoch": self.epoch, "sequence": row["sequence"], "capture_id": capture_id}
         if row["face_sha256"] is None:
             return Packet(CaptureFailed(
                 **common, error=row["error"], message=row["message"], dead=bool(row["dead"])))

@@ -134,9 +134,9 @@ def test_what_was_kept_is_as_old_after_a_rebuild(data):
         pass
     (data / "captures.sqlite3").unlink()
     with FolderStore(data, clock) as store:
-        assert store.expired(DAY, 9) == []
+        assert store.retention.expired(DAY, 9) == []
         clock.pass_time(10)
-        assert store.expired(DAY, 9) == ["done"]
+        assert store.retention.expired(DAY, 9) == ["done"]
 
 
 def test_a_frame_without_a_row_gets_its_row(data):
@@ -206,12 +206,12 @@ def test_quarantine_goes_after_the_retention(data):
     with FolderStore(data, clock) as store:
         with pytest.raises(StoreError):
             store.frame("waits")
-        store.sweep(DAY)
+        store.retention.sweep(DAY)
         assert len(reports(data)) == 1
         clock.pass_time(DAY)
-        store.sweep(None)
+        store.retention.sweep(None)
         assert len(reports(data)) == 1
-        store.sweep(DAY)
+        store.retention.sweep(DAY)
         assert list((data / "quarantine").iterdir()) == []
 
 
@@ -220,11 +220,11 @@ def test_quarantine_goes_with_its_capture(data):
     with FolderStore(data, FakeClock()) as store:
         with pytest.raises(StoreError):
             store.frame("waits")
-        store.remove(["dead"], CaptureState.REMOVED)
-        store.erase(["dead"])
+        store.retention.remove(["dead"], CaptureState.REMOVED)
+        store.retention.erase(["dead"])
         assert len(reports(data)) == 1
-        store.remove(["waits"], CaptureState.REMOVED)
-        store.erase(["waits"])
+        store.retention.remove(["waits"], CaptureState.REMOVED)
+        store.retention.erase(["waits"])
         assert list((data / "quarantine").iterdir()) == []
 
 
@@ -233,17 +233,17 @@ def test_a_removal_that_was_cut_short_is_finished(data, monkeypatch):
         raise StoreError("killed")
 
     with FolderStore(data, FakeClock()) as store:
-        monkeypatch.setattr(store._retention, "_erase", killed)
-        store.remove(["done", "waits"], CaptureState.REMOVED)
+        monkeypatch.setattr(store.retention, "_erase", killed)
+        store.retention.remove(["done", "waits"], CaptureState.REMOVED)
         with pytest.raises(StoreError):
-            store.erase(["done", "waits"])
+            store.retention.erase(["done", "waits"])
     monkeypatch.undo()
     with FolderStore(data, FakeClock()) as store:
         assert store.find("done") is None
         assert store.counts() == {CaptureState.FAILED: 1, CaptureState.DEAD: 1}
         accept(store, frame("done"), Settings(), "0f")
         assert store.find("done").state is CaptureState.ACCEPTED
-        store.sweep(None)
+        store.retention.sweep(None)
         assert store.find("done").state is CaptureState.ACCEPTED
         assert sorted(path.name for path in (data / "frames").iterdir()) == [
             "dead.frame", "done.frame", "failed.frame"]
@@ -302,17 +302,17 @@ def test_a_full_database_leaves_no_frame(data):
 
 def test_a_purge_makes_room_on_a_full_disk(data, monkeypatch):
     with FolderStore(data, FakeClock()) as store:
-        real = store._retention._mark
+        real = store.retention._mark
 
         def full(*arguments):
             if (data / "ballast").exists():
                 raise DiskFullError("no room on the disk")
             real(*arguments)
 
-        monkeypatch.setattr(store._retention, "_mark", full)
+        monkeypatch.setattr(store.retention, "_mark", full)
         assert (data / "ballast").stat().st_size == 2**20
-        store.remove(["waits"], CaptureState.REMOVED)
-        store.erase(["waits"])
+        store.retention.remove(["waits"], CaptureState.REMOVED)
+        store.retention.erase(["waits"])
         assert store.find("waits") is None
         assert (data / "ballast").stat().st_size == 2**20
 
