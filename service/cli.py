@@ -8,7 +8,6 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
-from types import FrameType
 from typing import NoReturn
 
 from denseface.service.commands import COMMANDS, load
@@ -27,7 +26,7 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and give its exit status."""
     args = _parser().parse_args(arguments)
-    signal.signal(signal.SIGTERM, _raise_exit)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))
     try:
         status: int = load(args.command).run(args)
         sys.stdout.flush()
@@ -82,17 +81,8 @@ class _Version(argparse.Action):
 
 def _exit_status(error: Exception) -> int:
     from denseface.capture.errors import CalibrationError, FrameError, UnreadableSourceError
-    from denseface.service.errors import (
-        FormatError,
-        LocalProtocolError,
-        SettingsError,
-        UsageError,
-    )
+    from denseface.service import errors
 
-    wrong_input = (CalibrationError, FrameError, UnreadableSourceError, FormatError,
-                   LocalProtocolError, SettingsError, UsageError)
+    wrong_input = (CalibrationError, FrameError, UnreadableSourceError, errors.FormatError,
+                   errors.LocalProtocolError, errors.SettingsError, errors.UsageError)
     return _USAGE if isinstance(error, wrong_input) else _FAILED
-
-
-def _raise_exit(number: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001
-    raise SystemExit(_TERMINATED)

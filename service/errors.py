@@ -9,31 +9,12 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
 __all__ = [
-    "AddressError",
-    "AuthenticatorStoppedError",
-    "CaptureFailedError",
-    "ClientClosedError",
-    "ClientTimeoutError",
-    "CorruptFileError",
-    "DamagedDatabaseError",
-    "DamagedFaceError",
-    "DiskFullError",
-    "FormatError",
-    "HubRunningError",
-    "KeyFileError",
-    "KeyRefusedError",
-    "LocalProtocolError",
-    "PressRefusedError",
-    "ProtocolError",
-    "RemoteProtocolError",
-    "RequestFailedError",
-    "ServiceError",
-    "SettingsError",
-    "StoreError",
-    "UnknownCaptureError",
-    "UsageError",
-    "first_error",
-    "reason_of",
+    "AddressError", "AuthenticatorStoppedError", "CaptureFailedError", "ClientClosedError",
+    "ClientTimeoutError", "CorruptFileError", "DamagedDatabaseError", "DamagedFaceError",
+    "DiskFullError", "FormatError", "HubRunningError", "KeyFileError", "KeyRefusedError",
+    "LocalProtocolError", "PressRefusedError", "ProtocolError", "RemoteProtocolError",
+    "RequestFailedError", "ServiceError", "SettingsError", "StoreError", "UnknownCaptureError",
+    "UsageError", "first_error", "reason_of",
 ]
 
 
@@ -121,12 +102,7 @@ class CorruptFileError(StoreError):
 
 
 class DamagedFaceError(CorruptFileError):
-    """The file of a face is damaged: the face must be computed again.
-
-    Attributes
-    ----------
-    capture_id : the capture
-    """
+    """The file of a capture's face is damaged: the face must be computed again."""
 
     def __init__(self, capture_id: str, reason: str) -> None:
         super().__init__(reason)

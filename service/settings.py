@@ -7,14 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import platformdirs
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationError,
-    field_validator,
-)
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from denseface.service.errors import SettingsError, first_error
 from denseface.service.runtime.parsing import parse_loopback_address, parse_retention
@@ -23,6 +16,10 @@ __all__ = ["ServiceSettings", "default_address", "runtime_folder"]
 
 _PREFIX = "DENSEFACE_"
 _Seconds = Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
+
+
+def _split(given: object) -> object:
+    return tuple(filter(None, given.split(","))) if isinstance(given, str) else given
 
 
 def runtime_folder() -> Path:
@@ -48,7 +45,7 @@ class ServiceSettings(BaseModel):
 
     address: str = Field(default_factory=default_address)
     """The hub's address: `ipc://PATH` or `tcp://HOST:PORT`."""
-    listen: Annotated[tuple[str, ...], Field(max_length=16)] = ()
+    listen: Annotated[tuple[str, ...], Field(max_length=16), BeforeValidator(_split)] = ()
     """More addresses of the hub, for peers with a key: `tcp://HOST:PORT`, several with commas."""
     keys: Path = Field(default_factory=lambda: platformdirs.user_config_path("denseface") / "keys")
     """Folder of the keys and of the hub's allow-list."""
@@ -80,11 +77,6 @@ class ServiceSettings(BaseModel):
     """Host and port of `/metrics` and `/healthz`, on this machine alone; None for neither."""
     resend_s: _Seconds = 2.0
     """Time after which an unanswered request or frame is sent again, seconds."""
-
-    @field_validator("listen", mode="before")
-    @classmethod
-    def _split(cls, given: object) -> object:
-        return tuple(filter(None, given.split(","))) if isinstance(given, str) else given
 
     @property
     def silence_s(self) -> float:

@@ -16,22 +16,10 @@ if TYPE_CHECKING:
     from denseface.service.client import Client, Operator
     from denseface.service.settings import ServiceSettings
 
-__all__ = ["add_address", "add_credentials", "add_data", "add_keys", "add_listen", "add_log",
-           "add_metrics", "add_outputs", "add_recon", "add_retention", "add_source", "client",
-           "count", "operator", "recon_settings", "repeated", "seconds", "service_settings",
-           "timestamp"]
 
-
-def add_address(parser: argparse.ArgumentParser) -> None:
-    """Add `--address`: where the hub is."""
-    parser.add_argument(
-        "--address", "--hub", metavar="ADDRESS",
-        help="the hub's, ipc://PATH or tcp://HOST:PORT (default: DENSEFACE_ADDRESS, "
-             "else this user's own)")
-
-
-def add_credentials(parser: argparse.ArgumentParser) -> None:
-    """Add `--key` and `--hub-key`, for a hub on another machine."""
+def add_client(parser: argparse.ArgumentParser) -> None:
+    """Add `--address`, `--key` and `--hub-key`, of a process that connects to a hub."""
+    _add_address(parser)
     parser.add_argument("--key", type=Path, metavar="FILE",
                         help="one's own secret key, for a hub on another machine "
                              "(default: DENSEFACE_KEY)")
@@ -39,8 +27,9 @@ def add_credentials(parser: argparse.ArgumentParser) -> None:
                         help="the public key of that hub (default: DENSEFACE_HUB_KEY)")
 
 
-def add_listen(parser: argparse.ArgumentParser) -> None:
-    """Add `--listen`, `--keys` and `--key`, for other machines to connect."""
+def add_hub(parser: argparse.ArgumentParser) -> None:
+    """Add all flags of the hub."""
+    _add_address(parser)
     parser.add_argument("--listen", action="append", metavar="tcp://HOST:PORT",
                         help="listen here too, for those with an allowed key; may be repeated "
                              "(default: DENSEFACE_LISTEN)")
@@ -48,40 +37,35 @@ def add_listen(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--key", type=Path, metavar="FILE",
                         help="the hub's secret key (default: DENSEFACE_KEY, else hub.secret in the "
                              "folder of keys)")
+    parser.add_argument("--data", type=Path, metavar="DIR",
+                        help="folder of frames and faces (default: DENSEFACE_DATA, else this "
+                             "user's data folder)")
+    parser.add_argument("--retention", metavar="TIME",
+                        help="remove captures so long after their outcome: 24h, 90m, 7d, or off "
+                             "(default: DENSEFACE_RETENTION, else 24h)")
+    parser.add_argument("--metrics", metavar="PORT",
+                        help="serve /metrics and /healthz on this loopback port; 0 chooses one and "
+                             "logs it (default: DENSEFACE_METRICS, else off)")
+    add_recon(parser)
+    add_log(parser)
+
+
+def _add_address(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--address", "--hub", metavar="ADDRESS",
+        help="the hub's, ipc://PATH or tcp://HOST:PORT (default: DENSEFACE_ADDRESS, "
+             "else this user's own)")
 
 
 def add_keys(parser: argparse.ArgumentParser) -> None:
-    """Add `--keys`: where keys are kept."""
     parser.add_argument("--keys", type=Path, metavar="DIR",
                         help="folder of keys (default: DENSEFACE_KEYS, else denseface/keys in this "
                              "user's configuration)")
 
 
 def add_log(parser: argparse.ArgumentParser) -> None:
-    """Add `--log`: how a process logs."""
     parser.add_argument("--log", choices=("text", "json"), default="text",
                         help="form of the log on stderr (default: text)")
-
-
-def add_data(parser: argparse.ArgumentParser) -> None:
-    """Add `--data`: where frames and faces are kept."""
-    parser.add_argument("--data", type=Path, metavar="DIR",
-                        help="folder of frames and faces (default: DENSEFACE_DATA, else this "
-                             "user's data folder)")
-
-
-def add_retention(parser: argparse.ArgumentParser) -> None:
-    """Add `--retention`: for how long captures are kept."""
-    parser.add_argument("--retention", metavar="TIME",
-                        help="remove captures so long after their outcome: 24h, 90m, 7d, or off "
-                             "(default: DENSEFACE_RETENTION, else 24h)")
-
-
-def add_metrics(parser: argparse.ArgumentParser) -> None:
-    """Add `--metrics`: where metrics are served."""
-    parser.add_argument("--metrics", metavar="PORT",
-                        help="serve /metrics and /healthz on this loopback port; 0 chooses one and "
-                             "logs it (default: DENSEFACE_METRICS, else off)")
 
 
 def add_source(parser: argparse.ArgumentParser) -> None:
@@ -111,13 +95,7 @@ def add_recon(parser: argparse.ArgumentParser) -> None:
 
 
 def recon_settings(args: argparse.Namespace) -> "Settings":
-    """Read `--preset` and `--set`.
-
-    Raises
-    ------
-    UsageError
-        One line that names the setting, what was found and what was expected.
-    """
+    """Read `--preset` and `--set`; raises `UsageError`, which names the setting that is wrong."""
     from pydantic import ValidationError
 
     from denseface.recon.settings import Settings
@@ -139,16 +117,13 @@ def recon_settings(args: argparse.Namespace) -> "Settings":
 
 
 def service_settings(args: argparse.Namespace) -> "ServiceSettings":
-    """Put the flags over the environment."""
     from denseface.service.settings import ServiceSettings
 
     names = ("address", "data", "key", "hub_key", "keys", "listen", "retention", "metrics")
-    return ServiceSettings.of(
-        os.environ, **{name: getattr(args, name, None) for name in names})
+    return ServiceSettings.of(os.environ, **{name: getattr(args, name, None) for name in names})
 
 
 def client(args: argparse.Namespace) -> "Client":
-    """Give a client of the hub that `add_address` and `add_credentials` name."""
     from denseface.service.client import Client
 
     return Client(args.address, key=args.key, hub_key=args.hub_key)
@@ -156,13 +131,7 @@ def client(args: argparse.Namespace) -> "Client":
 
 @contextmanager
 def operator(args: argparse.Namespace) -> Iterator["Operator"]:
-    """Give an operator of that hub.
-
-    Raises
-    ------
-    LocalProtocolError
-        Where a capture id is malformed.
-    """
+    """Give an operator of the hub; raises `LocalProtocolError` where an id is malformed."""
     from pydantic import ValidationError
 
     from denseface.service.client import Operator
@@ -189,7 +158,6 @@ def repeated(args: argparse.Namespace, *names: str) -> list[str]:
 
 
 def seconds(text: str) -> float:
-    """Read a duration in seconds."""
     try:
         value = float(text)
     except ValueError:
@@ -200,14 +168,12 @@ def seconds(text: str) -> float:
 
 
 def count(text: str) -> int:
-    """Read a whole number above 0."""
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number, at least 1")
     return int(text)
 
 
 def timestamp(text: str) -> datetime:
-    """Read a date and time."""
     from denseface.service.runtime.parsing import parse_time
 
     try:

@@ -4,13 +4,9 @@ import argparse
 
 from denseface.service.commands import _options
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the flags."""
-    _options.add_address(parser)
-    _options.add_credentials(parser)
+    _options.add_client(parser)
     parser.add_argument("action", choices=("list", "retry", "drop"),
                         help="list: sequence number, id, time, attempts, reason; retry: all "
                              "attempts again; drop: remove frame, error and row")
@@ -19,7 +15,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command and give its exit status."""
     from denseface.service.errors import UsageError
 
     if args.action == "list" and (args.ids or args.all):

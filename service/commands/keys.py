@@ -1,17 +1,14 @@
 """`denseface keys`."""
 
 import argparse
-from pathlib import Path
+import os
 
 from denseface.service.commands import _options
-
-__all__ = ["add_arguments", "run"]
 
 _ROLES = ("sensor", "worker", "presser", "subscriber", "operator")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the flags."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     new = actions.add_parser("new", help="make a pair: NAME.secret and NAME.public", description=(
         "Make a pair of keys. `hub` is the name of the hub's own."))
@@ -31,41 +28,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command and give its exit status."""
-    import os
-
+    from denseface.service import security
+    from denseface.service.protocol.roles import Role
     from denseface.service.settings import ServiceSettings
 
     folder = ServiceSettings.of(os.environ, keys=args.keys).keys
-    {"new": _new, "allow": _allow, "revoke": _revoke, "list": _list}[args.action](args, folder)
+    match args.action:
+        case "new":
+            secret, public = security.new_pair(folder, args.name)
+            print(f"{secret}  stays where it is used\n{public}  goes to the other side: "
+                  f"{security.read_public(public)}")
+        case "allow":
+            one = security.allow(folder, args.name, security.read_public(args.public),
+                                 frozenset(map(Role, args.roles)))
+            print(f"{one.name} ({one.fingerprint}) may come in as {', '.join(sorted(one.roles))}")
+        case "revoke":
+            security.revoke(folder, args.name)
+            print(f"{args.name} may come in no more")
+        case "list":
+            for one in sorted(security.AllowList(folder), key=lambda one: one.name):
+                print(f"{one.name:20} {one.fingerprint}  {', '.join(sorted(one.roles))}")
     return 0
-
-
-def _new(args: argparse.Namespace, folder: Path) -> None:
-    from denseface.service.security import new_pair, read_public
-
-    secret, public = new_pair(folder, args.name)
-    print(f"{secret}  stays where it is used\n{public}  goes to the other side: "
-          f"{read_public(public)}")
-
-
-def _allow(args: argparse.Namespace, folder: Path) -> None:
-    from denseface.service.protocol.roles import Role
-    from denseface.service.security import allow, read_public
-
-    one = allow(folder, args.name, read_public(args.public), frozenset(map(Role, args.roles)))
-    print(f"{one.name} ({one.fingerprint}) may come in as {', '.join(sorted(one.roles))}")
-
-
-def _revoke(args: argparse.Namespace, folder: Path) -> None:
-    from denseface.service.security import revoke
-
-    revoke(folder, args.name)
-    print(f"{args.name} may come in no more")
-
-
-def _list(args: argparse.Namespace, folder: Path) -> None:  # noqa: ARG001
-    from denseface.service.security import AllowList
-
-    for one in sorted(AllowList(folder), key=lambda one: one.name):
-        print(f"{one.name:20} {one.fingerprint}  {', '.join(sorted(one.roles))}")

@@ -4,11 +4,8 @@ import argparse
 
 from denseface.service.commands import _options
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the flags."""
     _options.add_source(parser)
     length = parser.add_mutually_exclusive_group()
     length.add_argument("--seconds", type=_options.seconds, metavar="S",
@@ -19,7 +16,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command and give its exit status."""
     from denseface.service.daemons.startup import use_one_thread
 
     use_one_thread()

@@ -4,13 +4,9 @@ import argparse
 
 from denseface.service.commands import _options
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the flags."""
-    _options.add_address(parser)
-    _options.add_credentials(parser)
+    _options.add_client(parser)
     parser.add_argument("--id", metavar="ID", dest="capture_id",
                         help="id of the capture; the same one again is the same capture")
     parser.add_argument("--timeout", type=_options.seconds, default=60.0, metavar="S",
@@ -19,7 +15,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command and give its exit status."""
     from denseface.service.export import FaceFiles
 
     files = FaceFiles(args.output, args.report, args.rendering)

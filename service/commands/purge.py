@@ -5,13 +5,9 @@ import sys
 
 from denseface.service.commands import _options
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the flags."""
-    _options.add_address(parser)
-    _options.add_credentials(parser)
+    _options.add_client(parser)
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--id", metavar="ID", dest="capture_id",
                       help="this capture, finished or not")
@@ -24,7 +20,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command and give its exit status."""
     from denseface.service.errors import UsageError
 
     chosen = (f"capture {args.capture_id}" if args.capture_id is not None

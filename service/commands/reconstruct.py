@@ -5,11 +5,8 @@ from pathlib import Path
 
 from denseface.service.commands import _options
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the flags."""
     parser.add_argument("input", metavar="INPUT", help="a .npz frame or a .oni recording")
     parser.add_argument("--frame", type=int, default=0, metavar="N",
                         help="which frame of the recording, from 0 (default: 0)")
@@ -20,7 +17,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command and give its exit status."""
     from denseface.service.export import FaceFiles
     from denseface.service.tools.frames import read_frame
 

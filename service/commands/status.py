@@ -4,13 +4,9 @@ import argparse
 
 from denseface.service.commands import _options
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the flags."""
-    _options.add_address(parser)
-    _options.add_credentials(parser)
+    _options.add_client(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--wait", type=_options.seconds, metavar="SECONDS",
                         help="wait until hub, a sensor and a worker are ready; fail where they "
@@ -18,7 +14,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command and give its exit status."""
     from denseface.service.tools.status import as_json, as_text, ready_status
 
     with _options.client(args) as client:

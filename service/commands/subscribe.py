@@ -6,13 +6,9 @@ from pathlib import Path
 
 from denseface.service.commands import _options
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the flags."""
-    _options.add_address(parser)
-    _options.add_credentials(parser)
+    _options.add_client(parser)
     parser.add_argument("--save", type=Path, metavar="DIR",
                         help="write each face as DIR/ID.ply with its report, DIR/ID.json")
     parser.add_argument("--count", type=int, metavar="N", help="end after N captures")
@@ -28,7 +24,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command and give its exit status."""
     from denseface.service.errors import UsageError
     from denseface.service.tools.follow import follow
 

@@ -5,25 +5,15 @@ import os
 
 from denseface.service.commands import _options
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the flags."""
     _options.add_source(parser)
     parser.add_argument("--workers", type=_worker_count, default=max(1, (os.cpu_count() or 2) - 1),
                         metavar="N", help="reconstruction processes (default: cores less one)")
-    _options.add_address(parser)
-    _options.add_listen(parser)
-    _options.add_data(parser)
-    _options.add_retention(parser)
-    _options.add_metrics(parser)
-    _options.add_recon(parser)
-    _options.add_log(parser)
+    _options.add_hub(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command and give its exit status."""
     from denseface.service.daemons.startup import start_process
 
     start_process("up", args.log)

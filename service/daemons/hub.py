@@ -4,7 +4,9 @@ import math
 import os
 import time
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, closing, nullcontext
+from dataclasses import dataclass
+from typing import Any
 
 import structlog
 import zmq
@@ -34,6 +36,7 @@ _SENT_FAILPOINTS = {
     "take": "hub.take.sent", "frame_accepted": "hub.frame.acknowledged",
     "press_accepted": "hub.press.acknowledged", "job": "hub.job.sent"}
 """Failpoint that is passed after a message of this kind was sent."""
+_log = structlog.get_logger("hub")
 
 
 def run(settings: ServiceSettings, recon: Settings) -> int:
@@ -48,27 +51,21 @@ def run(settings: ServiceSettings, recon: Settings) -> int:
     """
     os.umask(0o077)  # SQLite's files too are for this user alone
     keep_freed_memory()  # fetching it anew for each face costs a third of the processor time
-    log = structlog.get_logger("hub")
     with StopSignal() as stop, FolderStore(settings.data) as store, WriterThreads() as writer, \
             Observer(settings.data) as observer, zmq.Context() as context:
         rejections = Rejections(observer.figures.counters)
-        listeners = Listeners(context, settings, rejections, (stop, writer))
-        try:
+        with closing(Listeners(context, settings, rejections, (stop, writer))) as listeners:
             hub = Hub(store, settings, recon, observer.figures, rejections, writer,
                       time.monotonic())
             loop = _EventLoop(listeners, hub, rejections, observer, writer)
-            log.info("listening", address=" ".join(listeners.addresses), data=str(settings.data))
+            _log.info("listening", address=" ".join(listeners.addresses), data=str(settings.data))
             with _metrics_server(settings, observer):
                 loop.serve(stop)
-        finally:
-            listeners.close()
-        log.info("stopped")
+        _log.info("stopped")
         return stop.exit_status
 
 
-def _metrics_server(
-    settings: ServiceSettings, observer: Observer
-) -> AbstractContextManager[object]:
+def _metrics_server(settings: ServiceSettings, observer: Observer) -> AbstractContextManager[Any]:
     if settings.metrics is None:
         return nullcontext()
     from prometheus_client import make_wsgi_app
@@ -80,74 +77,70 @@ def _metrics_server(
     health = Health(observer.latest, settings, lambda: write_error(settings.data))
     server = MetricsServer(settings.metrics, make_wsgi_app(Metrics(observer.latest).registry),
                            health.report)
-    structlog.get_logger("hub").info("metrics", url=f"{server.url}/metrics")
+    _log.info("metrics", url=f"{server.url}/metrics")
     return server
 
 
+@dataclass(frozen=True)
 class _EventLoop:
-    def __init__(
-        self, listeners: Listeners, hub: Hub, rejections: Rejections, observer: Observer,
-        writer: WriterThreads,
-    ) -> None:
-        self._writer = writer
-        self._listeners = listeners
-        self._hub = hub
-        self._rejections = rejections
-        self._observer = observer
-        self._log = structlog.get_logger("hub")
+    listeners: Listeners
+    hub: Hub
+    rejections: Rejections
+    observer: Observer
+    writer: WriterThreads
 
     def serve(self, stop: StopSignal) -> None:
         due = time.monotonic()
         while not stop:
             if (now := time.monotonic()) >= due:
                 due = self._tick(now, due)
-            for incoming in self._listeners.receive(max(0, math.ceil((due - now) * 1000))):
+            for incoming in self.listeners.receive(max(0, math.ceil((due - now) * 1000))):
                 self._receive(incoming)
-            if self._writer.has_results():
-                self._send_all(self._hub.written(time.monotonic()))
+            if self.writer.has_results():
+                self._send_all(self.hub.written(time.monotonic()))
             stop.drain()
         # Writes under way are finished and acknowledged; the sockets linger for that.
-        self._send_all(self._hub.written(time.monotonic(), wait=True))
+        self._send_all(self.hub.written(time.monotonic(), wait=True))
 
     def _tick(self, now: float, due: float) -> float:
         """Let the hub do what time demands; give when the next tick is due."""
-        self._hub.loop_stalled(now - due)
-        subscriptions = self._listeners.subscriptions()
+        self.hub.loop_stalled(now - due)
+        subscriptions = self.listeners.subscriptions()
         watched = subscriptions[Topic.PREVIEW] > 0
-        if self._listeners.tick():
+        if self.listeners.tick():
             self._drop_revoked()
-        self._hub.want_previews(wanted=watched)
-        outputs = self._hub.tick(now)
-        self._observer.record_tick(now, outputs, subscriptions)
+        self.hub.want_previews(wanted=watched)
+        outputs = self.hub.tick(now)
+        self.observer.record_tick(now, outputs, subscriptions)
         self._send_all(outputs)
         return now + (PREVIEW_PERIOD_S if watched else _TICK_S)
 
     def _drop_revoked(self) -> None:
-        for peer in self._hub.peers():
-            if not self._listeners.is_allowed(peer):
-                self._send_all(self._hub.unreachable(peer, "its key or its roles changed"))
+        for peer in self.hub.peers():
+            if not self.listeners.is_allowed(peer):
+                self._send_all(self.hub.unreachable(peer, "its key or its roles changed"))
 
     def _receive(self, incoming: Incoming) -> None:
         who = {"key": incoming.sender.name, "address": incoming.address}
         try:
             packet = decode_to_hub(incoming.parts)
         except RemoteProtocolError as error:
-            self._rejections.note(error.reason, **who, detail=str(error))
+            self.rejections.note(error.reason, **who, detail=str(error))
             return
         message, sender = packet.message, incoming.sender
         own = (incoming.key != "" and isinstance(message, messages.GetFace)
-               and self._hub.pressed_by(message.capture_id) == incoming.key)
+               and self.hub.pressed_by(message.capture_id) == incoming.key)
         missing = missing_role(sender.roles, message, own=own)
         if missing:
-            self._rejections.note("role", **who, detail=missing)
+            self.rejections.note("role", **who, detail=missing)
             self._send_all([_denied(incoming, message, missing)])
             return
-        self._send_all(self._hub.receive(
+        self._send_all(self.hub.receive(
             time.monotonic(), incoming.peer, packet, incoming.key), packet)
 
     def _send_all(self, outputs: list[Output], caused_by: Packet | None = None) -> None:
         for step in steps(outputs):
-            self._observer.record(time.monotonic(), caused_by, step)
+            self.observer.watch.record(time.monotonic(), caused_by, step)
             self._send(step)
             caused_by = None
 
@@ -156,20 +149,20 @@ class _EventLoop:
             try:
                 parts = encode(output.packet)
             except LocalProtocolError as error:  # the hub goes on without it
-                self._log.error("message not sent", reason=str(error))
+                _log.error("message not sent", reason=str(error))
                 continue
             if isinstance(output, Publish):
                 self._publish(output.topic, parts)
-            elif not self._listeners.send(output.peer, parts):
-                self._send_all(self._hub.unreachable(output.peer))
+            elif not self.listeners.send(output.peer, parts):
+                self._send_all(self.hub.unreachable(output.peer))
             elif name := _SENT_FAILPOINTS.get(output.packet.message.kind):
                 failpoint(name)
 
     def _publish(self, topic: Topic, parts: Sequence[Buffer]) -> None:
         if topic is Topic.FACES:
             failpoint("hub.outcome.publishing")
-        if not self._listeners.publish(topic, parts):
-            self._observer.figures.counters.add("drops", topic)
+        if not self.listeners.publish(topic, parts):
+            self.observer.figures.counters.add("drops", topic)
         if topic is Topic.FACES:
             failpoint("hub.outcome.published")
 
@@ -179,6 +172,5 @@ def _denied(incoming: Incoming, message: messages.BaseMessage, missing: str) -> 
     has = ", ".join(sorted(incoming.sender.roles))
     text = f"refused: {missing}, the key {incoming.sender.name} has {has}"
     request = getattr(message, "request", None)
-    if request is None:
-        return send(incoming.peer, messages.Denied(message=text))
-    return send(incoming.peer, messages.RequestFailed(request=request, message=text))
+    return send(incoming.peer, messages.Denied(message=text) if request is None
+                else messages.RequestFailed(request=request, message=text))

@@ -18,10 +18,7 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 def start_process(name: str, log_format: Literal["text", "json"]) -> None:
     """Name this process, tie it to its supervisor, configure its log, arm its failpoints.
 
-    Parameters
-    ----------
-    name : of the process, in each line of its log
-    log_format : `text` or `json`
+    Each line of the log bears the `name`.
     """
     with suppress(OSError):
         Path("/proc/self/comm").write_text("denseface")  # what `ps` and `top` show

@@ -5,6 +5,7 @@ import socket
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import cv2
 import structlog
@@ -12,14 +13,7 @@ import structlog
 from denseface import recon
 from denseface.recon import ReconstructionError, reconstruct
 from denseface.recon.face import Face
-from denseface.service.protocol.messages import (
-    Announce,
-    Heartbeat,
-    Job,
-    JobFailed,
-    Result,
-    WorkerReady,
-)
+from denseface.service.protocol import messages
 from denseface.service.protocol.packing import warm_packing
 from denseface.service.protocol.payload import Arrays, FaceHeader
 from denseface.service.protocol.wire import Packet
@@ -37,6 +31,7 @@ _MAX_JOBS = 2
 """The job under way and the one that follows it."""
 _FINISH_S = 3.0
 """Time to finish the job under way when the process stops, seconds; below the supervisor's 5."""
+_log = structlog.get_logger("worker")
 
 
 def run(settings: ServiceSettings) -> int:
@@ -55,7 +50,7 @@ def run(settings: ServiceSettings) -> int:
     with StopSignal() as stop:
         begun = time.monotonic()
         warm()
-        structlog.get_logger("worker").info("warm", seconds=round(time.monotonic() - begun, 2))
+        _log.info("warm", seconds=round(time.monotonic() - begun, 2))
         with Background[Face]("recon") as compute:
             with HubConnection(settings, "worker") as connection:
                 worker = _Worker(settings, connection, compute)
@@ -72,113 +67,110 @@ def warm() -> None:
     warm_packing()
 
 
+@dataclass
 class _Worker:
-    def __init__(
-        self, settings: ServiceSettings, connection: HubConnection, compute: Background[Face]
-    ) -> None:
-        self._settings = settings
-        self._connection = connection
-        self._compute = compute
-        self._log = structlog.get_logger("worker")
-        self._jobs: deque[Job] = deque()
-        """The one under way, then the one that follows."""
-        self._send_answer: Callable[[], bool] | None = None
-        """Sends the answer to a job that ended; False where the hub is not there."""
-        self._credit = 0
-        """Jobs asked for so far."""
+    settings: ServiceSettings
+    connection: HubConnection
+    compute: Background[Face]
+    jobs: deque[messages.Job] = field(default_factory=deque)
+    """The one under way, then the one that follows."""
+    send_answer: Callable[[], bool] | None = None
+    """Sends the answer to a job that ended; False where the hub is not there."""
+    credit: int = 0
+    """Jobs asked for so far."""
 
     def serve(self, stop: StopSignal) -> None:
-        for packet in self._connection.packets(stop, self._compute, self._holding):
+        for packet in self.connection.packets(stop, self.compute, self._holding):
             if packet is not None:
                 self._receive(packet)
             self._deliver()
-            while self._send_answer is None and self._compute.done():
-                self._send_answer = self._answer_job()
+            while self.send_answer is None and self.compute.done():
+                self.send_answer = self._answer_job()
                 self._deliver()
-            if not self._compute.done() and (
-                    self._compute.elapsed_s > self._settings.job_timeout_s):
-                self._log.error("job takes too long", capture_id=self._holding(),
-                                seconds=self._compute.elapsed_s)
+            if not self.compute.done() and (
+                    self.compute.elapsed_s > self.settings.job_timeout_s):
+                _log.error("job takes too long", capture_id=self._holding(),
+                           seconds=self.compute.elapsed_s)
                 os._exit(1)
 
     def _deliver(self) -> None:
-        if self._send_answer and self._send_answer():  # else it is tried again
+        if self.send_answer and self.send_answer():  # else it is tried again
             failpoint("worker.result.sent")
-            self._send_answer = None
+            self.send_answer = None
 
     def finish(self) -> None:
         """Finish the job under way and deliver its answer; leave it where that takes too long."""
         self._deliver()
-        if self._compute.cancel_queued():
-            self._jobs.pop()
+        if self.compute.cancel_queued():
+            self.jobs.pop()
         deadline = time.monotonic() + _FINISH_S
-        while self._compute:
-            while not self._compute.wait(min(self._settings.heartbeat_s, _FINISH_S)):
+        while self.compute:
+            while not self.compute.wait(min(self.settings.heartbeat_s, _FINISH_S)):
                 if time.monotonic() >= deadline:
-                    self._log.warning("job handed back", capture_id=self._holding(),
-                                      seconds=round(self._compute.elapsed_s, 1))
+                    _log.warning("job handed back", capture_id=self._holding(),
+                                 seconds=round(self.compute.elapsed_s, 1))
                     return
-                self._connection.send(Heartbeat(holding=self._holding()))
-            self._send_answer = self._answer_job()
+                self.connection.send(messages.Heartbeat(holding=self._holding()))
+            self.send_answer = self._answer_job()
             self._deliver()
 
     def _holding(self) -> str | None:
-        return self._jobs[0].capture_id if self._jobs else None
+        return self.jobs[0].capture_id if self.jobs else None
 
     def _send_ready(self) -> None:
-        self._connection.send(WorkerReady(
-            name=f"{socket.gethostname()}/{os.getpid()}", credit=self._credit))
+        self.connection.send(messages.WorkerReady(
+            name=f"{socket.gethostname()}/{os.getpid()}", credit=self.credit))
 
     def _receive(self, packet: Packet) -> None:
         match packet.message:
-            case Announce():
-                if len(self._jobs) < _MAX_JOBS:
+            case messages.Announce():
+                if len(self.jobs) < _MAX_JOBS:
                     self._send_ready()
-            case Job() as job:
-                if len(self._jobs) == _MAX_JOBS:  # the hub redelivers what no heartbeat names
-                    self._log.warning("job dropped, busy", capture_id=job.capture_id)
+            case messages.Job() as job:
+                if len(self.jobs) == _MAX_JOBS:  # the hub redelivers what no heartbeat names
+                    _log.warning("job dropped, busy", capture_id=job.capture_id)
                     return
                 failpoint("worker.job.received")
-                self._jobs.append(job)
-                self._compute.start(lambda: _reconstruct(job, packet.arrays))
-                if len(self._jobs) == 1:
+                self.jobs.append(job)
+                self.compute.start(lambda: _reconstruct(job, packet.arrays))
+                if len(self.jobs) == 1:
                     self._ask_for_next()
 
     def _ask_for_next(self) -> None:
         """Ask for the job that follows the one under way, if there is one."""
-        if self._jobs:
-            self._credit += 1
+        if self.jobs:
+            self.credit += 1
             self._send_ready()
-            job = self._jobs[0]
-            self._log.info("job", capture_id=job.capture_id, attempt=job.attempt)
+            job = self.jobs[0]
+            _log.info("job", capture_id=job.capture_id, attempt=job.attempt)
 
     def _answer_job(self) -> Callable[[], bool]:
         """Give what sends the answer to the job that ended; the next one has begun already."""
-        job = self._jobs.popleft()
+        job = self.jobs.popleft()
         self._ask_for_next()
         try:
-            face = self._compute.result()
+            face = self.compute.result()
             failpoint("worker.job.computed")
             report = face.report.model_copy(update={"capture_id": job.capture_id})
             header, arrays = FaceHeader.of(Face(face.initial, face.dense, report))
-            result = Result(
+            result = messages.Result(
                 capture_id=job.capture_id, settings_hash=job.settings_hash,
                 frame_sha256=job.frame_sha256, face=header)
         except Exception as error:
             final = isinstance(error, ReconstructionError)
-            say = self._log.warning if final else self._log.exception
+            say = _log.warning if final else _log.exception
             say("no face", capture_id=job.capture_id, error=type(error).__name__,
                 reason=str(error))
-            failure = JobFailed(
+            failure = messages.JobFailed(
                 capture_id=job.capture_id, settings_hash=job.settings_hash,
                 frame_sha256=job.frame_sha256, error=type(error).__name__,
                 message=str(error)[:4000], final=final)
-            return lambda: self._connection.send(failure)
-        self._log.info("face", capture_id=job.capture_id, points=report.dense_points,
-                       total_ms=round(report.timings_ms.get("total", 0.0)))
-        return lambda: self._connection.send(result, arrays)
+            return lambda: self.connection.send(failure)
+        _log.info("face", capture_id=job.capture_id, points=report.dense_points,
+                  total_ms=round(report.timings_ms.get("total", 0.0)))
+        return lambda: self.connection.send(result, arrays)
 
 
-def _reconstruct(job: Job, arrays: Arrays) -> Face:
+def _reconstruct(job: messages.Job, arrays: Arrays) -> Face:
     failpoint("worker.job.computing")
     return reconstruct(job.frame.join(arrays), job.settings)

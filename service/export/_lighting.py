@@ -3,8 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["shade"]
-
 _KEY_LIGHT = np.array([-0.55, -0.55, -0.63])
 """Direction to the main light, camera frame: upper left, grazing, for relief."""
 _FILL_LIGHT = np.array([0.70, 0.10, -0.70])
@@ -31,5 +29,4 @@ def shade(normals: NDArray[np.floating]) -> NDArray[np.uint8]:
     key = np.clip(normals @ (_KEY_LIGHT / np.linalg.norm(_KEY_LIGHT)), 0, None)
     fill = np.clip(normals @ (_FILL_LIGHT / np.linalg.norm(_FILL_LIGHT)), 0, None)
     light = np.clip(_AMBIENT + _KEY * key + _FILL * fill, 0, 1)
-    shaded: NDArray[np.uint8] = np.round(light[:, None] ** (1 / _GAMMA) * _CLAY).astype(np.uint8)
-    return shaded
+    return np.asarray(np.round(light[:, None] ** (1 / _GAMMA) * _CLAY), np.uint8)

@@ -11,12 +11,6 @@ from pydantic import ValidationError
 from denseface.recon.face import DenseCloud, Face, PointCloud, Report
 from denseface.service.errors import FormatError, first_error, reason_of
 
-__all__ = ["from_npz", "to_npz"]
-
-_ARRAYS = ("initial_points", "initial_colors", "dense_points", "dense_colors", "dense_normals",
-           "dense_sigma", "dense_cells", "grid_shape", "grid_step_mm", "report")
-"""Keys of the file; the report is JSON."""
-
 
 def to_npz(face: Face) -> bytes:
     """Give the file's bytes."""
@@ -35,14 +29,13 @@ def from_npz(path: str | Path) -> Face:
     """Read a file of `to_npz`; raises as `load_face`."""
     try:
         with np.load(path, allow_pickle=False) as file:
-            of = {name: file[name] for name in _ARRAYS}
-        rows, columns = of["grid_shape"].tolist()
-        return Face(
-            PointCloud(of["initial_points"], of["initial_colors"]),
-            DenseCloud(of["dense_points"], of["dense_colors"], of["dense_normals"],
-                       of["dense_sigma"], of["dense_cells"], (rows, columns),
-                       float(of["grid_step_mm"])),
-            Report.model_validate_json(str(of["report"])))
+            initial = PointCloud(file["initial_points"], file["initial_colors"])
+            points, colors, normals, sigma, cells = (file[f"dense_{name}"] for name in (
+                "points", "colors", "normals", "sigma", "cells"))
+            rows, columns = file["grid_shape"].tolist()
+            dense = DenseCloud(points, colors, normals, sigma, cells, (rows, columns),
+                               float(file["grid_step_mm"]))
+            return Face(initial, dense, Report.model_validate_json(str(file["report"])))
     except ValidationError as error:
         field, message = first_error(error)
         raise FormatError(f"{path}: report: {field}: {message}") from error

@@ -1,5 +1,6 @@
 """All that may be written of one face: cloud or mesh, report, rendering."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
 __all__ = ["FaceFiles"]
 
 
+@dataclass(frozen=True)
 class FaceFiles:
     """Where to write a face; None is not written. Checked here, before the face is made.
 
@@ -29,17 +31,17 @@ class FaceFiles:
         Where an ending is wrong or a folder does not exist.
     """
 
-    def __init__(
-        self, output: Path | None = None, report: Path | None = None,
-        rendering: Path | None = None,
-    ) -> None:
-        self._output, self._report, self._rendering = output, report, rendering
-        if output:
-            check_ending(output)
-        for path, ending in ((report, ".json"), (rendering, ".png")):
+    output: Path | None = None
+    report: Path | None = None
+    rendering: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.output:
+            check_ending(self.output)
+        for path, ending in ((self.report, ".json"), (self.rendering, ".png")):
             if path and path.suffix.lower() != ending:
                 raise UsageError(f"{path}: expected a name that ends in {ending}")
-        for path in (output, report, rendering):
+        for path in (self.output, self.report, self.rendering):
             if path and not path.absolute().parent.is_dir():
                 raise UsageError(f"{path}: no such folder: {path.parent}")
 
@@ -54,14 +56,14 @@ class FaceFiles:
         from denseface.service.runtime.files import write_atomically
 
         try:
-            if self._output:
-                save_face(face, self._output)
-            if self._report:
+            if self.output:
+                save_face(face, self.output)
+            if self.report:
                 text = face.report.model_dump_json(indent=2) + "\n"
-                write_atomically(self._report, [text.encode()], durable=False)
-            if self._rendering:
+                write_atomically(self.report, [text.encode()], durable=False)
+            if self.rendering:
                 from denseface.service.export.render import render
 
-                write_atomically(self._rendering, [render(face)], durable=False)
+                write_atomically(self.rendering, [render(face)], durable=False)
         except OSError as error:
             raise StoreError(f"{error.filename or ''}: {reason_of(error)}") from error

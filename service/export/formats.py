@@ -7,7 +7,7 @@ imported where a file is written: the command line names the formats.
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from denseface.service.errors import FormatError
 
@@ -65,12 +65,12 @@ def _write_cloud(face: "Face", path: Path) -> None:
     """Write points with normals, colours and standard errors."""
     import open3d as o3d
 
-    tensor = o3d.core.Tensor.from_numpy
+    tensor = o3d.core.Tensor.from_numpy  # shares memory, and takes none that is read-only
     dense = face.dense
-    cloud = o3d.t.geometry.PointCloud(tensor(_copied(dense.points)))
-    cloud.point.normals = tensor(_copied(dense.normals))
-    cloud.point.colors = tensor(_copied(dense.colors))
-    cloud.point.sigma = tensor(_copied(dense.sigma[:, None]))
+    cloud = o3d.t.geometry.PointCloud(tensor(dense.points.copy()))
+    cloud.point.normals = tensor(dense.normals.copy())
+    cloud.point.colors = tensor(dense.colors.copy())
+    cloud.point.sigma = tensor(dense.sigma[:, None].copy())
     _write_by_library(path, lambda name: o3d.t.io.write_point_cloud(name, cloud))
 
 
@@ -105,11 +105,6 @@ def _write_npz(face: "Face", path: Path) -> None:
     from denseface.service.runtime.files import write_atomically
 
     write_atomically(path, [to_npz(face)], durable=False)
-
-
-def _copied(array: Any) -> Any:
-    """Give a copy that Open3D may share: it takes no read-only memory."""
-    return array.copy()
 
 
 def _write_by_library(path: Path, write: Callable[[Path], bool]) -> None:

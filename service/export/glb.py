@@ -38,14 +38,13 @@ def to_glb(cloud: DenseCloud, triangles: NDArray[np.int32]) -> bytes:
     colors = np.full((len(cloud), 4), 65535, "<u2")
     colors[:, :3] = np.round(_linear(cloud.colors) * 65535)
     views: list[dict[str, Any]] = []
-    chunks: list[bytes] = []
+    arrays: list[bytes] = []
     for array, target in ((positions.astype("<f4"), _VERTICES),
                           ((cloud.normals * _FLIP).astype("<f4"), _VERTICES),
                           (colors, _VERTICES), (triangles.astype("<u4").ravel(), _INDICES)):
-        offset = sum(map(len, chunks))
-        chunks.append(array.tobytes())
-        views.append({"buffer": 0, "byteOffset": offset, "byteLength": array.nbytes,
-                      "target": target})
+        views.append({"buffer": 0, "byteOffset": sum(map(len, arrays)),
+                      "byteLength": array.nbytes, "target": target})
+        arrays.append(array.tobytes())
     n = len(cloud)
     document = {
         "asset": {"version": "2.0", "generator": "denseface"},
@@ -62,20 +61,19 @@ def to_glb(cloud: DenseCloud, triangles: NDArray[np.int32]) -> bytes:
             {"bufferView": 1, "componentType": _FLOAT, "count": n, "type": "VEC3"},
             {"bufferView": 2, "componentType": _USHORT, "normalized": True, "count": n,
              "type": "VEC4"},
-            {"bufferView": 3, "componentType": _UINT, "count": triangles.size,
-             "type": "SCALAR"},
+            {"bufferView": 3, "componentType": _UINT, "count": triangles.size, "type": "SCALAR"},
         ],
         "bufferViews": views,
-        "buffers": [{"byteLength": sum(map(len, chunks))}],
+        "buffers": [{"byteLength": sum(map(len, arrays))}],
     }
-    header = json.dumps(document, separators=(",", ":")).encode()
-    header += b" " * (-len(header) % 4)
-    binary = b"".join(chunks)
-    binary += b"\0" * (-len(binary) % 4)
-    total = 12 + 8 + len(header) + 8 + len(binary)
-    return b"".join([
-        b"glTF", struct.pack("<II", 2, total), struct.pack("<II", len(header), _JSON), header,
-        struct.pack("<II", len(binary), _BIN), binary])
+    body = _chunk(_JSON, json.dumps(document, separators=(",", ":")).encode(), b" ")
+    body += _chunk(_BIN, b"".join(arrays), b"\0")
+    return b"glTF" + struct.pack("<II", 2, 12 + len(body)) + body
+
+
+def _chunk(kind: int, data: bytes, padding: bytes) -> bytes:
+    data += padding * (-len(data) % 4)
+    return struct.pack("<II", len(data), kind) + data
 
 
 def _linear(srgb: NDArray[np.uint8]) -> NDArray[np.float64]:

@@ -3,7 +3,6 @@
 Points are splatted into a z-buffer by NumPy and OpenCV: no window, no GPU.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -39,20 +38,6 @@ _SUBDIVISIONS = 2
 """Parts of each edge of a triangle; points are drawn where they meet."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Splats:
-    points: NDArray[np.float32]
-    side_mm: float
-    """Side of the square drawn for each point."""
-
-
-@dataclass(frozen=True)
-class _Column:
-    title: str
-    splats: _Splats
-    colors: NDArray[np.uint8]
-
-
 def render(face: Face) -> bytes:
     """Draw a face: columns measured, dense, shape alone; rows front view and turned view.
 
@@ -67,26 +52,23 @@ def render(face: Face) -> bytes:
     """
     initial, dense = face.initial, face.dense
     points, colors, normals = _subdivided(dense)
-    seeds = _Splats(initial.points, _SEED_SHARE * face.report.mean_spacing_mm)
-    surface = _Splats(points, dense.grid_step_mm)
-    columns = (
-        _Column(f"measured: {len(initial):,} points", seeds, initial.colors),
-        _Column(f"dense: {len(dense):,} points", surface, colors),
-        _Column("shape alone", surface, shade(normals)),
-    )
+    shading = shade(normals)
+    titles = (f"measured: {len(initial):,} points", f"dense: {len(dense):,} points", "shape alone")
     center = (dense.points.min(axis=0) + dense.points.max(axis=0)) / 2
     scale = _scale(dense.points - center)
-    width = _MARGIN + len(columns) * (_PANEL + _MARGIN)
+    width = _MARGIN + len(titles) * (_PANEL + _MARGIN)
     height = _HEADER + len(_VIEWS) * (_PANEL + _MARGIN) + _FOOTER
     canvas = np.full((height, width, 3), _BACKGROUND, np.uint8)
     for row, (_, angle) in enumerate(_VIEWS):
-        visible = {splats: _visible(splats, center, scale, angle) for splats in (seeds, surface)}
-        for index, column in enumerate(columns):
-            top = _HEADER + row * (_PANEL + _MARGIN)
-            left = _MARGIN + index * (_PANEL + _MARGIN)
-            pixels, rows = visible[column.splats]
-            canvas[top:top + _PANEL, left:left + _PANEL] = _panel(pixels, column.colors[rows])
-    _captions(canvas, columns, scale)
+        seeds = _visible(initial.points - center, scale, angle,
+                         _SEED_SHARE * face.report.mean_spacing_mm)
+        surface = _visible(points - center, scale, angle, dense.grid_step_mm)
+        top = _HEADER + row * (_PANEL + _MARGIN)
+        for column, ((pixels, rows), shown) in enumerate((
+                (seeds, initial.colors), (surface, colors), (surface, shading))):
+            left = _MARGIN + column * (_PANEL + _MARGIN)
+            canvas[top:top + _PANEL, left:left + _PANEL] = _panel(pixels, shown[rows])
+    _captions(canvas, titles, scale)
     encoded, png = cv2.imencode(".png", cv2.cvtColor(canvas, cv2.COLOR_RGB2BGR))
     if not encoded:
         raise RuntimeError("OpenCV could not write the PNG")
@@ -130,18 +112,18 @@ def _scale(points: NDArray[np.float32]) -> float:
 
 
 def _visible(
-    splats: _Splats, center: NDArray[np.float32], scale: float, angle: float
+    points: NDArray[np.float32], scale: float, angle: float, side_mm: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Give the pixels of a panel that are covered, and the row of the point that each shows."""
+    """Give the pixels covered by squares of a side, and the row of the point that each shows."""
     size = _PANEL * _OVERSAMPLING
     fine = scale * _OVERSAMPLING
-    points = _rotated(splats.points - center, angle)
+    points = _rotated(points, angle)
     order = np.argsort(-points[:, 2])  # the nearest is drawn last
     u, v = np.floor(points[order, :2] * fine + size / 2).astype(np.intp).T
     inside = np.flatnonzero((u >= 0) & (u < size) & (v >= 0) & (v < size))
     rank = np.full((size, size), -1.0)
     rank[v[inside], u[inside]] = inside  # where several share a pixel, the last one stays
-    side = max(2, round(splats.side_mm * fine))
+    side = max(2, round(side_mm * fine))
     # The highest rank within reach: each point a square, nearer ones over farther ones.
     rank = cv2.dilate(rank, np.ones((side, side), np.uint8))
     pixels = np.flatnonzero(rank >= 0)
@@ -156,10 +138,10 @@ def _panel(pixels: NDArray[np.intp], colors: NDArray[np.uint8]) -> NDArray[np.ui
         image.reshape(size, size, 3), (_PANEL, _PANEL), interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _captions(canvas: NDArray[np.uint8], columns: tuple[_Column, ...], scale: float) -> None:
-    for index, column in enumerate(columns):
-        left = _MARGIN + index * (_PANEL + _MARGIN)
-        _write(canvas, column.title, (left + 2, _HEADER - 24), 0.95, _INK)
+def _captions(canvas: NDArray[np.uint8], titles: tuple[str, ...], scale: float) -> None:
+    for column, title in enumerate(titles):
+        left = _MARGIN + column * (_PANEL + _MARGIN)
+        _write(canvas, title, (left + 2, _HEADER - 24), 0.95, _INK)
     for row, (name, _) in enumerate(_VIEWS):
         _write(canvas, name, (_MARGIN + 14, _HEADER + row * (_PANEL + _MARGIN) + 30), 0.6,
                _FAINT_INK)

@@ -4,6 +4,7 @@ import os
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ _STALL_S = 5.0
 _MIB = 2**20
 
 
+@dataclass(frozen=True)
 class Health:
     """Judges the hub's last snapshot; for any thread.
 
@@ -28,19 +30,14 @@ class Health:
     clock : seconds, the snapshots'
     """
 
-    def __init__(
-        self, latest: Callable[[], Snapshot | None], settings: ServiceSettings,
-        write_error: Callable[[], str | None], clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._latest = latest
-        self._settings = settings
-        self._write_error = write_error
-        self._clock = clock
-        self._stall_s = max(_STALL_S, settings.silence_s)
+    latest: Callable[[], Snapshot | None]
+    settings: ServiceSettings
+    write_error: Callable[[], str | None]
+    clock: Callable[[], float] = time.monotonic
 
     def report(self) -> tuple[bool, dict[str, Any]]:
         """Say whether all is well, with what `/healthz` shows as JSON."""
-        snapshot = self._latest()
+        snapshot = self.latest()
         status = snapshot.status if snapshot else None
         missing = self._missing(snapshot)
         return not missing, {
@@ -53,18 +50,18 @@ class Health:
         found = []
         if snapshot is None:
             found.append("hub: has not said how it is yet")
-        elif (silence := self._clock() - snapshot.taken) > self._stall_s:
+        elif (silence := self.clock() - snapshot.taken) > max(_STALL_S, self.settings.silence_s):
             found.append(f"hub: has not said how it is for {silence:.0f} s")
-        if why := self._write_error():
+        if why := self.write_error():
             found.append(f"store: {why}")
         if snapshot is None:
             return found
-        status, reserve = snapshot.status, self._settings.reserve_mib
+        status, reserve = snapshot.status, self.settings.reserve_mib
         if status.free_bytes is None:
             found.append("disk: its free room is not known")
         elif status.free_bytes < reserve * _MIB:
-            found.append(f"disk: {status.free_bytes // _MIB} MiB free, {reserve} MiB are to stay "
-                         "free")
+            found.append(
+                f"disk: {status.free_bytes // _MIB} MiB free, {reserve} MiB are to stay free")
         if not status.sensors:
             found.append("sensor: none is alive")
         if not status.workers:

@@ -11,7 +11,6 @@ from denseface.service.monitoring.figures import Figures, Histogram
 from denseface.service.monitoring.message_watch import MessageWatch
 from denseface.service.protocol.messages import Status
 from denseface.service.protocol.outgoing import Output, Publish
-from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.closing import Closing
 
@@ -46,7 +45,7 @@ class Observer(Closing):
     def __init__(self, data: Path) -> None:
         self.figures = Figures()
         self._snapshot: Snapshot | None = None
-        self._watch = MessageWatch(self.figures)
+        self.watch = MessageWatch(self.figures)
         self._data = data
         self._measurement = Background[int]("usage")
         self._next_measurement = 0.0
@@ -58,10 +57,6 @@ class Observer(Closing):
     def latest(self) -> Snapshot | None:
         """Give the last snapshot, None before there is one; for any thread."""
         return self._snapshot
-
-    def record(self, now: float, packet: Packet | None, outputs: Sequence[Output]) -> None:
-        """Record a message, None for a tick, and the outputs that it caused; `now` in seconds."""
-        self._watch.record(now, packet, outputs)
 
     def record_tick(
         self, now: float, outputs: Sequence[Output], subscriptions: Mapping[str, int]

@@ -3,13 +3,7 @@
 from collections.abc import Callable, Iterator
 from itertools import accumulate
 
-from prometheus_client import CollectorRegistry, ProcessCollector
-from prometheus_client.core import (
-    CounterMetricFamily,
-    GaugeMetricFamily,
-    HistogramMetricFamily,
-    Metric,
-)
+from prometheus_client import CollectorRegistry, ProcessCollector, core
 from prometheus_client.registry import Collector
 
 from denseface.service.monitoring.figures import BUCKETS_S, Histogram
@@ -51,7 +45,7 @@ class Metrics(Collector):
         self.registry.register(self)
         ProcessCollector(registry=self.registry)
 
-    def collect(self) -> Iterator[Metric]:
+    def collect(self) -> Iterator[core.Metric]:
         """Give the families; none before the hub's first status."""
         snapshot = self._latest()
         if snapshot is not None:
@@ -60,10 +54,10 @@ class Metrics(Collector):
             yield _latencies(snapshot.stages)
 
 
-def _counters(snapshot: Snapshot) -> Iterator[Metric]:
+def _counters(snapshot: Snapshot) -> Iterator[core.Metric]:
     for name, (metric, label, text) in COUNTERS.items():
         found = {one: count for known, one, count in snapshot.counts if known == name}
-        family = CounterMetricFamily(_PREFIX + metric, text, labels=[label] if label else [])
+        family = core.CounterMetricFamily(_PREFIX + metric, text, labels=[label] if label else [])
         if label is None:
             family.add_metric([], sum(found.values()))
         for one, count in found.items() if label else ():
@@ -71,7 +65,7 @@ def _counters(snapshot: Snapshot) -> Iterator[Metric]:
         yield family
 
 
-def _gauges(snapshot: Snapshot) -> Iterator[Metric]:
+def _gauges(snapshot: Snapshot) -> Iterator[core.Metric]:
     status = snapshot.status
     yield _gauge_family("in_flight", "Captures without an outcome.", "state", {
         "pressed": status.pressed, "queued": status.queued, "working": status.working})
@@ -87,19 +81,19 @@ def _gauges(snapshot: Snapshot) -> Iterator[Metric]:
     yield _gauge_family("build", "Always 1.", "version", {status.hub_version: 1})
 
 
-def _gauge(name: str, text: str, value: int) -> Metric:
-    return GaugeMetricFamily(_PREFIX + name, text, value=value)
+def _gauge(name: str, text: str, value: int) -> core.Metric:
+    return core.GaugeMetricFamily(_PREFIX + name, text, value=value)
 
 
-def _gauge_family(name: str, text: str, label: str, values: dict[str, int]) -> Metric:
-    family = GaugeMetricFamily(_PREFIX + name, text, labels=[label])
+def _gauge_family(name: str, text: str, label: str, values: dict[str, int]) -> core.Metric:
+    family = core.GaugeMetricFamily(_PREFIX + name, text, labels=[label])
     for one, value in values.items():
         family.add_metric([one], value)
     return family
 
 
-def _latencies(stages: dict[str, Histogram]) -> Metric:
-    family = HistogramMetricFamily(
+def _latencies(stages: dict[str, Histogram]) -> core.Metric:
+    family = core.HistogramMetricFamily(
         _PREFIX + "latency_seconds", "How long each stage took.", labels=["stage"])
     for stage, one in stages.items():
         ends = [*map(str, BUCKETS_S), "+Inf"]

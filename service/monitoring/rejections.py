@@ -41,10 +41,7 @@ class Rejections:
     def note(self, reason: str, **who: object) -> None:
         """Count a rejection and log it, unless its reason has logged too much.
 
-        Parameters
-        ----------
-        reason : one of a fixed set
-        who : key name, address and what else is known
+        `reason` is one of a fixed set, `who` names the key, the address and what else is known.
         """
         self._counters.add("refused", reason)
         now = self._clock()

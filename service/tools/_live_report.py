@@ -10,8 +10,6 @@ from typing import Self
 from denseface.recon import Face, Settings
 from denseface.service.tools._live_statistics import LiveFrame, LiveStatistics
 
-__all__ = ["StatusLine", "json_summary", "text_summary"]
-
 _REFRESH_S = 0.1
 """Shortest time between two writings of the status line, seconds."""
 

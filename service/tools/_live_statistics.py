@@ -10,8 +10,6 @@ import numpy as np
 from denseface.capture import RgbdFrame
 from denseface.recon import Face, ReconstructionError
 
-__all__ = ["Clock", "LiveFrame", "LiveStatistics"]
-
 _MAX_TIMES = 3600
 """Frames whose stage times are kept, the newest: a run may last for days."""
 _RECENT_FRAMES = 30
@@ -23,28 +21,17 @@ Clock = Callable[[], float]
 
 @dataclass(frozen=True, eq=False)
 class LiveFrame:
-    """A frame and what became of it.
-
-    Attributes
-    ----------
-    frame : as the source gave it
-    outcome : its face, or why there is none
-    timings_ms : wall time of `capture`, the wait for the frame, then of each stage, and `total`
-        without the wait; where there is no face, of `capture` and `without_face`
-    """
+    """A frame and what became of it: its face, or why there is none."""
 
     frame: RgbdFrame
     outcome: Face | ReconstructionError
     timings_ms: dict[str, float]
+    """Wall time of `capture`, the wait for the frame, then of each stage, and `total` without the
+    wait; where there is no face, of `capture` and `without_face`."""
 
 
 class LiveStatistics:
-    """Counts and times of a live run, from when this is made.
-
-    Parameters
-    ----------
-    clock : seconds, from any start
-    """
+    """Counts and times of a live run, from when this is made."""
 
     def __init__(self, clock: Clock = time.perf_counter) -> None:
         self._clock = clock
@@ -97,9 +84,6 @@ class LiveStatistics:
 
     def stages_ms(self) -> dict[str, tuple[float, float]]:
         """Give the median and the 99th percentile of each stage's time."""
-        return {stage: _median_p99(times) for stage, times in self._times.items()}
-
-
-def _median_p99(values: deque[float]) -> tuple[float, float]:
-    median, high = np.percentile(np.array(values), (50, 99))
-    return float(median), float(high)
+        percentiles = {stage: np.percentile(np.array(times), (50, 99)).tolist()
+                       for stage, times in self._times.items()}
+        return {stage: (median, p99) for stage, (median, p99) in percentiles.items()}

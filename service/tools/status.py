@@ -41,10 +41,6 @@ def as_json(address: str, status: Status) -> str:
 
 def as_text(address: str, status: Status) -> str:
     """Give the status as lines of a name and what it says."""
-    return "\n".join(f"{name:8} {value}" for name, value in _rows(address, status).items())
-
-
-def _rows(address: str, status: Status) -> dict[str, str]:
     rows = {
         "hub": f"{status.hub_version} at {address}",
         "sensors": ", ".join(status.sensors) or "none",
@@ -65,4 +61,4 @@ def _rows(address: str, status: Status) -> dict[str, str]:
             ("refused", "", status.refused)):
         if counts:
             rows[name] = prefix + ", ".join(f"{one} {count}" for one, count in counts.items())
-    return rows
+    return "\n".join(f"{name:8} {value}" for name, value in rows.items())

@@ -4,6 +4,7 @@ import argparse
 
 import pytest
 
+from denseface.recon import Preset, Settings
 from denseface.service.commands import _options
 from denseface.service.export import FORMATS
 
@@ -11,9 +12,7 @@ from denseface.service.export import FORMATS
 def test_flags_are_given_again_to_a_child_as_they_were_given():
     parser = argparse.ArgumentParser()
     parser.add_argument("--debug", action="store_true")
-    _options.add_listen(parser)
-    _options.add_recon(parser)
-    _options.add_log(parser)
+    _options.add_hub(parser)
     given = ["--debug", "--listen=tcp://[::1]:5", "--listen=tcp://[::1]:7", "--set=ratio=9",
              "--log=text"]
     names = ("debug", "listen", "key", "preset", "set", "log")
@@ -25,6 +24,15 @@ def test_the_help_names_every_format():
     parser = argparse.ArgumentParser()
     _options.add_outputs(parser, "--save")
     assert all(ending in parser.format_help() for ending in FORMATS)
+
+
+def test_the_help_names_every_preset_and_the_default():
+    parser = argparse.ArgumentParser()
+    _options.add_recon(parser)
+    *presets, last = Preset
+    default = Settings.model_fields["preset"].default
+    text = " ".join(parser.format_help().split())
+    assert f"--preset NAME {', '.join(presets)} or {last} (default: {default})" in text
 
 
 @pytest.mark.parametrize("text", ["", "0", "-1", "1.5", "x"])

@@ -118,19 +118,19 @@ def test_told_to_stop_it_answers_what_it_has_begun_and_begins_nothing(run):
     worker, connection = run(job("a"), job("b"))
     worker.finish()  # a may end at the first heartbeat
     assert connection.sent == [("worker_ready", 1), ("result", "a")]
-    assert not worker._compute
+    assert not worker.compute
 
 
 def test_told_to_stop_it_finishes_the_job_that_followed_too(run):
     worker, connection = run(job("a"), job("b"))
     connection.gate.release()
-    worker._compute._calls[0].result(20)
-    while not worker._compute._calls[1].running():
+    worker.compute._calls[0].result(20)
+    while not worker.compute._calls[1].running():
         pass
     worker.finish()  # b may end at the first heartbeat
     assert connection.sent == [("worker_ready", 1), ("worker_ready", 2), ("result", "a"),
                          ("result", "b")]
-    assert not worker._compute
+    assert not worker.compute
 
 
 def test_told_to_stop_it_sends_what_waited_for_the_hub(run):
