@@ -21,8 +21,11 @@ from denseface.capture.frame import RgbdFrame
 
 __all__ = ["Source", "open_source"]
 
-_SOURCES = {".npz": "npz:NpzSource", ".oni": "openni2:RecordingSource",
-            "openni2:": "openni2:LiveSource"}
+_SOURCES = {
+    ".npz": "npz:NpzSource",
+    ".oni": "openni2:RecordingSource",
+    "openni2:": "openni2:LiveSource",
+}
 """A file's ending or a sensor's scheme, and which class of which module of `capture` opens it.
 
 The class is imported when first needed, and called with the file's path (of a sensor: with what

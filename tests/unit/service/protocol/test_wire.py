@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import Phase, example, find, given, settings
 from hypothesis import strategies as st
 
 from denseface.recon.settings import Preset, Settings
@@ -125,10 +125,14 @@ def test_what_the_hub_sends_comes_out_the_same(packet):
     assert same(decode_from_hub(encode(packet)), packet)
 
 
-def test_every_kind_is_covered_by_the_two_tests_above():
-    kinds = {kind.model_fields["kind"].default for kind in messages.TO_HUB}
-    kinds |= {kind.model_fields["kind"].default for kind in messages.FROM_HUB}
-    assert len(kinds) == len(messages.TO_HUB) + len(messages.FROM_HUB) == 38
+@pytest.mark.parametrize(("packets", "kind"), [
+    *((to_hub, kind) for kind in messages.TO_HUB), *((from_hub, kind) for kind in messages.FROM_HUB)
+], ids=lambda value: getattr(value, "__name__", ""))
+def test_every_kind_is_among_the_examples(packets, kind):
+    found = find(packets, lambda packet: type(packet.message) is kind,
+                 settings=settings(deadline=None, derandomize=True, database=None,
+                                   max_examples=5000, phases=[Phase.generate]))
+    assert found.message.kind == kind.model_fields["kind"].default
 
 
 @given(to_hub)

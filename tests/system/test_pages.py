@@ -1,0 +1,66 @@
+"""Every command and program that a page shows is run as a reader would, a sensor plugged in."""
+
+import os
+import shutil
+
+import pytest
+
+from tests.system.running import RECORDINGS, REPOSITORY
+from tests.system.snippets import Snippet, reader, run_all, snippets
+from tests.virtual_sensor.clip import write_clip
+from tests.virtual_sensor.process import environment, play
+
+PAGES = ["README.md", "CONTRIBUTING.md", "docs/operating.md"]
+HOW_TOS = sorted(path.relative_to(REPOSITORY) for path in (REPOSITORY / "docs/howto").glob("*.md"))
+LANGUAGES = {"", "sh", "python", "json", "diff"}
+_TIMEOUT_S = 100
+
+
+@pytest.fixture(scope="module")
+def sensor(tmp_path_factory):
+    """Give an environment with a sensor that sees a face."""
+    frames, _ = play(RECORDINGS / "frontal_700.oni")
+    clip = tmp_path_factory.mktemp("clip") / "clip"
+    write_clip(clip, [(frame.depth, frame.color) for frame in frames])
+    return environment(clip)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_what_a_page_shows_runs(page, sensor):
+    with reader(REPOSITORY, sensor) as (desk, variables):
+        done = run_all(snippets(REPOSITORY / page), desk, variables, _TIMEOUT_S)
+        assert done.returncode == 0, f"{page}: {done.stderr}{done.stdout}"
+        assert "Warning" not in done.stderr
+
+
+@pytest.mark.parametrize("page", HOW_TOS, ids=lambda page: page.stem)
+def test_a_how_to_does_what_it_says(page, sensor, tmp_path):
+    """In a copy of the code: files are made, rows are added, and what is shown then runs."""
+    copy = tmp_path / "copy"
+    copy.mkdir()
+    for name in ("capture", "recon", "service", "denseface", "tests", "docs", "script"):
+        shutil.copytree(REPOSITORY / name, copy / name, symlinks=True)  # compiled kernels too
+    for name in ("pyproject.toml", "README.md", "fixtures"):
+        (copy / name).symlink_to(REPOSITORY / name)
+    with reader(copy, sensor) as (desk, variables):
+        blocks = snippets(REPOSITORY / page)
+        assert any(block.language == "diff" for block in blocks), "ends in one row of a table"
+        done = run_all(blocks, copy, variables | {"PYTHONPATH": str(copy)}, _TIMEOUT_S)
+        assert done.returncode == 0, f"{page}: {done.stderr}{done.stdout}"
+        assert not list(desk.glob("*.rej"))
+
+
+@pytest.mark.parametrize("page", [*PAGES, *map(str, HOW_TOS)])
+def test_blocks_are_of_a_kind_that_is_run_or_say_why_not(page):
+    for block in snippets(REPOSITORY / page):
+        assert block.language in LANGUAGES, f"{page}:{block.line}"
+        assert block.reason == "" or len(block.reason) > 10, f"{page}:{block.line}"
+
+
+def test_a_failing_block_is_named(tmp_path):
+    blocks = [Snippet("sh", "true\n", 3), Snippet("python", "raise SystemExit(5)\n", 8),
+              Snippet("sh", "touch never\n", 12)]
+    done = run_all(blocks, tmp_path, dict(os.environ), _TIMEOUT_S)
+    assert done.returncode == 5
+    assert done.stderr.splitlines()[-1] == "line 8"
+    assert not (tmp_path / "never").exists()
