@@ -66,7 +66,7 @@ def test_sigma_tells_good_points_from_bad(taken):
 def test_the_benchmark_fits_what_the_engine_computed(taken):
     """From the finished faces it finds the very parts that their sigma was summed from."""
     of = Samples.joined(list(taken.values()))
-    coefficients, *_ = np.linalg.lstsq(of.sources, of.sigma**2, rcond=None)
+    coefficients, *_ = np.linalg.lstsq(of.components, of.sigma**2, rcond=None)
     assert (coefficients > 0).all()
-    ratio = np.sqrt(of.sources @ coefficients) / of.sigma
+    ratio = np.sqrt(of.components @ coefficients) / of.sigma
     assert np.quantile(np.abs(ratio - 1), 0.99) < 0.02
