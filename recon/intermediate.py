@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 from denseface.recon.numerics.bilinear import add_resampled
 from denseface.recon.support import Support
 
-__all__ = ["ColorSampler", "Registration", "SurfaceGrid", "ZBuffer"]
+__all__ = ["NO_DEPTH_MM", "ColorSampler", "Registration", "SurfaceGrid", "ZBuffer"]
+
+NO_DEPTH_MM = np.float32(1e30)
+"""z of a cell without any depth, mm. Not inf: compiled code assumes finite numbers."""
 
 ColorSampler = Callable[[NDArray[np.float32]], tuple[NDArray[np.uint8], NDArray[np.bool_]]]
 """Points, (n, 3) float32, mm, to their colours, (n, 3) uint8, and which are seen, (n,) bool."""
@@ -20,7 +23,7 @@ class ZBuffer(NamedTuple):
     """The nearest z in the colour camera's frame, in cells of the colour image."""
 
     nearest: NDArray[np.float32]
-    """(rows, columns), mm, 1e30 where nothing is."""
+    """(rows, columns), mm, `NO_DEPTH_MM` where nothing is."""
     pitch: float
     """Side of a cell, pixels of the colour image."""
 

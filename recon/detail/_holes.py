@@ -21,8 +21,8 @@ from denseface.recon.detail._hole_kernels import (
     resample_filled,
 )
 from denseface.recon.detail._rim import Rim
-from denseface.recon.numerics.components import large_components
 from denseface.recon.numerics.filters import downsampled
+from denseface.recon.numerics.morphology import large_components
 
 __all__ = ["fill_holes"]
 

@@ -4,12 +4,10 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes, Doubles
 from denseface.recon.detection._haar import load_cascade, passing_boxes
 from denseface.recon.face import Box
-
-__all__ = ["CascadePass", "CenterMask", "run_pass"]
 
 _GROUP_EPS = 0.2
 """How much boxes of one face may differ, as a share of their size: OpenCV's default."""
@@ -31,7 +29,7 @@ class CascadePass(NamedTuple):
 class CenterMask(NamedTuple):
     """Where in an image the centre of a box may be."""
 
-    allowed: NDArray[np.bool_]
+    allowed: Bools
     """(rows, columns), cells of the image."""
     cell_px: float
     """Side of a cell, pixels."""
@@ -41,12 +39,8 @@ class CenterMask(NamedTuple):
 
 
 def run_pass(
-    gray: NDArray[np.uint8],
-    roi: Box,
-    cascade_pass: CascadePass,
-    typical_px: float,
-    size_limits: tuple[float, float],
-    centers: CenterMask,
+    gray: Bytes, roi: Box, cascade_pass: CascadePass, typical_px: float,
+    size_limits: tuple[float, float], centers: CenterMask,
 ) -> list[Box]:
     """Find faces in a part of an image.
 
@@ -95,9 +89,7 @@ def run_pass(
     return found
 
 
-def _rotated(
-    image: NDArray[np.uint8], degrees: float
-) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+def _rotated(image: Bytes, degrees: float) -> tuple[Bytes, Doubles]:
     """Rotate a whole image counterclockwise; give also the (2, 3) transform of its pixels back."""
     height, width = image.shape
     transform = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), degrees, 1.0)

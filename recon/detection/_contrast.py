@@ -2,11 +2,9 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bytes
 from denseface.recon.face import Box
-
-__all__ = ["equalize_contrast"]
 
 _LOW, _HIGH = 2.0, 98.0
 """Percentiles of the samples' brightness that become black and white."""
@@ -18,9 +16,7 @@ _CLIP_LIMIT = 4.0
 """CLAHE's limit of contrast (Zuiderveld, 1994)."""
 
 
-def equalize_contrast(
-    gray: NDArray[np.uint8], roi: Box, samples: NDArray[np.uint8]
-) -> NDArray[np.uint8]:
+def equalize_contrast(gray: Bytes, roi: Box, samples: Bytes) -> Bytes:
     """Stretch a part of an image to the whole range of the samples, then apply CLAHE.
 
     The samples are what lies at a face's depth: neither a wall behind it nor a lamp then decides

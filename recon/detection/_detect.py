@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bytes
 from denseface.recon.detection._cascades import CascadePass, CenterMask, run_pass
 from denseface.recon.detection._contrast import equalize_contrast
 from denseface.recon.detection._kernels import center_depths, depths_in_box
@@ -17,8 +17,6 @@ from denseface.recon.errors import FaceWithoutDepthError, NoFaceError
 from denseface.recon.face import Box, FaceCandidate
 from denseface.recon.intermediate import Registration
 from denseface.recon.numerics.percentile import percentile
-
-__all__ = ["FACE_WIDTH_MM", "Detection", "detect_face", "judge_box"]
 
 FACE_WIDTH_MM = (110.0, 210.0)
 """How wide a cascade's box around a face is, child to large adult, hair included."""
@@ -92,9 +90,7 @@ class Detection:
     candidates: tuple[FaceCandidate, ...]
 
 
-def detect_face(
-    color: NDArray[np.uint8], registered: Registration, focal_px: float
-) -> Detection:
+def detect_face(color: Bytes, registered: Registration, focal_px: float) -> Detection:
     """Find the nearest face whose size and shape fit its depth.
 
     The scene is searched from the nearest layer of depth to the farthest, at most 2 m, and no
@@ -122,8 +118,7 @@ def detect_face(
             if hit:
                 return search.detection(search.nearer_face(hit.face) or hit)
             if one is _COARSE and not equalized:
-                search.drop_flat_regions()
-    search.search_whole_image()
+                search.regions = search.without_flat(search.regions)
     raise search.failure()
 
 
@@ -160,16 +155,14 @@ class _Hit(NamedTuple):
     """A face, and in which image and by which pass it was found."""
 
     face: FaceCandidate
-    gray: NDArray[np.uint8]
+    gray: Bytes
     cascade_pass: CascadePass
 
 
 class _Search:
     """One frame's search: the image, the regions to search, and the candidates so far."""
 
-    def __init__(
-        self, color: NDArray[np.uint8], registered: Registration, focal_px: float
-    ) -> None:
+    def __init__(self, color: Bytes, registered: Registration, focal_px: float) -> None:
         self.registered = registered
         self.focal_px = focal_px
         self.candidates: list[FaceCandidate] = []
@@ -181,11 +174,11 @@ class _Search:
         self.to_color = color.shape[1] / gray.shape[1]
         self.shape = color.shape[:2]
         self.regions = regions_by_depth(registered, self.shape, focal_px)
-        self._equalized: dict[tuple[Box, float, float], NDArray[np.uint8]] = {}
+        self._equalized: dict[tuple[Box, float, float], Bytes] = {}
 
-    def drop_flat_regions(self) -> None:
-        """From now on search only where depth bulges."""
-        self.regions = without_flat(self.regions, self.registered, self.shape, self.focal_px)
+    def without_flat(self, regions: list[Region]) -> list[Region]:
+        """Keep only where depth bulges."""
+        return without_flat(regions, self.registered, self.shape, self.focal_px)
 
     def nearest_face(
         self, cascade_pass: CascadePass, regions: Iterable[Region], *, equalized: bool = False
@@ -214,8 +207,7 @@ class _Search:
             region.centers[top:bottom, left:right] = False
             if region.far_mm > _depth(found) - _BODY_MM:
                 region.centers[bottom:, max(round(x - w / 2), 0):round(x + 1.5 * w)] = False
-        if nearer:
-            nearer = without_flat(nearer, self.registered, self.shape, self.focal_px)
+        nearer = self.without_flat(nearer)
         for equalized, passes in ((False, _NEARER_PASSES), (True, _NEARER_EQUALIZED_PASSES)):
             for one in passes if nearer else ():
                 hit = self.nearest_face(one, nearer, equalized=equalized)
@@ -234,23 +226,26 @@ class _Search:
             for c in others))
         return Detection(chosen.box, _depth(chosen), candidates)
 
-    def search_whole_image(self) -> None:
-        """Run a pass over the whole image, so that `failure` can name what is no face."""
+    def failure(self) -> NoFaceError | FaceWithoutDepthError:
+        """Say why there is no face; what looks like one is sought in the whole image."""
         height, width = (round(side * self.to_color) for side in self.gray.shape)
         typical = 3 * _WHOLE_IMAGE.face_px * self.to_color
         self.candidates += self._run(
             self.gray, (0, 0, width, height), _WHOLE_IMAGE, typical, (0.0, float(height)),
             CenterMask(np.ones((1, 1), np.bool_), float(width)))
-
-    def failure(self) -> NoFaceError | FaceWithoutDepthError:
-        """Say why there is no face."""
-        measured = [c for c in self.candidates if c.depth_mm is not None]
         if not self.candidates:
             return NoFaceError("no face found in the colour image")
+        measured = [c for c in self.candidates if c.depth_mm is not None]
         if not measured:
             return FaceWithoutDepthError(
                 f"face seen at {self.candidates[0].box}, but no depth was measured on it")
-        return NoFaceError(f"no face found: {_rejection(measured[-1])}")
+        if measured[-1].verdict == "flat":
+            return NoFaceError(
+                f"no face found: what the box at {measured[-1].box} shows is flat")
+        least, most = FACE_WIDTH_MM
+        return NoFaceError(
+            f"no face found: the box at {measured[-1].box} is {measured[-1].width_mm:.0f} mm wide "
+            f"at its depth, a face is {least:.0f}-{most:.0f} mm")
 
     def _refine(self, hit: _Hit) -> list[FaceCandidate]:
         """Give the boxes of a face's size at its depth, about the centre of the one found."""
@@ -271,26 +266,22 @@ class _Search:
                             (u - shift) / self.to_color, (v - shift) / self.to_color)
         return self._run(gray, roi, again, wider * w, (small, large), center)
 
-    def _equalize(self, region: Region) -> NDArray[np.uint8]:
+    def _equalize(self, region: Region) -> Bytes:
         """Give the image with a region's contrast equalised by what lies at its depth."""
         key = (region.roi, region.near_mm, region.far_mm)
         if key not in self._equalized:
-            roi = _scaled(region.roi, 1 / self.to_color)
-            self._equalized[key] = equalize_contrast(self.gray, roi, self._samples(region))
+            depth = self.registered.color_depth
+            at_depth = (self.registered.visible & (depth >= region.near_mm)
+                        & (depth < region.far_mm))
+            u, v = (self.registered.pixels[at_depth] / np.float32(self.to_color)).astype(np.int32).T
+            x, y, w, h = roi = _scaled(region.roi, 1 / self.to_color)
+            inside = (u >= x) & (u < x + w) & (v >= y) & (v < y + h)
+            samples = self.gray[v[inside], u[inside]]
+            self._equalized[key] = equalize_contrast(self.gray, roi, samples)
         return self._equalized[key]
 
-    def _samples(self, region: Region) -> NDArray[np.uint8]:
-        """Give the brightness of what was measured in a region."""
-        registered = self.registered
-        at_depth = (registered.visible & (registered.color_depth >= region.near_mm)
-                    & (registered.color_depth < region.far_mm))
-        u, v = (registered.pixels[at_depth] / np.float32(self.to_color)).astype(np.int32).T
-        x, y, w, h = _scaled(region.roi, 1 / self.to_color)
-        inside = (u >= x) & (u < x + w) & (v >= y) & (v < y + h)
-        return np.asarray(self.gray[v[inside], u[inside]], np.uint8)
-
     def _run(
-        self, gray: NDArray[np.uint8], roi: Box, cascade_pass: CascadePass, typical: float,
+        self, gray: Bytes, roi: Box, cascade_pass: CascadePass, typical: float,
         sizes: tuple[float, float], centers: CenterMask,
     ) -> list[FaceCandidate]:
         """Run a pass and judge its boxes; `roi`, `typical`, `sizes` in pixels of `color`."""
@@ -304,13 +295,6 @@ class _Search:
 
 def _depth(candidate: FaceCandidate) -> float:
     return np.inf if candidate.depth_mm is None else candidate.depth_mm
-
-
-def _rejection(candidate: FaceCandidate) -> str:
-    if candidate.verdict == "flat":
-        return f"what the box at {candidate.box} shows is flat"
-    return (f"the box at {candidate.box} is {candidate.width_mm:.0f} mm wide at its depth, a face "
-            f"is {FACE_WIDTH_MM[0]:.0f}-{FACE_WIDTH_MM[1]:.0f} mm")
 
 
 def _scaled(box: Box, factor: float) -> Box:

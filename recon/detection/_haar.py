@@ -11,8 +11,8 @@ from xml.etree import ElementTree
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes, Doubles, Ints, Sizes
 from denseface.recon.detection._haar_kernels import (
     Trees,
     WindowGrid,
@@ -20,8 +20,6 @@ from denseface.recon.detection._haar_kernels import (
     passing_windows,
 )
 from denseface.recon.face import Box
-
-__all__ = ["Cascade", "load_cascade", "passing_boxes"]
 
 _THRESHOLD_SLACK = 1e-5
 """What OpenCV takes off a stage's threshold for rounding."""
@@ -43,7 +41,7 @@ class Cascade(NamedTuple):
 
     window: int
     trees: Trees
-    corners: NDArray[np.int32]
+    corners: Ints
 
 
 @cache
@@ -61,7 +59,7 @@ def load_cascade(name: str) -> Cascade:
     root = _child(ElementTree.parse(path).getroot(), "cascade")  # noqa: S314  OpenCV's own file
     rectangles = [[_numbers(one) for one in _child(feature, "rects")]
                   for feature in _child(root, "features")]
-    nodes: list[NDArray[np.float64]] = []
+    nodes: list[Doubles] = []
     outcomes: list[list[float]] = []
     stages, stage_thresholds = [0], []
     for stage in _child(root, "stages"):
@@ -90,12 +88,8 @@ def load_cascade(name: str) -> Cascade:
 
 
 def passing_boxes(
-    gray: NDArray[np.uint8],
-    cascade: Cascade,
-    size_limits: tuple[float, float],
-    scale_step: float,
-    allowed: NDArray[np.bool_],
-    to_cells: NDArray[np.float64],
+    gray: Bytes, cascade: Cascade, size_limits: tuple[float, float], scale_step: float,
+    allowed: Bools, to_cells: Doubles,
 ) -> list[Box]:
     """Give each window of each size that passes all stages.
 
@@ -112,7 +106,7 @@ def passing_boxes(
     smallest, largest = size_limits
     found = []
     stride = width + 1 + (width + 1) % 2
-    offsets: dict[int, NDArray[np.uint64]] = {}
+    offsets: dict[int, Sizes] = {}
     scale = 1.0
     while (side := round(cascade.window * scale)) <= min(largest, height, width):
         if side >= smallest:
@@ -149,5 +143,5 @@ def _child(element: ElementTree.Element, name: str) -> ElementTree.Element:
     return found
 
 
-def _numbers(element: ElementTree.Element) -> NDArray[np.float64]:
+def _numbers(element: ElementTree.Element) -> Doubles:
     return np.array((element.text or "").split(), np.float64)

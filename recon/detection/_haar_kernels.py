@@ -4,14 +4,13 @@ Neighbouring windows go through the cascade together, one in each lane of a vect
 their rectangles are neighbours in memory, and no branch depends on one window alone.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes, Doubles, Floats, Ints, Sizes
 from denseface.recon.numerics.jit import STACK_FLOATS, compiled, inlined, stack_floats
-
-__all__ = ["Trees", "WindowGrid", "corner_offsets", "passing_windows"]
 
 _MIN_DEVIATION = 10.0
 """Grey levels: windows of a smaller standard deviation show no pattern."""
@@ -36,11 +35,11 @@ class Trees(NamedTuple):
     stage_thresholds : (stages,) float32, what the trees of a stage must add up to
     """
 
-    weights: NDArray[np.float32]
-    thresholds: NDArray[np.float32]
-    outcomes: NDArray[np.float32]
+    weights: Floats
+    thresholds: Floats
+    outcomes: Floats
     stages: NDArray[np.uint32]
-    stage_thresholds: NDArray[np.float32]
+    stage_thresholds: Floats
 
 
 class WindowGrid(NamedTuple):
@@ -57,28 +56,23 @@ class WindowGrid(NamedTuple):
 
 
 class _Integrals(NamedTuple):
-    sums: NDArray[np.int32]
+    sums: Ints
     """Sum of the pixels above and left of each corner of a pixel, as laid out by the grid."""
     squares: NDArray[np.int64]
     """(H + 1, W + 1), the same of their squares."""
 
 
 @compiled
-def corner_offsets(corners: NDArray[np.int32], grid: WindowGrid) -> NDArray[np.uint64]:
+def corner_offsets(corners: Ints, grid: WindowGrid) -> Sizes:
     """Turn (nodes, 12, 2) x and y of corners into offsets in the integral image."""
-    offsets = np.empty(corners.shape[:2], np.uint64)
-    for node in range(corners.shape[0]):
-        for k in range(corners.shape[1]):
-            offsets[node, k] = (
-                _column(corners[node, k, 0], grid) + grid.stride * corners[node, k, 1])
-    return offsets
+    offsets: Sizes = _column(corners[:, :, 0], grid) + grid.stride * corners[:, :, 1]
+    return offsets.astype(np.uint64)
 
 
 @compiled
 def passing_windows(
-    image: NDArray[np.uint8], trees: Trees, offsets: NDArray[np.uint64], grid: WindowGrid,
-    to_cells: NDArray[np.float64], allowed: NDArray[np.bool_],
-) -> NDArray[np.int32]:
+    image: Bytes, trees: Trees, offsets: Sizes, grid: WindowGrid, to_cells: Doubles, allowed: Bools
+) -> Ints:
     """Give the (n, 2) columns and rows of the windows that pass every stage.
 
     image : (H, W)
@@ -118,14 +112,14 @@ def passing_windows(
 
 
 @compiled
-def _column(x: int, grid: WindowGrid) -> int:
-    """Give where a column is in a row of the integral image."""
+def _column(x: Any, grid: WindowGrid) -> Any:
+    """Give where a column, or each of an array, is in a row of the integral image."""
     odd = grid.step - 1
     return (x >> odd) + (grid.stride >> odd) * (x & odd)
 
 
 @compiled
-def _integral_images(image: NDArray[np.uint8], grid: WindowGrid) -> _Integrals:
+def _integral_images(image: Bytes, grid: WindowGrid) -> _Integrals:
     height, width = image.shape
     sums = np.zeros((height + 1) * grid.stride + STACK_FLOATS, np.int32)
     squares = np.zeros((height + 1, width + 1), np.int64)
@@ -143,8 +137,8 @@ def _integral_images(image: NDArray[np.uint8], grid: WindowGrid) -> _Integrals:
 
 @compiled
 def _set_scales(
-    scale: NDArray[np.float32], y: int, integrals: _Integrals, grid: WindowGrid,
-    to_cells: NDArray[np.float64], allowed: NDArray[np.bool_],
+    scale: Floats, y: int, integrals: _Integrals, grid: WindowGrid,
+    to_cells: Doubles, allowed: Bools,
 ) -> None:
     """Set one over area and standard deviation of a row's windows; 0 where one is left out.
 
@@ -175,8 +169,7 @@ def _set_scales(
 
 @compiled
 def _run_stages(
-    sums: NDArray[np.int32], at: np.uint64, scale: NDArray[np.float32], trees: Trees,
-    offsets: NDArray[np.uint64], rejected_by: NDArray[np.int32],
+    sums: Ints, at: np.uint64, scale: Floats, trees: Trees, offsets: Sizes, rejected_by: Ints
 ) -> None:
     """Set the stage that rejects each of `STACK_FLOATS` windows, or the number of all stages.
 
@@ -210,8 +203,7 @@ def _run_stages(
 
 @inlined
 def _add_node(
-    sums: NDArray[np.int32], at: np.uint64, offsets: NDArray[np.uint64],
-    trees: Trees, tree: int, scale: NDArray[np.float32], score: NDArray[np.float32],
+    sums: Ints, at: np.uint64, offsets: Sizes, trees: Trees, tree: int, scale: Floats, score: Floats
 ) -> None:
     """Add what a tree of one node says of each window."""
     weights, thresholds, outcomes, _, _ = trees
@@ -228,8 +220,7 @@ def _add_node(
 
 @inlined
 def _add_nodes(
-    sums: NDArray[np.int32], at: np.uint64, offsets: NDArray[np.uint64],
-    trees: Trees, tree: int, scale: NDArray[np.float32], score: NDArray[np.float32],
+    sums: Ints, at: np.uint64, offsets: Sizes, trees: Trees, tree: int, scale: Floats, score: Floats
 ) -> None:
     """Add what a tree of two nodes says of each window."""
     weights, thresholds, outcomes, _, _ = trees
@@ -253,8 +244,7 @@ def _add_nodes(
 
 @inlined
 def _two_rectangles(
-    sums: NDArray[np.int32], at: np.uint64, offsets: NDArray[np.uint64],
-    weights: NDArray[np.float32], node: np.uint64 | int,
+    sums: Ints, at: np.uint64, offsets: Sizes, weights: Floats, node: np.uint64 | int
 ) -> np.float32:
     """Give the weighted sum over a node's first two rectangles."""
     value: np.float32 = (
@@ -269,8 +259,7 @@ def _two_rectangles(
 
 @inlined
 def _three_rectangles(
-    sums: NDArray[np.int32], at: np.uint64, offsets: NDArray[np.uint64],
-    weights: NDArray[np.float32], node: np.uint64 | int,
+    sums: Ints, at: np.uint64, offsets: Sizes, weights: Floats, node: np.uint64 | int
 ) -> np.float32:
     """Give the weighted sum over a node's three rectangles."""
     value: np.float32 = (

@@ -1,17 +1,14 @@
 """The loops of detection over the registered depth, compiled."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes, Doubles, Floats
 from denseface.recon.numerics.jit import compiled
-
-__all__ = ["center_depths", "depths_in_box", "fill_layers", "nearest_in_cells"]
 
 
 @compiled
 def fill_layers(
-    pixels: NDArray[np.float32], color_depth: NDArray[np.float32], visible: NDArray[np.bool_],
-    edges: NDArray[np.float64], cell: float, filled: NDArray[np.uint8],
+    pixels: Floats, color_depth: Floats, visible: Bools, edges: Doubles, cell: float, filled: Bytes
 ) -> None:
     """Set to 1, layer by layer of depth, the cells of the colour image that hold a depth.
 
@@ -35,8 +32,7 @@ def fill_layers(
 
 @compiled
 def nearest_in_cells(
-    pixels: NDArray[np.float32], color_depth: NDArray[np.float32], visible: NDArray[np.bool_],
-    cell: float, nearest: NDArray[np.float32],
+    pixels: Floats, color_depth: Floats, visible: Bools, cell: float, nearest: Floats
 ) -> None:
     """Lower each of the (rows, columns) cells to the nearest depth in it, mm."""
     rows, columns = nearest.shape
@@ -50,9 +46,9 @@ def nearest_in_cells(
 
 @compiled
 def depths_in_box(
-    pixels: NDArray[np.float32], color_depth: NDArray[np.float32], visible: NDArray[np.bool_],
+    pixels: Floats, color_depth: Floats, visible: Bools,
     left: float, top: float, width: float, height: float,
-) -> NDArray[np.float64]:
+) -> Doubles:
     """Give the (n, 3) u, v and z of what the colour camera sees in a box.
 
     u and v are -1 and 1 at the sides of the box.
@@ -72,7 +68,7 @@ def depths_in_box(
 
 
 @compiled
-def center_depths(depths: NDArray[np.float64], half: float) -> NDArray[np.float64]:
+def center_depths(depths: Doubles, half: float) -> Doubles:
     """Give the z of (n, 3) u, v and z with both u and v nearer to 0 than `half`."""
     found = np.empty(len(depths))
     count = 0

@@ -4,15 +4,13 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools
 from denseface.recon.detection._kernels import fill_layers, nearest_in_cells
 from denseface.recon.detection._relief import bulging_cells
 from denseface.recon.errors import NoDepthError
 from denseface.recon.face import Box
-from denseface.recon.intermediate import Registration
-
-__all__ = ["CELLS", "Region", "regions_by_depth", "without_flat"]
+from denseface.recon.intermediate import NO_DEPTH_MM, Registration
 
 CELLS = 80
 """Cells across the colour image, in which depth is judged."""
@@ -35,8 +33,6 @@ _HALF_BOX_MM = 80.0
 """From a cell to the sides of the box in which a bulge is fitted."""
 _HALF_NARROWEST_MM, _HALF_WIDEST_MM = 55.0, 105.0
 """Half of the narrowest and of the widest face."""
-_NOTHING = np.float32(1e30)
-"""z of a cell without depth, mm."""
 
 
 class Region(NamedTuple):
@@ -45,7 +41,7 @@ class Region(NamedTuple):
     roi: Box
     near_mm: float
     far_mm: float
-    centers: NDArray[np.bool_]
+    centers: Bools
     """(rows, CELLS) of the whole image: where the centre of a face can be."""
 
 
@@ -101,7 +97,7 @@ def without_flat(
     if not regions:
         return []
     cell = shape[1] / CELLS
-    nearest = np.full(regions[0].centers.shape, _NOTHING)
+    nearest = np.full(regions[0].centers.shape, NO_DEPTH_MM)
     nearest_in_cells(registered.pixels, registered.color_depth, registered.visible, cell, nearest)
     remaining = []
     for region in regions:

@@ -1,12 +1,10 @@
 """How far what a box shows bulges toward the camera; the fits are compiled."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Doubles, Floats
 from denseface.recon.numerics.jit import compiled
 from denseface.recon.numerics.linear_solve import solve_small
-
-__all__ = ["bulge_mm", "bulging_cells", "fit_bulge"]
 
 _HEAD_MM = 120.0
 """Depths nearer or farther than the middle by more than this, mm, are not part of the head."""
@@ -21,7 +19,7 @@ _SAMPLES = 5
 """Samples from the middle of a cell's surroundings to each side, at most."""
 
 
-def bulge_mm(depths: NDArray[np.float64], depth_mm: float) -> float:
+def bulge_mm(depths: Doubles, depth_mm: float) -> float:
     """Fit z = a + b u + c v + d (u^2 + v^2) to a box's depths, and give d at the box's sides.
 
     A wall, a cupboard or a photograph, however slanted, has none; a face about 30 mm.
@@ -40,7 +38,7 @@ def bulge_mm(depths: NDArray[np.float64], depth_mm: float) -> float:
 
 
 @compiled
-def fit_bulge(depths: NDArray[np.float64], depth_mm: float) -> tuple[float, bool]:
+def fit_bulge(depths: Doubles, depth_mm: float) -> tuple[float, bool]:
     """Give `bulge_mm`, and whether there are enough depths to tell."""
     kept = np.ones(len(depths), np.bool_)
     fitted = np.zeros(4)
@@ -57,9 +55,8 @@ def fit_bulge(depths: NDArray[np.float64], depth_mm: float) -> tuple[float, bool
 
 @compiled
 def _normal_equations(
-    depths: NDArray[np.float64], depth_mm: float, fitted: NDArray[np.float64], trim: bool,
-    kept: NDArray[np.bool_],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
+    depths: Doubles, depth_mm: float, fitted: Doubles, trim: bool, kept: Bools
+) -> tuple[Doubles, Doubles, int]:
     """Give the fit's equations over the kept depths, and their number.
 
     kept : (n,), cleared outside the unit circle, off the head and, where `trim`, in front of
@@ -87,9 +84,7 @@ def _normal_equations(
 
 
 @compiled
-def bulging_cells(
-    nearest: NDArray[np.float32], allowed: NDArray[np.bool_], half_at_1_mm: float, min_mm: float
-) -> NDArray[np.bool_]:
+def bulging_cells(nearest: Floats, allowed: Bools, half_at_1_mm: float, min_mm: float) -> Bools:
     """Give the allowed cells around which depth bulges by at least `min_mm`, or cannot tell.
 
     nearest : (rows, columns), mm, the nearest depth in each cell, or a very large number

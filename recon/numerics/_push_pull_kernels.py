@@ -5,17 +5,13 @@ over count, filtered alike.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes, Floats
 from denseface.recon.numerics.jit import compiled
-
-__all__ = ["divide", "halve", "masked_sums", "pull", "set_rounded", "splat_colors"]
 
 
 @compiled
-def splat_colors(
-    colors: NDArray[np.uint8], coordinates: NDArray[np.float32], rows: int, columns: int
-) -> NDArray[np.float32]:
+def splat_colors(colors: Bytes, coordinates: Floats, rows: int, columns: int) -> Floats:
     """Splat each colour, and a 1 beside it, on the four pixels around its coordinates, bilinear.
 
     colors : (n, 3); coordinates : (n, 2), (row, column), inside the image
@@ -43,7 +39,7 @@ def splat_colors(
 
 
 @compiled
-def masked_sums(image: NDArray[np.uint8], known: NDArray[np.bool_]) -> NDArray[np.float32]:
+def masked_sums(image: Bytes, known: Bools) -> Floats:
     """Give the known colours of an image, (H, W, 3), and a 1 beside each; 0 elsewhere."""
     rows, columns = known.shape
     sums = np.zeros((rows, columns, 4), np.float32)
@@ -57,9 +53,7 @@ def masked_sums(image: NDArray[np.uint8], known: NDArray[np.bool_]) -> NDArray[n
 
 
 @compiled
-def divide(
-    sums: NDArray[np.float32], wanted: NDArray[np.bool_], least: float
-) -> tuple[NDArray[np.float32], NDArray[np.bool_], int]:
+def divide(sums: Floats, wanted: Bools, least: float) -> tuple[Floats, Bools, int]:
     """Divide the sums by their count where they are wanted and the count is more than `least`.
 
     Returns the means, (rows, columns, 3), 0 elsewhere; which wanted ones are missing, (rows,
@@ -84,9 +78,7 @@ def divide(
 
 
 @compiled
-def halve(
-    sums: NDArray[np.float32], missing: NDArray[np.bool_]
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+def halve(sums: Floats, missing: Bools) -> tuple[Floats, Bools]:
     """Average each four pixels, 0 outside, and say whether one of them is missing."""
     rows, columns = missing.shape
     half = np.zeros(((rows + 1) // 2, (columns + 1) // 2, 4), np.float32)
@@ -107,9 +99,7 @@ def halve(
 
 
 @compiled
-def pull(
-    mean: NDArray[np.float32], missing: NDArray[np.bool_], coarse: NDArray[np.float32]
-) -> None:
+def pull(mean: Floats, missing: Bools, coarse: Floats) -> None:
     """Interpolate the missing means, (rows, columns, 3), from those at half the size, bilinear."""
     last_row, last_column = coarse.shape[0] - 1, coarse.shape[1] - 1
     quarter = np.float32(0.25)
@@ -130,9 +120,7 @@ def pull(
 
 
 @compiled
-def set_rounded(
-    mean: NDArray[np.float32], wanted: NDArray[np.bool_], image: NDArray[np.uint8]
-) -> None:
+def set_rounded(mean: Floats, wanted: Bools, image: Bytes) -> None:
     """Set the wanted pixels of an image to the means, rounded."""
     for row in range(wanted.shape[0]):
         for column in range(wanted.shape[1]):

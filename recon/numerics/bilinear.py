@@ -7,6 +7,7 @@ fractional rows, (m,), and columns, (k,), of the image: inside it and rising.
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Floats
 from denseface.recon.numerics.jit import compiled
 
 __all__ = ["add_resampled", "column_positions", "exceeds", "read_row"]
@@ -16,10 +17,7 @@ _0, _1 = np.uint64(0), np.uint64(1)
 
 
 @compiled
-def add_resampled(
-    image: NDArray[np.float32], coarse: NDArray[np.float32], rows: NDArray[np.float32],
-    columns: NDArray[np.float32],
-) -> None:
+def add_resampled(image: Floats, coarse: Floats, rows: Floats, columns: Floats) -> None:
     """Add a resampled image to another, (m, k)."""
     left, part = column_positions(columns, coarse.shape[1])
     lines, known = np.empty((2, len(columns)), np.float32), -2
@@ -34,32 +32,16 @@ def add_resampled(
             own[j] += upper[j] + down * (lower[j] - upper[j])
 
 
-@compiled
-def exceeds(
-    coarse: NDArray[np.float32], rows: NDArray[np.float32], columns: NDArray[np.float32],
-    level: float,
-) -> NDArray[np.bool_]:
+def exceeds(coarse: Floats, rows: Floats, columns: Floats, level: float) -> Bools:
     """Say where a resampled image is above a level, (m, k)."""
-    left, part = column_positions(columns, coarse.shape[1])
-    lines, known = np.empty((2, len(columns)), np.float32), -2
-    out = np.empty((len(rows), len(columns)), np.bool_)
-    least = np.float32(level)
-    for i in range(len(rows)):
-        first = min(int(rows[i]), coarse.shape[0] - 2)
-        if first != known:
-            _read_rows(coarse, first, known, left, part, lines)
-            known = first
-        upper, lower, down = lines[first & 1], lines[1 - (first & 1)], rows[i] - np.float32(first)
-        own = out[i]
-        for j in range(len(columns)):
-            own[j] = upper[j] + down * (lower[j] - upper[j]) > least
-    return out
+    image = np.zeros((len(rows), len(columns)), np.float32)
+    add_resampled(image, coarse, rows, columns)
+    return image > np.float32(level)
 
 
 @compiled
 def _read_rows(
-    image: NDArray[np.float32], first: int, known: int, left: NDArray[np.uint32],
-    part: NDArray[np.float32], lines: NDArray[np.float32],
+    image: Floats, first: int, known: int, left: NDArray[np.uint32], part: Floats, lines: Floats
 ) -> None:
     """Read a row of an image and the next at some columns.
 
@@ -73,9 +55,7 @@ def _read_rows(
 
 
 @compiled
-def column_positions(
-    columns: NDArray[np.float32], width: int
-) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+def column_positions(columns: Floats, width: int) -> tuple[NDArray[np.uint32], Floats]:
     """Split columns into the pixel to the left, and how far each is from it."""
     left, part = np.empty(len(columns), np.uint32), np.empty(len(columns), np.float32)
     for j in range(len(columns)):
@@ -86,9 +66,8 @@ def column_positions(
 
 @compiled
 def read_row(
-    image: NDArray[np.float32], begin: np.uint64, left: NDArray[np.uint32],
-    part: NDArray[np.float32], channels: np.uint64, first: np.uint64, end: np.uint64,
-    out: NDArray[np.float32],
+    image: Floats, begin: np.uint64, left: NDArray[np.uint32], part: Floats, channels: np.uint64,
+    first: np.uint64, end: np.uint64, out: Floats,
 ) -> None:
     """Read a row of a flat image, which starts at `begin`, at `column_positions`.
 

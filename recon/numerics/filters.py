@@ -2,26 +2,24 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Floats
 from denseface.recon.numerics.jit import compiled
 
 __all__ = ["blurred", "downsampled", "filtered", "gaussian_taps", "upsampled"]
-
-Image = NDArray[np.float32]
 
 _REACH = 3.0
 """Where a Gaussian ends, standard deviations: OpenCV's own four take a third longer."""
 
 
-def gaussian_taps(sigma: float) -> NDArray[np.float32]:
+def gaussian_taps(sigma: float) -> Floats:
     """Give the taps of a Gaussian of that standard deviation, pixels, to thrice it each way."""
     size = 2 * max(1, round(_REACH * sigma)) + 1
     return np.asarray(cv2.getGaussianKernel(size, sigma, cv2.CV_32F), np.float32).ravel()
 
 
 @compiled
-def filtered(image: Image, taps: Image) -> Image:
+def filtered(image: Floats, taps: Floats) -> Floats:
     """Filter rows and columns of (rows, columns, channels) alike; zero outside.
 
     taps : (2 reach + 1,), symmetric
@@ -60,14 +58,14 @@ def filtered(image: Image, taps: Image) -> Image:
     return out.reshape(rows, columns, channels)
 
 
-def blurred(image: Image, sigma: float) -> Image:
+def blurred(image: Floats, sigma: float) -> Floats:
     """Filter by a Gaussian of that standard deviation, pixels; zero outside."""
     side = 2 * max(1, round(_REACH * sigma)) + 1
     return np.asarray(
         cv2.GaussianBlur(image, (side, side), sigma, borderType=cv2.BORDER_CONSTANT), np.float32)
 
 
-def downsampled(image: Image) -> Image:
+def downsampled(image: Floats) -> Floats:
     """Average each four pixels, the edge repeated: half of the rows and columns, rounded up."""
     rows, columns = image.shape
     even = cv2.copyMakeBorder(image, 0, rows % 2, 0, columns % 2, cv2.BORDER_REPLICATE)
@@ -75,7 +73,7 @@ def downsampled(image: Image) -> Image:
                       np.float32)
 
 
-def upsampled(image: Image, shape: tuple[int, ...]) -> Image:
+def upsampled(image: Floats, shape: tuple[int, ...]) -> Floats:
     """Interpolate a downsampled image, of any channels, to its former (rows, columns)."""
     finer = cv2.resize(image, None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
     return np.ascontiguousarray(finer[:shape[0], :shape[1]], np.float32)

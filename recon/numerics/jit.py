@@ -7,12 +7,12 @@ where neither can be written, it is compiled at each start.
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-import numpy as np
 from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.numpy_support import carray
-from numpy.typing import NDArray
+
+from denseface.recon.arrays import Floats
 
 __all__ = ["STACK_FLOATS", "compiled", "inlined", "stack_floats"]
 
@@ -47,7 +47,7 @@ def _stack_pointer(_: Any) -> tuple[Any, Any]:
 
 
 @inlined
-def stack_floats() -> NDArray[np.float32]:
+def stack_floats() -> Floats:
     """Give (`STACK_FLOATS`,) float32 on the stack, for compiled functions alone.
 
     The compiler knows that no other array aliases them, and vectorises loops without checks.

@@ -1,8 +1,7 @@
 """Systems of a few linear equations, compiled."""
 
-import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Doubles
 from denseface.recon.numerics.jit import compiled
 
 __all__ = ["solve_small"]
@@ -12,7 +11,7 @@ _RIDGE = 1e-6
 
 
 @compiled
-def solve_small(matrix: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+def solve_small(matrix: Doubles, right: Doubles) -> Doubles:
     """Solve a positive definite system by elimination, (n, n) and (n,); both are overwritten."""
     size = len(right)
     for k in range(size):

@@ -5,21 +5,19 @@ the blurred weight.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Floats
 from denseface.recon.numerics.filters import blurred
 from denseface.recon.numerics.jit import compiled
 
 __all__ = ["normalized", "normalized_convolution"]
-
-Image = NDArray[np.float32]
 
 _LEAST_WEIGHT = np.float32(1e-6)
 """Weights are divided by as if they were at least this."""
 _QUARTER = np.float32(0.25)
 
 
-def normalized_convolution(weight: Image, sigma: float, *values: Image) -> list[Image]:
+def normalized_convolution(weight: Floats, sigma: float, *values: Floats) -> list[Floats]:
     """Average images under a Gaussian, (rows, columns) each to half of that, rounded up.
 
     Parameters
@@ -32,7 +30,7 @@ def normalized_convolution(weight: Image, sigma: float, *values: Image) -> list[
 
 
 @compiled
-def _downsampled_products(weight: Image, values: tuple[Image, ...]) -> Image:
+def _downsampled_products(weight: Floats, values: tuple[Floats, ...]) -> Floats:
     """Average a weight, and its product with each value, over each four pixels.
 
     weight, values : (rows, columns) each; beyond the edge the weight is zero
@@ -55,7 +53,7 @@ def _downsampled_products(weight: Image, values: tuple[Image, ...]) -> Image:
 
 
 @compiled
-def normalized(planes: Image) -> Image:
+def normalized(planes: Floats) -> Floats:
     """Divide all planes but the first by it: (rows, columns, 1 + k) to (k, rows, columns)."""
     rows, columns, count = planes.shape
     out = np.empty((count - 1, rows, columns), np.float32)

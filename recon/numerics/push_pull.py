@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes, Floats
 from denseface.recon.numerics._push_pull_kernels import (
     divide,
     halve,
@@ -31,12 +32,8 @@ _REACH = np.ones((5, 5), np.uint8)
 
 
 def interpolate_colors(
-    colors: NDArray[np.uint8],
-    coordinates: NDArray[np.number],
-    wanted: NDArray[np.bool_],
-    radius: float,
-    spacing: float,
-) -> NDArray[np.uint8]:
+    colors: Bytes, coordinates: NDArray[np.number], wanted: Bools, radius: float, spacing: float
+) -> Bytes:
     """Average scattered colours over an image by a Gaussian of growing radius.
 
     Parameters
@@ -64,9 +61,7 @@ def interpolate_colors(
     return image
 
 
-def inpaint_colors(
-    image: NDArray[np.uint8], known: NDArray[np.bool_], missing: NDArray[np.bool_]
-) -> None:
+def inpaint_colors(image: Bytes, known: Bools, missing: Bools) -> None:
     """Fill an image's missing colours with the mean of the known ones around them.
 
     Parameters
@@ -77,10 +72,7 @@ def inpaint_colors(
     _push_pull(masked_sums(image, known), missing, gaussian_taps(1.0), _LEAST_COUNT, image)
 
 
-def _push_pull(
-    sums: NDArray[np.float32], wanted: NDArray[np.bool_], taps: NDArray[np.float32], least: float,
-    image: NDArray[np.uint8],
-) -> None:
+def _push_pull(sums: Floats, wanted: Bools, taps: Floats, least: float, image: Bytes) -> None:
     """Set the wanted pixels of an image; sums : (rows, columns, 4), or more."""
     levels = []
     asked = wanted

@@ -1,8 +1,8 @@
 """Scattered points to pixels and back, compiled."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bytes, Floats
 from denseface.recon.numerics.jit import compiled
 
 __all__ = ["BILINEAR_VARIANCE", "interpolate", "occupancy", "pixel_coordinates", "splat",
@@ -14,7 +14,7 @@ BILINEAR_VARIANCE = 1 / 6
 
 
 @compiled
-def xy_bounds(points: NDArray[np.float32]) -> tuple[float, float, float, float]:
+def xy_bounds(points: Floats) -> tuple[float, float, float, float]:
     """Give the least and the largest x, the least and the largest y of (n, 3) points, n >= 1."""
     left = right = points[0, 0]
     top = bottom = points[0, 1]
@@ -26,8 +26,8 @@ def xy_bounds(points: NDArray[np.float32]) -> tuple[float, float, float, float]:
 
 @compiled
 def occupancy(
-    points: NDArray[np.float32], origin: tuple[float, float], step: float, rows: int, columns: int
-) -> NDArray[np.uint8]:
+    points: Floats, origin: tuple[float, float], step: float, rows: int, columns: int
+) -> Bytes:
     """Set the pixel nearest to each point, (n, 3): (rows, columns), 0 or 1.
 
     origin, step : centre of pixel (0, 0), (x, y), and distance of pixels, mm; no point is farther
@@ -43,9 +43,7 @@ def occupancy(
 
 
 @compiled
-def pixel_coordinates(
-    points: NDArray[np.float32], origin: tuple[float, float], step: float
-) -> NDArray[np.float32]:
+def pixel_coordinates(points: Floats, origin: tuple[float, float], step: float) -> Floats:
     """Give the fractional (row, column) of each point, (n, 3) to (n, 2), at least 0.
 
     origin, step : as of `occupancy`
@@ -58,10 +56,7 @@ def pixel_coordinates(
 
 
 @compiled
-def splat(
-    columns: NDArray[np.float32], rows: NDArray[np.float32], values: NDArray[np.float32],
-    counts: NDArray[np.float32], sums: NDArray[np.float32],
-) -> None:
+def splat(columns: Floats, rows: Floats, values: Floats, counts: Floats, sums: Floats) -> None:
     """Add 1, and each value, to the four pixels around its coordinates, by bilinear weights.
 
     columns, rows : (n,), inside the images, not on their last row or column
@@ -84,9 +79,7 @@ def splat(
 
 
 @compiled
-def interpolate(
-    image: NDArray[np.float32], columns: NDArray[np.float32], rows: NDArray[np.float32]
-) -> NDArray[np.float32]:
+def interpolate(image: Floats, columns: Floats, rows: Floats) -> Floats:
     """Read an image at the coordinates of `splat`, bilinear: (n,)."""
     out = np.empty(len(columns), np.float32)
     for i in range(len(columns)):

@@ -16,14 +16,8 @@ _R = TypeVar("_R")
 
 
 @cache
-def _libraries() -> ThreadpoolController:
-    return ThreadpoolController()
-
-
-@cache
-def _blas() -> tuple[Any, ...]:
-    return tuple(library for library in _libraries().lib_controllers
-                 if library.user_api == "blas")
+def _blas() -> Any:
+    return ThreadpoolController().select(user_api="blas")
 
 
 def one_blas_thread(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -31,9 +25,9 @@ def one_blas_thread(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
     @wraps(function)
     def limited(*args: _P.args, **kwargs: _P.kwargs) -> _R:
-        if all(library.num_threads == 1 for library in _blas()):
+        if all(library.num_threads == 1 for library in _blas().lib_controllers):
             return function(*args, **kwargs)
-        with _libraries().limit(limits=1, user_api="blas"):
+        with _blas().limit(limits=1):
             return function(*args, **kwargs)
 
     return limited

@@ -5,14 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes, Doubles, Floats
 from denseface.recon.intermediate import ZBuffer
 from denseface.recon.numerics.jit import compiled
-
-__all__ = ["EMPTY", "ColorCamera", "PixelGrid", "Projected", "project", "project_points",
-           "sample_image", "visible_mask"]
-
-EMPTY = np.float32(1e30)
-"""z of an empty cell of the z-buffer, mm. Not inf: compiled code assumes finite numbers."""
 
 _HIDDEN_MM, _HIDDEN_SHARE = np.float32(15.0), np.float32(0.02)
 """A point behind the z-buffer by more than this, mm or by its z (the larger counts), is hidden.
@@ -37,8 +32,8 @@ class ColorCamera(NamedTuple):
 class PixelGrid(NamedTuple):
     """Every k-th pixel of a part of the depth image."""
 
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    x: Doubles
+    y: Doubles
     """(rows, columns) of the whole image: each pixel's ray at z = 1."""
     begin: tuple[int, int]
     step: tuple[int, int]
@@ -48,11 +43,11 @@ class PixelGrid(NamedTuple):
 class Projected(NamedTuple):
     """Points and where the colour camera sees them."""
 
-    points: NDArray[np.float32]
+    points: Floats
     """(H, W, 3), mm, depth camera frame."""
-    pixels: NDArray[np.float32]
+    pixels: Floats
     """(H, W, 2), (u, v) in the colour image."""
-    color_depth: NDArray[np.float32]
+    color_depth: Floats
     """(H, W), mm, z in the colour camera's frame."""
 
 
@@ -143,9 +138,8 @@ def _to_color_image(
 
 @compiled
 def visible_mask(
-    pixels: NDArray[np.float32], color_depth: NDArray[np.float32], z_buffer: ZBuffer,
-    size: tuple[float, float],
-) -> NDArray[np.bool_]:
+    pixels: Floats, color_depth: Floats, z_buffer: ZBuffer, size: tuple[float, float]
+) -> Bools:
     """Give (H, W): which points lie inside an image of that width and height and are not hidden.
 
     z_buffer : each cell lowered to the least of the cells around it
@@ -165,9 +159,7 @@ def visible_mask(
 
 
 @compiled
-def sample_image(
-    pixels: NDArray[np.float32], visible: NDArray[np.bool_], image: NDArray[np.uint8]
-) -> NDArray[np.uint8]:
+def sample_image(pixels: Floats, visible: Bools, image: Bytes) -> Bytes:
     """Give the colours of the visible points, bilinear: (H, W, 3), zero for the others."""
     height, width = image.shape[:2]
     colors = np.zeros((*visible.shape, 3), np.uint8)

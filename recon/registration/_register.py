@@ -4,34 +4,20 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from denseface.capture.calibration import CameraModel
 from denseface.capture.frame import RgbdFrame
+from denseface.recon.arrays import Bools, Bytes, Doubles, Floats
 from denseface.recon.errors import NoDepthError
-from denseface.recon.intermediate import Registration, ZBuffer
-from denseface.recon.registration._kernels import (
-    EMPTY,
-    ColorCamera,
-    PixelGrid,
-    Projected,
-    project,
-    project_points,
-    sample_image,
-    visible_mask,
-)
-
-__all__ = ["register", "sample_colors"]
+from denseface.recon.intermediate import NO_DEPTH_MM, Registration, ZBuffer
+from denseface.recon.registration import _kernels as kernels
+from denseface.recon.registration._kernels import ColorCamera, PixelGrid, Projected
 
 _ALL = slice(None)
 
 
 def register(
-    frame: RgbdFrame,
-    depth_offset_mm: float = 0.0,
-    rows: slice = _ALL,
-    columns: slice = _ALL,
-    *,
+    frame: RgbdFrame, depth_offset_mm: float = 0.0, rows: slice = _ALL, columns: slice = _ALL, *,
     colors: bool = True,
 ) -> Registration:
     """Tie depth to colour through both cameras' intrinsics, distortion and relative pose.
@@ -63,33 +49,25 @@ def register(
     grid = PixelGrid(*_rays(frame.depth_camera), (first_row, first_column), (row_step, column_step))
     camera = _color_camera(frame)
     pitch = max(1.0, camera.intrinsics[0] / frame.depth_camera.fx * row_step)
-    nearest = np.full([int(np.ceil(side / pitch)) + 1 for side in frame.color.shape[:2]], EMPTY)
+    cells = [int(np.ceil(side / pitch)) + 1 for side in frame.color.shape[:2]]
+    nearest = np.full(cells, NO_DEPTH_MM)
     z_buffer = ZBuffer(nearest, pitch)
-    top, bottom, left, right = project(depth, depth_offset_mm, grid, camera, out, z_buffer)
+    top, bottom, left, right = kernels.project(depth, depth_offset_mm, grid, camera, out, z_buffer)
     # Each point covers about its cell and the next: without this, a far surface would shine
     # through between the samples of a near one.
     if bottom >= 0:
         part = (slice(max(top - 1, 0), bottom + 2), slice(max(left - 1, 0), right + 2))
         nearest[part] = cv2.erode(nearest[part], np.ones((3, 3), np.uint8))
-    visible = visible_mask(out.pixels, out.color_depth, z_buffer, camera.size)
-    return Registration(
-        rows=rows,
-        columns=columns,
-        focal_px=frame.depth_camera.fx,
-        points=out.points,
-        valid=valid,
-        pixels=out.pixels,
-        color_depth=out.color_depth,
-        visible=visible,
-        colors=(sample_image(out.pixels, visible, _read_only(frame.color)) if colors
-                else np.zeros((*depth.shape, 3), np.uint8)),
-        z_buffer=z_buffer,
-    )
+    visible = kernels.visible_mask(out.pixels, out.color_depth, z_buffer, camera.size)
+    sampled = (kernels.sample_image(out.pixels, visible, _read_only(frame.color)) if colors
+               else np.zeros((*depth.shape, 3), np.uint8))
+    return Registration(rows, columns, frame.depth_camera.fx, out.points, valid, out.pixels,
+                        out.color_depth, visible, sampled, z_buffer)
 
 
 def sample_colors(
-    frame: RgbdFrame, registered: Registration, points: NDArray[np.float32]
-) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    frame: RgbdFrame, registered: Registration, points: Floats
+) -> tuple[Bytes, Bools]:
     """Sample the colour image at any points, as if they had been measured.
 
     Parameters
@@ -106,13 +84,13 @@ def sample_colors(
     camera = _color_camera(frame)
     out = Projected(np.ascontiguousarray(points)[None], np.empty((1, len(points), 2), np.float32),
                     np.empty((1, len(points)), np.float32))
-    project_points(out, camera)
-    visible = visible_mask(out.pixels, out.color_depth, registered.z_buffer, camera.size)
-    return sample_image(out.pixels, visible, _read_only(frame.color))[0], visible[0]
+    kernels.project_points(out, camera)
+    visible = kernels.visible_mask(out.pixels, out.color_depth, registered.z_buffer, camera.size)
+    return kernels.sample_image(out.pixels, visible, _read_only(frame.color))[0], visible[0]
 
 
 @lru_cache(maxsize=8)
-def _rays(camera: CameraModel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _rays(camera: CameraModel) -> tuple[Doubles, Doubles]:
     """Give x and y at z = 1 of each pixel, read-only.
 
     Without distortion they are broadcast from one row and one column, which stay in the cache.
@@ -132,7 +110,7 @@ def _color_camera(frame: RgbdFrame) -> ColorCamera:
         tuple(map(float, (camera.fx, camera.fy, camera.cx, camera.cy))), camera.distortion)
 
 
-def _read_only(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _read_only(image: Bytes) -> Bytes:
     """Give the same image, contiguous and read-only: loops are compiled for that type alone."""
     same = np.ascontiguousarray(image).view()
     same.setflags(write=False)

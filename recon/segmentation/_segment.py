@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from denseface.recon.errors import FaceWithoutDepthError
 from denseface.recon.face import Box, Seeds
 from denseface.recon.intermediate import Registration
-from denseface.recon.numerics.components import large_components
-from denseface.recon.numerics.morphology import binary_fill_holes, opened
+from denseface.recon.numerics.morphology import binary_fill_holes, large_components, opened
 from denseface.recon.numerics.percentile import percentile
 from denseface.recon.segmentation._depth_kmeans import split_depths
 from denseface.recon.segmentation._edge_colors import seed_colors
