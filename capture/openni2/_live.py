@@ -40,12 +40,8 @@ class LiveSource(OpenNI2Source):
     _origin = "device"
 
     def __init__(
-        self,
-        device_uri: str | None = None,
-        chosen: ChosenCalibration | None = None,
-        *,
-        timeout_s: float = 5.0,
-        start: bool = True,
+        self, device_uri: str | None = None, chosen: ChosenCalibration | None = None, *,
+        timeout_s: float = 5.0, start: bool = True,
     ) -> None:
         super().__init__(f"openni2:{device_uri or ''}", chosen)
         self.timeout_s = timeout_s
