@@ -2,6 +2,7 @@
 
 import inspect
 import os
+import signal
 
 import pytest
 from hypothesis import settings
@@ -23,6 +24,10 @@ for _method in {method for client in (AsyncClient, Client, Operator)
     _defaults = _method.__kwdefaults__ or {}
     if isinstance(_defaults.get("timeout"), float):
         _defaults["timeout"] *= PATIENCE
+
+# What a shell starts in the background ignores Ctrl-C, and so would every process of a test.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.hookimpl(tryfirst=True)
