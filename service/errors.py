@@ -146,16 +146,9 @@ class UsageError(ServiceError, ValueError):
 
 
 def first_error(error: "ValidationError", *, found: bool = False) -> tuple[str, str]:
-    """Give the first field that pydantic refuses, and why.
+    """Give the first field that pydantic refuses, its path with dots, and why, in one sentence.
 
-    Parameters
-    ----------
-    found : say also which value it had
-
-    Returns
-    -------
-    field : its path, with dots; empty where the whole is refused
-    message : one sentence
+    The field is empty where the whole is refused; `found` adds the value that it had.
     """
     first = error.errors(include_url=False, include_context=False, include_input=found)[0]
     message = f"{first['msg']}, found {first['input']!r}" if found else first["msg"]

@@ -53,10 +53,7 @@ def process_table(workers: int, common: Sequence[str], hub: Sequence[str],
                   capture: Sequence[str]) -> list[ProcessSpec]:
     """Give all processes of the service, in the order of starting; the hub is stopped last.
 
-    Parameters
-    ----------
-    workers : how many
-    common, hub, capture : flags of all, of the hub, of the capture process
+    `common`, `hub` and `capture` are the flags of all, of the hub and of the capture process.
     """
     return [
         ProcessSpec("hub", ("hub", *hub, *common)),
@@ -85,15 +82,15 @@ def check_settings(settings: ServiceSettings) -> None:
         server_credentials(settings)
 
 
+@dataclass
 class _Process:
     """A row of the table and the process that runs for it."""
 
-    def __init__(self, spec: ProcessSpec) -> None:
-        self.spec = spec
-        self.running: subprocess.Popen[bytes] | None = None
-        self.due = 0.0
-        """When to start, by the monotonic clock, seconds."""
-        self._restarts: deque[float] = deque()
+    spec: ProcessSpec
+    running: subprocess.Popen[bytes] | None = None
+    due: float = 0.0
+    """When to start, by the monotonic clock, seconds."""
+    restarts: deque[float] = field(default_factory=deque)
 
     def start(self) -> None:
         environment = os.environ | self.spec.environment | {PARENT_VARIABLE: str(os.getpid())}
@@ -112,11 +109,11 @@ class _Process:
 
     def plan_restart(self, now: float) -> bool:
         """Set when to start again; False in a storm."""
-        self._restarts.append(now)
-        while self._restarts[0] < now - _STORM_S:
-            self._restarts.popleft()
-        self.due = now + min(_BACKOFF_S * 2 ** (len(self._restarts) - 1), _BACKOFF_MAX_S)
-        return len(self._restarts) <= _STORM_RESTARTS
+        self.restarts.append(now)
+        while self.restarts[0] < now - _STORM_S:
+            self.restarts.popleft()
+        self.due = now + min(_BACKOFF_S * 2 ** (len(self.restarts) - 1), _BACKOFF_MAX_S)
+        return len(self.restarts) <= _STORM_RESTARTS
 
 
 class Supervisor:

@@ -17,12 +17,6 @@ __all__ = ["FaceFiles"]
 class FaceFiles:
     """Where to write a face; None is not written. Checked here, before the face is made.
 
-    Parameters
-    ----------
-    output : cloud or mesh, in one of `FORMATS`
-    report : `.json`
-    rendering : `.png`
-
     Raises
     ------
     FormatError
@@ -32,8 +26,11 @@ class FaceFiles:
     """
 
     output: Path | None = None
+    """Cloud or mesh, in one of `FORMATS`."""
     report: Path | None = None
+    """`.json`"""
     rendering: Path | None = None
+    """`.png`"""
 
     def __post_init__(self) -> None:
         if self.output:

@@ -94,10 +94,9 @@ def _write_mesh(face: "Face", path: Path) -> None:
 
 def _write_glb(face: "Face", path: Path) -> None:
     from denseface.service.export.glb import to_glb
-    from denseface.service.export.mesh import triangulate
     from denseface.service.runtime.files import write_atomically
 
-    write_atomically(path, [to_glb(face.dense, triangulate(face.dense))], durable=False)
+    write_atomically(path, [to_glb(face.dense)], durable=False)
 
 
 def _write_npz(face: "Face", path: Path) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.face import DenseCloud
+from denseface.service.export.mesh import triangulate
 
 __all__ = ["to_glb"]
 
@@ -25,14 +26,9 @@ _FLIP = np.array([1, -1, -1], np.float32)
 """Camera frame (y down, z forward) to glTF's (y up, z toward the viewer)."""
 
 
-def to_glb(cloud: DenseCloud, triangles: NDArray[np.int32]) -> bytes:
-    """Give the mesh as the bytes of a `.glb` file.
-
-    Parameters
-    ----------
-    cloud : mm, camera frame; written in metres, y up
-    triangles : (t, 3) int32, rows of `cloud.points`, front side toward the camera
-    """
+def to_glb(cloud: DenseCloud) -> bytes:
+    """Give the mesh of a cloud as the bytes of a `.glb` file: metres, y up."""
+    triangles = triangulate(cloud)
     positions = cloud.points * (_FLIP / np.float32(_MM_PER_M))
     # 16 bits a channel: 8 are too coarse for linear light in the shadows.
     colors = np.full((len(cloud), 4), 65535, "<u2")

@@ -39,16 +39,9 @@ _SUBDIVISIONS = 2
 
 
 def render(face: Face) -> bytes:
-    """Draw a face: columns measured, dense, shape alone; rows front view and turned view.
+    """Draw a face as a PNG file: columns measured, dense, shape alone; rows front and turned view.
 
-    Parameters
-    ----------
-    face : any; the picture has one scale, given by a bar
-
-    Returns
-    -------
-    bytes
-        A PNG file.
+    The picture has one scale, given by a bar.
     """
     initial, dense = face.initial, face.dense
     points, colors, normals = _subdivided(dense)

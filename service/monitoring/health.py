@@ -21,19 +21,15 @@ _MIB = 2**20
 
 @dataclass(frozen=True)
 class Health:
-    """Judges the hub's last snapshot; for any thread.
-
-    Parameters
-    ----------
-    latest : gives the last snapshot, None before there is one
-    write_error : says why nothing can be written, None where it can
-    clock : seconds, the snapshots'
-    """
+    """Judges the hub's last snapshot; for any thread."""
 
     latest: Callable[[], Snapshot | None]
+    """Gives the last snapshot, None before there is one."""
     settings: ServiceSettings
     write_error: Callable[[], str | None]
+    """Says why nothing can be written, None where it can."""
     clock: Callable[[], float] = time.monotonic
+    """The snapshots', seconds."""
 
     def report(self) -> tuple[bool, dict[str, Any]]:
         """Say whether all is well, with what `/healthz` shows as JSON."""

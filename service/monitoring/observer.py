@@ -35,12 +35,7 @@ class Snapshot:
 
 
 class Observer(Closing):
-    """Records what the hub's loop tells it, and gives other threads snapshots.
-
-    Parameters
-    ----------
-    data : the folder whose size is measured
-    """
+    """Records what the hub's loop tells it, the size of the folder `data` too; gives snapshots."""
 
     def __init__(self, data: Path) -> None:
         self.figures = Figures()

@@ -31,12 +31,7 @@ _PREFIX = "denseface_"
 
 
 class Metrics(Collector):
-    """Shows the hub's last snapshot; for any thread.
-
-    Parameters
-    ----------
-    latest : gives the last snapshot, None before there is one
-    """
+    """Shows the last snapshot, which `latest` gives, None before there is one; for any thread."""
 
     def __init__(self, latest: Callable[[], Snapshot | None]) -> None:
         self._latest = latest

@@ -59,13 +59,11 @@ def text_summary(warm_ms: float, statistics: LiveStatistics) -> str:
     return "\n".join(lines)
 
 
-def json_summary(
-    source: str, settings: Settings, warm_ms: float, statistics: LiveStatistics
-) -> str:
+def json_summary(uri: str, settings: Settings, warm_ms: float, statistics: LiveStatistics) -> str:
     """Give the same, with source, settings and version, as one JSON object."""
     points = statistics.points() or (None, None)
     return json.dumps({
-        "source": source,
+        "source": uri,
         "frames": statistics.frames,
         "faces": statistics.faces,
         "failures": dict(sorted(statistics.failures.items())),

@@ -84,6 +84,5 @@ class LiveStatistics:
 
     def stages_ms(self) -> dict[str, tuple[float, float]]:
         """Give the median and the 99th percentile of each stage's time."""
-        percentiles = {stage: np.percentile(np.array(times), (50, 99)).tolist()
-                       for stage, times in self._times.items()}
-        return {stage: (median, p99) for stage, (median, p99) in percentiles.items()}
+        return {stage: (float(np.median(list(times))), float(np.percentile(list(times), 99)))
+                for stage, times in self._times.items()}

@@ -58,12 +58,6 @@ def reconstruct_frames(
     A frame without a face is an outcome like any other. The kernels are warm before a frame is
     asked for.
 
-    Parameters
-    ----------
-    source : an open source
-    settings : of the reconstruction
-    clock : seconds, from any start
-
     Raises
     ------
     CaptureError
