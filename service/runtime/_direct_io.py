@@ -11,8 +11,6 @@ import os
 import threading
 from collections.abc import Sequence
 
-__all__ = ["write_direct"]
-
 _BLOCK = 4096
 """Alignment of memory, offset and size, bytes; a multiple of every disk's."""
 _MIN_BYTES = 2**20
@@ -43,10 +41,7 @@ _buffer = _Buffer()
 def write_direct(descriptor: int, chunks: Sequence[bytes | memoryview]) -> bool:
     """Write all of a new file; False where it is small or the file system cannot.
 
-    Raises
-    ------
-    OSError
-        As from the system, where the disk is full or fails.
+    Raises OSError as from the system, where the disk is full or fails.
     """
     size = sum(map(len, chunks))
     if size < _MIN_BYTES:

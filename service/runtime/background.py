@@ -6,7 +6,6 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import Generic, TypeVar
 
-from denseface.service.runtime.closing import Closing
 from denseface.service.runtime.wake_pipe import WakePipe
 
 __all__ = ["Background"]
@@ -16,15 +15,16 @@ _MAX_CALLS = 2
 """One that runs and one that waits."""
 
 
-class Background(Closing, Generic[_T]):
+class Background(WakePipe, Generic[_T]):
     """Runs one call at a time, always in the same thread.
 
     One more may wait: it begins when the call before ends, whether or not `result` was asked for.
+    Readable when a call has ended, until `drain`, which is to be called before `done`.
     """
 
     def __init__(self, name: str) -> None:
+        super().__init__()
         self._pool = ThreadPoolExecutor(1, thread_name_prefix=name)
-        self._wake = WakePipe()
         self._calls: deque[Future[_T]] = deque()
         self._begun = 0.0
 
@@ -37,10 +37,6 @@ class Background(Closing, Generic[_T]):
         """Time since the present call began, seconds; 0 where there is none."""
         return time.monotonic() - self._begun if self._calls else 0.0
 
-    def fileno(self) -> int:
-        """Give the descriptor that is readable when a call has ended."""
-        return self._wake.fileno()
-
     def start(self, call: Callable[[], _T]) -> None:
         """Start a call, or queue it behind the one that runs; at most one may wait."""
         if len(self._calls) == _MAX_CALLS:
@@ -49,7 +45,7 @@ class Background(Closing, Generic[_T]):
             self._begun = time.monotonic()
         future = self._pool.submit(self._run, call)
         self._calls.append(future)
-        future.add_done_callback(lambda _: self._wake.wake())
+        future.add_done_callback(lambda _: self.wake())
 
     def _run(self, call: Callable[[], _T]) -> _T:
         self._begun = time.monotonic()
@@ -72,10 +68,6 @@ class Background(Closing, Generic[_T]):
         self._calls.pop()
         return True
 
-    def drain(self) -> None:
-        """Make the descriptor unreadable; to be called before `done`."""
-        self._wake.drain()
-
     def wait(self, seconds: float) -> bool:
         """Wait for the oldest call, if any; False where it takes longer."""
         return not self._calls or not wait([self._calls[0]], seconds).not_done
@@ -83,4 +75,4 @@ class Background(Closing, Generic[_T]):
     def close(self) -> None:
         """Wait for all calls and end the thread."""
         self._pool.shutdown()
-        self._wake.close()
+        super().close()

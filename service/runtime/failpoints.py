@@ -49,11 +49,11 @@ class _Failpoint:
     action: str
     only: int | None
     """Number of the pass at which it acts; None for each."""
+    token: Path | None
     passed: int = 0
 
 
 _armed: dict[str, _Failpoint] = {}
-_tokens: list[Path] = []
 _lock = threading.Lock()
 
 
@@ -66,8 +66,7 @@ def arm(environment: Mapping[str, str]) -> None:
         Where a failpoint or an action is unknown.
     """
     _armed.clear()
-    _tokens.clear()
-    text = environment.get(FAILPOINTS_VARIABLE, "")
+    text, folder = environment.get(FAILPOINTS_VARIABLE, ""), environment.get(TOKENS_VARIABLE)
     if not text:
         return
     for entry in text.split(","):
@@ -84,32 +83,25 @@ def arm(environment: Mapping[str, str]) -> None:
         if at and not (number.isdecimal() and int(number) > 0):
             raise SettingsError(
                 f"{FAILPOINTS_VARIABLE}: {name}={what}: expected a number from 1 after @")
-        _armed[name] = _Failpoint(action, int(number) if at else None)
-    if folder := environment.get(TOKENS_VARIABLE):
-        _tokens.append(Path(folder))
+        _armed[name] = _Failpoint(
+            action, int(number) if at else None, Path(folder, name) if folder else None)
     structlog.get_logger("failpoints").warning(
         "failpoints are set: this process is to fail", failpoints=text)
 
 
 def failpoint(name: str) -> None:
-    """Do nothing, unless `arm` set this failpoint.
-
-    Raises
-    ------
-    OSError
-        Where its action is to raise.
-    """
-    if _armed:
-        _reach(name)
-
-
-def _reach(name: str) -> None:
+    """Do nothing, unless `arm` set this failpoint; OSError where its action is to raise."""
     armed = _armed.get(name)
     if armed is None:
         return
     with _lock:
         armed.passed += 1
-        if armed.only not in (None, armed.passed) or not _use_token(name):
+        if armed.only not in (None, armed.passed):
+            return
+        try:
+            if armed.token:
+                armed.token.unlink()
+        except FileNotFoundError:
             return
     match armed.action.split(":"):
         case ["kill"]:
@@ -121,12 +113,3 @@ def _reach(name: str) -> None:
         case [_, which]:
             number = getattr(errno, which)
             raise OSError(number, os.strerror(number), f"failpoint {name}")
-
-
-def _use_token(name: str) -> bool:
-    for folder in _tokens:
-        try:
-            (folder / name).unlink()
-        except FileNotFoundError:
-            return False
-    return True

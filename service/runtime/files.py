@@ -10,8 +10,7 @@ from denseface.service.errors import KeyFileError, SettingsError, reason_of
 from denseface.service.runtime._direct_io import write_direct
 from denseface.service.runtime.failpoints import failpoint
 
-__all__ = ["private_folder", "read_private_text", "sync_folder", "write_atomically",
-           "write_private_text"]
+__all__ = ["private_folder", "read_private_text", "sync_folder", "write_atomically"]
 
 _MAX_TEXT_BYTES = 4096
 """Of a private text; longer than any key file."""
@@ -85,20 +84,6 @@ def private_folder(path: Path) -> Path:
     except OSError as error:
         raise SettingsError(f"{path}: {reason_of(error)}") from error
     return path
-
-
-def write_private_text(path: Path, text: str) -> None:
-    """Write a file of mode 0600 atomically.
-
-    Raises
-    ------
-    KeyFileError
-        Where it cannot be written.
-    """
-    try:
-        write_atomically(path, [text.encode()], mode=0o600)
-    except OSError as error:
-        raise KeyFileError(f"{path}: {reason_of(error)}") from error
 
 
 def read_private_text(path: Path, forbidden: int) -> bytes:

@@ -49,7 +49,8 @@ class MemoryWatch:
         used = self._used()
         if used > self._limit:
             # Freed memory stays with the process, and libzmq frees some time after a cut.
-            self._trim()
+            if trim := getattr(ctypes.CDLL(None), "malloc_trim", None):
+                trim(0)
             used = self._used()
         if self._cut:
             # What is still in use after a cut may be for long: only growth beyond it counts.
@@ -68,13 +69,6 @@ class MemoryWatch:
 
     def _used(self) -> int:
         return int(os.pread(self._statm, 256, 0).split()[1]) * _PAGE_BYTES
-
-    @staticmethod
-    def _trim() -> None:
-        """Return freed memory to the system, where the C library can."""
-        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-        if trim is not None:
-            trim(0)
 
 
 class DescriptorWatch:

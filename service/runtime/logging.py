@@ -5,10 +5,10 @@ import math
 import sys
 import threading
 import warnings
-from types import TracebackType
 from typing import Any, Literal, TextIO
 
 import structlog
+from structlog.typing import EventDict, Processor
 
 __all__ = ["LogFormat", "configure"]
 
@@ -21,17 +21,14 @@ def configure(log_format: LogFormat, process: str) -> None:
     In JSON, what Python and the libraries report becomes events too: warnings, records of the
     standard library's logging, exceptions that nobody catches.
     """
-    renderers: list[structlog.typing.Processor]
+    renderers: list[Processor]
     if log_format == "json":
-        renderers = [structlog.processors.format_exc_info, _finite,
-                     structlog.processors.JSONRenderer()]
+        renderers = [structlog.processors.format_exc_info, structlog.processors.JSONRenderer()]
     else:
         renderers = [structlog.dev.ConsoleRenderer(
             colors=sys.stderr.isatty(), exception_formatter=structlog.dev.plain_traceback)]
 
-    def add_process(
-        _: Any, __: str, event: structlog.typing.EventDict
-    ) -> structlog.typing.EventDict:
+    def add_process(_: Any, __: str, event: EventDict) -> EventDict:
         event["process"] = process
         return event
 
@@ -51,32 +48,24 @@ def configure(log_format: LogFormat, process: str) -> None:
         _forward_others()
 
 
-def _without_data(
-    _: Any, __: str, event: structlog.typing.EventDict
-) -> structlog.typing.EventDict:
+def _without_data(_: Any, __: str, event: EventDict) -> EventDict:
     """Replace arrays and bytes by their sizes: who may read a log may not see faces."""
-    return {key: value if key == "exc_info" else _size(value) for key, value in event.items()}
+    return {key: value if key == "exc_info" else _loggable(value) for key, value in event.items()}
 
 
-def _size(value: Any) -> Any:
+def _loggable(value: Any) -> Any:
     shape = getattr(value, "shape", None)
     if shape:
         return f"<{getattr(value, 'dtype', type(value).__name__)} {list(shape)}>"
     if isinstance(value, bytes | bytearray | memoryview):
         return f"<{len(value)} bytes>"
     if isinstance(value, list | tuple | set | frozenset):
-        return [_size(one) for one in value]
+        return [_loggable(one) for one in value]
     if isinstance(value, dict):
-        return {str(key): _size(one) for key, one in value.items()}
+        return {str(key): _loggable(one) for key, one in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)  # JSON has no such numbers
     return value
-
-
-def _finite(
-    _: Any, __: str, event: structlog.typing.EventDict
-) -> structlog.typing.EventDict:
-    """Replace numbers that are not finite by text: JSON has none."""
-    return {key: str(value) if isinstance(value, float) and not math.isfinite(value) else value
-            for key, value in event.items()}
 
 
 class _Forward(logging.Handler):
@@ -96,21 +85,11 @@ def _forward_others() -> None:
     ) -> None:
         log.warning(str(message), category=category.__name__, where=f"{filename}:{lineno}")
 
-    def uncaught(
-        kind: type[BaseException], error: BaseException, traceback: TracebackType | None
-    ) -> None:
-        log.critical("uncaught", exc_info=(kind, error, traceback))
-
-    def in_thread(what: threading.ExceptHookArgs) -> None:
+    def uncaught(what: "threading.ExceptHookArgs | sys.UnraisableHookArgs") -> None:
         if what.exc_value is not None:
-            uncaught(what.exc_type, what.exc_value, what.exc_traceback)
-
-    def unraisable(what: "sys.UnraisableHookArgs") -> None:
-        if what.exc_value is not None:
-            uncaught(what.exc_type, what.exc_value, what.exc_traceback)
+            log.critical("uncaught", exc_info=what.exc_value)
 
     warnings.showwarning = warning
-    sys.excepthook = uncaught
-    threading.excepthook = in_thread
-    sys.unraisablehook = unraisable
+    sys.excepthook = lambda _, error, __: log.critical("uncaught", exc_info=error)
+    threading.excepthook = sys.unraisablehook = uncaught
     logging.root.handlers[:] = [_Forward()]

@@ -7,7 +7,7 @@ from ipaddress import ip_address
 
 __all__ = ["parse_loopback_address", "parse_retention", "parse_time"]
 
-_UNITS = {"s": 1, "m": 60, "h": 3600, "d": 86400}
+_UNITS = {"": 1, "s": 1, "m": 60, "h": 3600, "d": 86400}
 """Letter -> seconds."""
 _SHORTEST_S = 1.0
 """Shortest retention, seconds: 0 may mean "keep nothing" or "no limit"."""
@@ -21,13 +21,11 @@ def parse_retention(given: object) -> float | None:
     ValueError
         One line that says what was expected.
     """
-    if given is None or (isinstance(given, str) and given.strip().lower() == "off"):
+    text = str(given).strip()
+    if given is None or text.lower() == "off":
         return None
-    seconds = math.nan
-    if isinstance(given, int | float) and not isinstance(given, bool):
-        seconds = float(given)
-    elif match := re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([smhd]?)\s*", str(given)):
-        seconds = float(match.group(1)) * _UNITS[match.group(2) or "s"]
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([smhd]?)", text)
+    seconds = float(match[1]) * _UNITS[match[2]] if match else math.nan
     if not _SHORTEST_S <= seconds < math.inf:
         raise ValueError("expected a time of 1 s or more such as 24h, 90m or 7d, or off")
     return seconds

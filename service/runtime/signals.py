@@ -3,6 +3,7 @@
 import ctypes
 import os
 import signal
+from contextlib import ExitStack
 from types import FrameType
 from typing import Self
 
@@ -18,8 +19,8 @@ _PR_SET_PDEATHSIG = 1
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 
 
-class StopSignal:
-    """Inside the `with` block, signals only set `received` and make `fileno()` readable.
+class StopSignal(WakePipe):
+    """Inside the `with` block, signals only set `received` and make this readable.
 
     Parameters
     ----------
@@ -27,34 +28,25 @@ class StopSignal:
     """
 
     def __init__(self, *also: signal.Signals) -> None:
+        super().__init__()
         self.received: signal.Signals | None = None
-        self._also = also
-        self._wake = WakePipe()
-        self._before: list[tuple[signal.Signals, object]] = []
-        self._fd_before = -1
+        self._handled = *_STOPPING, *also
+        self._before = ExitStack()
 
     def __enter__(self) -> Self:
-        self._fd_before = signal.set_wakeup_fd(self._wake.writer, warn_on_full_buffer=False)
-        for number in (*_STOPPING, *self._also):
-            self._before.append((number, signal.signal(number, self._note)))
+        self._before.callback(signal.set_wakeup_fd, signal.set_wakeup_fd(
+            self.writer, warn_on_full_buffer=False))
+        for number in self._handled:
+            self._before.callback(signal.signal, number, signal.signal(number, self._note))
         return self
 
-    def __exit__(self, *_: object) -> None:
-        for number, handler in self._before:
-            signal.signal(number, handler)  # type: ignore[arg-type]
-        signal.set_wakeup_fd(self._fd_before)
-        self._wake.close()
+    def close(self) -> None:
+        """Set the handlers back; also at the end of the `with` block."""
+        self._before.close()
+        super().close()
 
     def __bool__(self) -> bool:
         return self.received is not None
-
-    def fileno(self) -> int:
-        """Give the descriptor to poll for reading."""
-        return self._wake.fileno()
-
-    def drain(self) -> None:
-        """Make the descriptor unreadable."""
-        self._wake.drain()
 
     @property
     def exit_status(self) -> int:

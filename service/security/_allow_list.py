@@ -16,14 +16,7 @@ from denseface.service.errors import KeyFileError, first_error, reason_of
 from denseface.service.protocol.roles import Role
 from denseface.service.runtime.files import private_folder, read_private_text
 from denseface.service.runtime.limits import OUT_OF_DESCRIPTORS
-from denseface.service.security._keys import (
-    check_key,
-    check_name,
-    fingerprint,
-    write_key_file,
-)
-
-__all__ = ["AllowList", "AllowedKey", "allow", "revoke"]
+from denseface.service.security._keys import check_key, check_name, fingerprint, write_key_file
 
 _WRITABLE_BY_OTHERS = 0o022
 """Mode bits that a file of the list may not have."""

@@ -15,17 +15,14 @@ import zmq
 import zmq.utils.z85
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from denseface.service.errors import KeyFileError
-from denseface.service.runtime.files import private_folder, read_private_text, write_private_text
-
-__all__ = ["HUB_NAME", "KeyPair", "check_key", "check_name", "fingerprint", "new_pair", "read_pair",
-           "read_public", "write_key_file"]
+from denseface.service.errors import KeyFileError, reason_of
+from denseface.service.runtime.files import private_folder, read_private_text, write_atomically
 
 HUB_NAME = "hub"
-"""Name of a key, and of its file."""
 """Name of the hub's own pair of keys."""
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+"""Name of a key, and of its file."""
 _OTHERS = 0o077
 """Mode bits that a file with a secret key may not have."""
 _Z85 = re.compile(r"[0-9A-Za-z.\-:+=^!/*?&<>()\[\]{}@%$#]{40}")
@@ -64,26 +61,14 @@ def fingerprint(public: str) -> str:
 
 
 def check_name(name: str) -> str:
-    """Check a key's name and give it back.
-
-    Raises
-    ------
-    KeyFileError
-        Where it may not be a file's name.
-    """
+    """Check a key's name and give it back; KeyFileError where it may not be a file's name."""
     if not _NAME.fullmatch(name):
         raise KeyFileError(f"key name {name!r}: expected letters, digits, - and _, at most 64")
     return name
 
 
 def check_key(path: Path, key: str) -> str:
-    """Check a key that a file held and give it back.
-
-    Raises
-    ------
-    KeyFileError
-        Where it is no key.
-    """
+    """Check a key that a file held and give it back; KeyFileError where it is none."""
     if not _is_key(key):
         raise KeyFileError(f"{path}: its key is not 40 characters of Z85")
     return key
@@ -118,14 +103,12 @@ def new_pair(folder: Path, name: str) -> tuple[Path, Path]:
 
 
 def write_key_file(path: Path, contents: BaseModel) -> None:
-    """Write a key file of mode 0600 atomically.
-
-    Raises
-    ------
-    KeyFileError
-        Where it cannot be written.
-    """
-    write_private_text(path, contents.model_dump_json(indent=2, exclude_none=True) + "\n")
+    """Write a key file of mode 0600 atomically; KeyFileError where it cannot be written."""
+    text = contents.model_dump_json(indent=2, exclude_none=True) + "\n"
+    try:
+        write_atomically(path, [text.encode()], mode=0o600)
+    except OSError as error:
+        raise KeyFileError(f"{path}: {reason_of(error)}") from error
 
 
 def read_pair(path: Path) -> KeyPair:
@@ -136,7 +119,7 @@ def read_pair(path: Path) -> KeyPair:
     KeyFileError
         Where it is none, or other users may read it.
     """
-    file = _parse(path, read_private_text(path, _OTHERS))
+    file = _read(path, _OTHERS)
     if file.secret_key is None:
         raise KeyFileError(f"{path}: holds a public key, expected the file NAME.secret")
     check_key(path, file.secret_key)
@@ -156,12 +139,11 @@ def read_public(given: Path | str) -> str:
     if _is_key(str(given)):
         return str(given)
     path = Path(given)
-    file = _parse(path, read_private_text(path, 0))
-    return check_key(path, file.public_key)
+    return check_key(path, _read(path, 0).public_key)
 
 
-def _parse(path: Path, text: bytes) -> _File:
+def _read(path: Path, forbidden: int) -> _File:
     try:
-        return _File.model_validate_json(text)
+        return _File.model_validate_json(read_private_text(path, forbidden))
     except ValidationError as error:
         raise KeyFileError(f"{path}: not a key file of `denseface keys`") from error

@@ -3,13 +3,10 @@
 from denseface.service.storage._capture_rows import CaptureRow
 from denseface.service.storage._folder_layout import FolderLayout
 from denseface.service.storage._folder_lock import check_folder
-from denseface.service.storage._store_clock import Clock, SystemClock
 from denseface.service.storage.folder_store import FolderStore
 from denseface.service.storage.records import (
     FaceMetadata,
-    FaceRecord,
     FrameMetadata,
-    FrameRecord,
     PendingWrite,
     read_face,
     read_frame,
@@ -18,16 +15,12 @@ from denseface.service.storage.writer import InlineWriter, Writer, WriteResult, 
 
 __all__ = [
     "CaptureRow",
-    "Clock",
     "FaceMetadata",
-    "FaceRecord",
     "FolderLayout",
     "FolderStore",
     "FrameMetadata",
-    "FrameRecord",
     "InlineWriter",
     "PendingWrite",
-    "SystemClock",
     "WriteResult",
     "Writer",
     "WriterThreads",

@@ -1,6 +1,5 @@
 """The rows of captures and outcomes: how they are found and changed."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
 from sqlite3 import Connection
@@ -12,9 +11,6 @@ from denseface.service.runtime.failpoints import failpoint
 from denseface.service.storage._database import Database
 from denseface.service.storage._store_clock import StoreClock, format_timestamp
 
-__all__ = ["CaptureRow", "CaptureRows", "NewCapture", "NewOutcome", "insert_captures",
-           "insert_outcome"]
-
 _MAX_MESSAGE = 300
 """Characters of an error in the list of dead letters."""
 
@@ -23,25 +19,22 @@ _MAX_MESSAGE = 300
 class CaptureRow:
     """A capture's row."""
 
+    capture_id: str
     state: CaptureState
     settings_hash: str
     frame_sha256: str
     """Checksum of the frame's file: names what a result must have been made of."""
-    attempts: int
     accepted_at: str
     pressed_by: str = ""
     """Fingerprint of the key that pressed; empty where none was needed."""
+    attempts: int = 0
 
-
-@dataclass(frozen=True)
-class NewCapture:
-    """A capture whose row is missing."""
-
-    capture_id: str
-    settings_hash: str
-    frame_sha256: str
-    accepted_at: str
-    pressed_by: str = ""
+    def insert(self, connection: Connection) -> None:
+        """Add this row."""
+        connection.execute(
+            "INSERT INTO captures (capture_id, state, settings_hash, frame_sha256, accepted_at,"
+            " pressed_by, attempts) VALUES (:capture_id, :state, :settings_hash, :frame_sha256,"
+            " :accepted_at, :pressed_by, :attempts)", vars(self))
 
 
 @dataclass(frozen=True)
@@ -56,27 +49,15 @@ class NewOutcome:
     error: str | None = None
     message: str | None = None
 
-
-def insert_captures(
-    connection: Connection, state: CaptureState, captures: Iterable[NewCapture]
-) -> None:
-    """Add rows of captures that are all in one state."""
-    connection.executemany(
-        "INSERT INTO captures (capture_id, state, settings_hash, frame_sha256, accepted_at,"
-        " pressed_by) VALUES (?, ?, ?, ?, ?, ?)",
-        [(one.capture_id, state, one.settings_hash, one.frame_sha256,
-          one.accepted_at, one.pressed_by) for one in captures])
-
-
-def insert_outcome(connection: Connection, capture_id: str, outcome: NewOutcome) -> None:
-    """Add the outcome of a capture and set its state; raises where it has an outcome."""
-    connection.execute(
-        "UPDATE captures SET state = ? WHERE capture_id = ?", (outcome.state, capture_id))
-    connection.execute(
-        "INSERT INTO outcomes (capture_id, face_sha256, error, message, dead, finished_at,"
-        " finished_age_s) VALUES (?, ?, ?, ?, ?, ?, ?)",
-        (capture_id, outcome.face_sha256, outcome.error, outcome.message,
-         outcome.state is CaptureState.DEAD, outcome.finished_at, outcome.age_s))
+    def insert(self, connection: Connection, capture_id: str) -> None:
+        """Add the outcome of a capture and set its state; raises where it has an outcome."""
+        connection.execute(
+            "UPDATE captures SET state = ? WHERE capture_id = ?", (self.state, capture_id))
+        connection.execute(
+            "INSERT INTO outcomes (capture_id, face_sha256, error, message, dead, finished_at,"
+            " finished_age_s) VALUES (?, ?, ?, ?, ?, ?, ?)",
+            (capture_id, self.face_sha256, self.error, self.message,
+             self.state is CaptureState.DEAD, self.finished_at, self.age_s))
 
 
 class CaptureRows:
@@ -100,8 +81,8 @@ class CaptureRows:
                 "SELECT * FROM captures WHERE capture_id = ? AND state != ?",
                 capture_id, CaptureState.REMOVED)
             self._last_find = asked, None if row is None else CaptureRow(
-                CaptureState(row["state"]), row["settings_hash"], row["frame_sha256"],
-                row["attempts"], row["accepted_at"], row["pressed_by"])
+                capture_id, CaptureState(row["state"]), row["settings_hash"],
+                row["frame_sha256"], row["accepted_at"], row["pressed_by"], row["attempts"])
         return self._last_find[1]
 
     def unfinished(self) -> list[str]:
@@ -131,9 +112,8 @@ class CaptureRows:
     def fail(self, capture_id: str, state: CaptureState, error: str, message: str) -> None:
         """Add a failure as the outcome of a capture, which is in `state` from now on."""
         with self._database.transaction() as connection:
-            insert_outcome(connection, capture_id, NewOutcome(
-                state, format_timestamp(self._clock.wall()), self._clock.now(),
-                error=error, message=message))
+            NewOutcome(state, self._clock.timestamp(), self._clock.now(), error=error,
+                       message=message).insert(connection, capture_id)
         failpoint("hub.outcome.stored")
 
     def reopen(self, capture_id: str, state: CaptureState, *, reset_attempts: bool) -> None:

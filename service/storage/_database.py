@@ -3,14 +3,12 @@
 import secrets
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import structlog
 
 from denseface.service.errors import DamagedDatabaseError, DiskFullError, StoreError
-
-__all__ = ["Database"]
 
 _VERSION = 3
 """Version of the schema, in `PRAGMA user_version`."""
@@ -18,6 +16,9 @@ _MAX_SEQUENCE = 2**53
 """Sequence numbers stay below it; a higher one is damage."""
 _BUSY_S = 1.0
 """Longest wait for another program that has the database open, seconds."""
+_DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_IOERR_READ,
+           sqlite3.SQLITE_IOERR_SHORT_READ, sqlite3.SQLITE_IOERR_CORRUPTFS)
+"""Result codes, primary or extended, of a malformed database."""
 _SCHEMA = f"""
 CREATE TABLE meta (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
 CREATE TABLE captures (
@@ -66,12 +67,11 @@ class Database:
         """The last hub was killed: some of its last rows may be lost."""
         with self._translate_errors():
             self._connection = sqlite3.connect(path, isolation_level=None, timeout=_BUSY_S)
-        try:
-            with self._translate_errors():
+            try:
                 self._open()
-        except BaseException:
-            self._connection.close()
-            raise
+            except BaseException:
+                self._connection.close()
+                raise
 
     def _open(self) -> None:
         connection = self._connection
@@ -123,16 +123,9 @@ class Database:
         StoreError
             Where a statement fails otherwise.
         """
-        with self._translate_errors(), self._sync_mode(synced=synced):
+        with self._translate_errors(), self._sync_mode(synced=synced), self._connection:
             self._connection.execute("BEGIN IMMEDIATE")
-            try:
-                yield self._connection
-                self._connection.execute("COMMIT")
-            except BaseException:
-                if self._connection.in_transaction:
-                    with suppress(sqlite3.Error):
-                        self._connection.execute("ROLLBACK")
-                raise
+            yield self._connection
 
     @contextmanager
     def _sync_mode(self, *, synced: bool) -> Iterator[None]:
@@ -201,18 +194,12 @@ class Database:
         try:
             yield
         except sqlite3.Error as error:
-            raise _translated(self.path, error) from error
+            code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)
+            reason = f"{self.path.name}: {error}"
+            if code in _DAMAGE or code & 0xFF in _DAMAGE:
+                raise DamagedDatabaseError(reason) from error
+            if code & 0xFF == sqlite3.SQLITE_FULL:
+                raise DiskFullError(f"no room on the disk ({reason})") from error
+            raise StoreError(reason) from error
         except UnicodeDecodeError as error:  # from a damaged name in SQLite's message
             raise DamagedDatabaseError(f"{self.path.name}: malformed") from error
-
-
-def _translated(path: Path, error: sqlite3.Error) -> StoreError | DamagedDatabaseError:
-    code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)
-    reason = f"{path.name}: {error}"
-    if code & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB) or code in (
-            sqlite3.SQLITE_IOERR_READ, sqlite3.SQLITE_IOERR_SHORT_READ,
-            sqlite3.SQLITE_IOERR_CORRUPTFS):
-        return DamagedDatabaseError(reason)
-    if code & 0xFF == sqlite3.SQLITE_FULL:
-        return DiskFullError(f"no room on the disk ({reason})")
-    return StoreError(reason)

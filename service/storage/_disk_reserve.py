@@ -9,8 +9,6 @@ import structlog
 
 from denseface.service.errors import DiskFullError
 
-__all__ = ["DiskReserve"]
-
 _BYTES = 2**20
 """Enough for SQLite to mark rows."""
 

@@ -7,8 +7,6 @@ from pathlib import Path
 
 from denseface.service.runtime.files import private_folder, sync_folder
 
-__all__ = ["FolderLayout"]
-
 _FRAME_NAME = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.frame")
 """Capture id."""
 _FACE_NAME = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.[0-9a-f]{1,64}\.face")
@@ -20,10 +18,7 @@ _TEMPORARY_NAME = re.compile(r"\..*\.tmp")
 class FolderLayout:
     """The paths of a data folder; creates the folders that are missing, durably.
 
-    Raises
-    ------
-    SettingsError, OSError
-        Where a folder cannot be created or is another user's.
+    Raises SettingsError or OSError where a folder cannot be created or is another user's.
     """
 
     def __init__(self, root: Path) -> None:

@@ -7,8 +7,6 @@ from pathlib import Path
 from denseface.service.errors import HubRunningError, SettingsError, reason_of
 from denseface.service.runtime.files import private_folder
 
-__all__ = ["check_folder", "lock"]
-
 
 def check_folder(folder: Path) -> None:
     """Create a data folder, or check that a hub could open it.
@@ -26,10 +24,7 @@ def check_folder(folder: Path) -> None:
 def lock(path: Path) -> int:
     """Lock a data folder by a file in it, until the descriptor returned is closed.
 
-    Raises
-    ------
-    SettingsError, HubRunningError
-        As `check_folder`.
+    Raises as `check_folder`.
     """
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)

@@ -4,8 +4,6 @@ from collections.abc import Iterable
 
 from denseface.service.storage.records import FrameRecord
 
-__all__ = ["FrameCache"]
-
 _MAX_BYTES = 64 * 2**20
 """Of all arrays together; a frame beyond it is read from its file when it is needed."""
 

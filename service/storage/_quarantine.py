@@ -7,10 +7,8 @@ from pathlib import Path
 
 import structlog
 
-from denseface.service.runtime.files import private_folder, write_atomically
-from denseface.service.storage._store_clock import StoreClock, format_timestamp
-
-__all__ = ["Quarantine"]
+from denseface.service.runtime.files import write_atomically
+from denseface.service.storage._store_clock import StoreClock
 
 
 class Quarantine:
@@ -21,7 +19,7 @@ class Quarantine:
     """
 
     def __init__(self, folder: Path, clock: StoreClock) -> None:
-        self._folder = private_folder(folder)
+        self._folder = folder
         self._clock = clock
         self._log = structlog.get_logger("store")
 
@@ -30,7 +28,7 @@ class Quarantine:
         self._log.error("damaged", file=path.name, capture_id=capture_id, reason=reason)
         if not path.exists():
             return
-        moment = format_timestamp(self._clock.wall()).replace(":", "")
+        moment = self._clock.timestamp().replace(":", "")
         moved = self._folder / f"{moment}.{path.name}"
         report = moved.with_name(f"{moved.name}.json")
         try:
@@ -47,27 +45,22 @@ class Quarantine:
 
     def remove(self, capture_ids: Collection[str]) -> None:
         """Remove the files of captures; OSError where one cannot be removed."""
-        for report in self._reports():
+        for report in list(self._folder.glob("*.json")):
             if _read(report).get("capture_id") in capture_ids:
                 _remove(report)
 
-    def remove_older(self, retention_s: float) -> int:
-        """Remove files older than that and give their number; OSError as `remove`."""
+    def remove_older(self, retention_s: float) -> None:
+        """Remove files older than that; OSError as `remove`."""
         before = self._clock.now() - retention_s
-        old = [report for report in self._reports() if _age_s(report) <= before]
-        for report in old:
-            _remove(report)
-        return len(old)
+        for report in list(self._folder.glob("*.json")):
+            if _age_s(report) <= before:
+                _remove(report)
 
-    def clear(self) -> int:
-        """Remove all files and give their number; OSError as `remove`."""
-        files = [path for path in self._folder.iterdir() if path.is_file()]
-        for path in files:
-            path.unlink()
-        return len([path for path in files if path.suffix != ".json"])
-
-    def _reports(self) -> list[Path]:
-        return list(self._folder.glob("*.json"))
+    def clear(self) -> None:
+        """Remove all files; OSError as `remove`."""
+        for path in list(self._folder.iterdir()):
+            if path.is_file():
+                path.unlink()
 
 
 def _read(report: Path) -> dict[str, object]:

@@ -21,8 +21,6 @@ from pathlib import Path
 from denseface.service.errors import CorruptFileError, DiskFullError, StoreError, reason_of
 from denseface.service.runtime.files import write_atomically
 
-__all__ = ["read_parts", "store_error", "wrap_os_errors", "write_parts"]
-
 _MAGIC = b"denseface spool 3\n"
 """With the version of the layout."""
 _DIGEST_BYTES = hashlib.sha256().digest_size
@@ -32,28 +30,18 @@ _MAX_BYTES = 128 * 2**20
 
 
 def write_parts(
-    path: Path, parts: Sequence[bytes | memoryview], *, sync_name: bool = True,
-    direct: bool = False, failpoints: str = "",
+    path: Path, parts: Sequence[bytes | memoryview], *, failpoints: str = ""
 ) -> str:
-    """Write parts durably and give their checksum, hexadecimal.
+    """Write and sync parts, not their folder, and give their checksum, hexadecimal.
 
-    Parameters are those of `write_atomically`.
-
-    Raises
-    ------
-    DiskFullError
-        Where the disk is full.
-    StoreError
-        Where the file cannot be written for another reason.
+    `failpoints` is that of `write_atomically`; errors are those of `wrap_os_errors`.
     """
     index = struct.pack(f"<I{len(parts)}Q", len(parts), *map(len, parts))
     digest = _checksum(index, parts)
-    try:
+    with wrap_os_errors(path):
         write_atomically(
-            path, [_MAGIC, digest, index, *parts], sync_name=sync_name, direct=direct, mode=0o600,
+            path, [_MAGIC, digest, index, *parts], sync_name=False, direct=True, mode=0o600,
             failpoints=failpoints)
-    except OSError as error:
-        raise store_error(path, error) from error
     return digest.hex()
 
 
@@ -115,20 +103,15 @@ def _split(data: memoryview) -> list[memoryview] | None:
     return parts
 
 
-def store_error(path: Path, error: OSError) -> StoreError:
-    """Say in one line why a file could not be written."""
-    reason = f"{path}: {reason_of(error)}"
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return DiskFullError(f"no room on the disk ({reason})")
-    if error.errno == errno.EIO:
-        return StoreError(f"the disk fails ({reason})")
-    return StoreError(reason)
-
-
 @contextmanager
 def wrap_os_errors(path: Path) -> Iterator[None]:
-    """Raise each OSError within as a StoreError that names `path`."""
+    """Raise each OSError as a StoreError that names `path`; of a full disk, as DiskFullError."""
     try:
         yield
     except OSError as error:
-        raise store_error(path, error) from error
+        reason = f"{path}: {reason_of(error)}"
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise DiskFullError(f"no room on the disk ({reason})") from error
+        if error.errno == errno.EIO:
+            raise StoreError(f"the disk fails ({reason})") from error
+        raise StoreError(reason) from error

@@ -15,20 +15,13 @@ import structlog
 
 from denseface.service.errors import CorruptFileError, DamagedDatabaseError, StoreError
 from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
-from denseface.service.storage._capture_rows import (
-    NewCapture,
-    NewOutcome,
-    insert_captures,
-    insert_outcome,
-)
+from denseface.service.storage._capture_rows import CaptureRow, NewOutcome
 from denseface.service.storage._database import Database
 from denseface.service.storage._disk_reserve import DiskReserve
 from denseface.service.storage._folder_layout import FolderLayout
 from denseface.service.storage._quarantine import Quarantine
-from denseface.service.storage._store_clock import Clock, StoreClock, format_timestamp
+from denseface.service.storage._store_clock import Clock, StoreClock
 from denseface.service.storage.records import FaceRecord, FrameRecord, read_face, read_frame
-
-__all__ = ["recover"]
 
 _RecordT = TypeVar("_RecordT", FrameRecord, FaceRecord)
 
@@ -37,6 +30,8 @@ _SHOWN = 5
 _SKIPPED_NUMBERS = 1000
 """Sequence numbers left out after a kill: outcomes whose rows are lost may be published already."""
 
+_ACCEPTED = advance(CaptureState.SAVING_FRAME, CaptureEvent.FRAME_SAVED)
+"""State of a capture whose row is missing."""
 _NO_SETTINGS, _NO_CHECKSUM = "0", "0" * 64
 """In the row of a capture whose frame cannot be read."""
 
@@ -44,10 +39,7 @@ _NO_SETTINGS, _NO_CHECKSUM = "0", "0" * 64
 def recover(layout: FolderLayout, clock: Clock) -> tuple[Database, StoreClock, Quarantine]:
     """Open and repair a data folder, remove half-written files, log unknown ones.
 
-    Raises
-    ------
-    StoreError, OSError
-        Where the folder cannot be read or written.
+    Raises StoreError or OSError where the folder cannot be read or written.
     """
     for path in layout.temporary_files():
         path.unlink()
@@ -58,7 +50,8 @@ def recover(layout: FolderLayout, clock: Clock) -> tuple[Database, StoreClock, Q
             reserve.spend_on(lambda: database.skip_sequence_numbers(_SKIPPED_NUMBERS))
         reserve.spend_on(_MissingRows(layout, database, store_clock, quarantine).add)
         if unknown := [path.name for path in islice(layout.unknown_files(), _SHOWN)]:
-            _log().warning("unknown files, left alone", folder=str(layout.root), files=unknown)
+            structlog.get_logger("store").warning(
+                "unknown files, left alone", folder=str(layout.root), files=unknown)
     except BaseException:
         database.close()
         raise
@@ -73,7 +66,8 @@ def _open(layout: FolderLayout, clock: Clock) -> tuple[Database, StoreClock, Qua
         for path in layout.database_files():
             if path.exists():
                 quarantine.add(path, str(error))
-        _log().warning("the database is made again from the files", reason=str(error))
+        structlog.get_logger("store").warning(
+            "the database is made again from the files", reason=str(error))
         return _open_database(layout, clock)
 
 
@@ -111,7 +105,7 @@ class _MissingRows:
         self._rows = {
             row["capture_id"]: row for row in database.select("SELECT * FROM captures")}
         self._finished = set(database.select_ids("SELECT capture_id FROM outcomes"))
-        self._captures: dict[str, NewCapture] = {}
+        self._captures: dict[str, CaptureRow] = {}
         self._outcomes: dict[str, NewOutcome] = {}
         self._damaged: dict[str, str] = {}
         """Capture id -> what is wrong with one of its files."""
@@ -135,9 +129,9 @@ class _MissingRows:
     def _read_frame(self, capture_id: str, path: Path) -> None:
         if record := self._read(capture_id, path, read_frame):
             metadata = record.metadata
-            self._captures[capture_id] = NewCapture(
-                capture_id, metadata.settings_hash, record.checksum, metadata.accepted_at,
-                metadata.pressed_by)
+            self._captures[capture_id] = CaptureRow(
+                capture_id, _ACCEPTED, metadata.settings_hash, record.checksum,
+                metadata.accepted_at, metadata.pressed_by)
 
     def _read_face(self, capture_id: str, path: Path) -> None:
         record = self._read(capture_id, path, read_face)
@@ -150,8 +144,8 @@ class _MissingRows:
             expected = capture.settings_hash, capture.frame_sha256
         else:
             expected = made_of
-            self._captures[capture_id] = NewCapture(
-                capture_id, *made_of, record.metadata.accepted_at)
+            self._captures[capture_id] = CaptureRow(
+                capture_id, _ACCEPTED, *made_of, record.metadata.accepted_at)
         if made_of != expected:
             self._quarantine.add(path, "a face of another frame or settings", capture_id)
             return
@@ -169,7 +163,8 @@ class _MissingRows:
             self._damaged.setdefault(capture_id, str(error))
             return None
         except StoreError as error:
-            _log().warning("left alone", file=path.name, reason=str(error))
+            structlog.get_logger("store").warning(
+                "left alone", file=path.name, reason=str(error))
             return None
         if record.message.capture_id != capture_id:
             reason = f"{path}: is of capture {record.message.capture_id}"
@@ -178,24 +173,20 @@ class _MissingRows:
         return record
 
     def _give_up(self, capture_id: str, reason: str) -> None:
-        now = format_timestamp(self._clock.wall())
-        self._captures[capture_id] = NewCapture(capture_id, _NO_SETTINGS, _NO_CHECKSUM, now)
+        now = self._clock.timestamp()
+        self._captures[capture_id] = CaptureRow(
+            capture_id, _ACCEPTED, _NO_SETTINGS, _NO_CHECKSUM, now)
         self._outcomes[capture_id] = NewOutcome(
             advance(CaptureState.ACCEPTED, CaptureEvent.EXHAUSTED), now, self._clock.now(),
             error="CorruptFileError", message=reason)
 
     def _write(self) -> None:
-        accepted = advance(CaptureState.SAVING_FRAME, CaptureEvent.FRAME_SAVED)
-        captures = sorted(self._captures.values(), key=lambda one: one.accepted_at)
         with self._database.transaction() as connection:
-            insert_captures(connection, accepted, captures)
+            for capture in sorted(self._captures.values(), key=lambda one: one.accepted_at):
+                capture.insert(connection)
             for capture_id, outcome in sorted(
                     self._outcomes.items(), key=lambda item: item[1].finished_at):
-                insert_outcome(connection, capture_id, outcome)
-        _log().warning("files without a row indexed", captures=sorted(self._captures)[:_SHOWN],
-                       number=len(self._captures), outcomes=len(self._outcomes))
-
-
-def _log() -> structlog.stdlib.BoundLogger:
-    log: structlog.stdlib.BoundLogger = structlog.get_logger("store")
-    return log
+                outcome.insert(connection, capture_id)
+        structlog.get_logger("store").warning(
+            "files without a row indexed", captures=sorted(self._captures)[:_SHOWN],
+            number=len(self._captures), outcomes=len(self._outcomes))

@@ -15,8 +15,6 @@ from denseface.service.storage._quarantine import Quarantine
 from denseface.service.storage._record_file import wrap_os_errors
 from denseface.service.storage._store_clock import StoreClock, format_timestamp
 
-__all__ = ["Retention"]
-
 
 class Retention:
     """Removals of a `FolderStore`; errors are those of its methods.
@@ -44,7 +42,7 @@ class Retention:
             return []
         # By the store's clock and by the wall clock both, unless that was set back to before the
         # outcome: a clock that is wrong for a while removes nothing.
-        now = format_timestamp(self._clock.wall())
+        now = self._clock.timestamp()
         return self._database.select_ids(
             "SELECT capture_id FROM outcomes WHERE finished_age_s <= ?"
             " AND (julianday(?) - julianday(finished_at) >= ? OR finished_at > ?)"

@@ -7,14 +7,14 @@ the time that it was switched off.
 """
 
 import json
-import math
 import time
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Protocol
 
-__all__ = ["Clock", "StoreClock", "SystemClock", "format_timestamp"]
+from pydantic import AwareDatetime, BaseModel, ConfigDict, FiniteFloat, ValidationError
+
+from denseface.service.errors import first_error
 
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 """Names this start of the machine; see proc_sys_kernel(5)."""
@@ -52,15 +52,16 @@ def format_timestamp(moment: datetime) -> str:
     return moment.astimezone(UTC).isoformat(timespec="milliseconds")
 
 
-@dataclass(frozen=True)
-class _State:
+class _State(BaseModel):
     """The age of the store at one moment, and what both clocks said then."""
 
-    seconds: float
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    seconds: FiniteFloat
     """Age of the store."""
-    wall: str
+    wall: AwareDatetime
     boot: str
-    at: float
+    at: FiniteFloat
     """Since that boot, seconds."""
 
 
@@ -79,16 +80,16 @@ class StoreClock:
 
     def __init__(self, clock: Clock, saved: str | None) -> None:
         self._clock = clock
-        boot, at = clock.boot()
-        wall = clock.wall()
-        state = _parse(saved) if saved else _State(0.0, format_timestamp(wall), boot, at)
+        boot, self._opened_at = clock.boot()
+        self._opened_s = 0.0
         self.gap_s = 0.0
         """Time switched off by the wall clock, seconds: the part that may be wrong."""
-        passed = at - state.at
-        if boot != state.boot or passed < 0:
-            passed = max(0.0, (wall - datetime.fromisoformat(state.wall)).total_seconds())
-            self.gap_s = passed
-        self._start = _State(state.seconds + passed, format_timestamp(wall), boot, at)
+        if saved:
+            state = _parse(saved)
+            passed = self._opened_at - state.at
+            if boot != state.boot or passed < 0:
+                passed = self.gap_s = max(0.0, (clock.wall() - state.wall).total_seconds())
+            self._opened_s = state.seconds + passed
 
     @staticmethod
     def age_of(saved: str) -> float:
@@ -97,17 +98,17 @@ class StoreClock:
 
     def now(self) -> float:
         """Give the age of the store, seconds."""
-        return self._start.seconds + self._running_s()
+        return self._opened_s + self._running_s()
 
-    def wall(self) -> datetime:
-        """Give the time of day, UTC."""
-        return self._clock.wall()
+    def timestamp(self) -> str:
+        """Give the time of day as `format_timestamp` does."""
+        return format_timestamp(self._clock.wall())
 
     def save(self) -> str:
         """Give the state from which the next `StoreClock` of this store continues."""
         boot, at = self._clock.boot()
-        return json.dumps({"seconds": self.now(), "wall": format_timestamp(self._clock.wall()),
-                           "boot": boot, "at": at})
+        return json.dumps(
+            {"seconds": self.now(), "wall": self.timestamp(), "boot": boot, "at": at})
 
     def trusted(self, retention_s: float) -> bool:
         """Whether captures may be removed by their age.
@@ -119,16 +120,12 @@ class StoreClock:
         return self.gap_s <= grace or self._running_s() >= grace
 
     def _running_s(self) -> float:
-        return max(0.0, self._clock.boot()[1] - self._start.at)
+        return max(0.0, self._clock.boot()[1] - self._opened_at)
 
 
 def _parse(saved: str) -> _State:
     try:
-        state = _State(**json.loads(saved))
-        finite = math.isfinite(state.seconds) and math.isfinite(state.at)
-        zone = datetime.fromisoformat(state.wall).tzinfo
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"saved clock {saved[:200]!r}: {error}") from error
-    if not finite or zone is None:
-        raise ValueError(f"saved clock {saved[:200]!r}: expected finite seconds and a zone")
-    return state
+        return _State.model_validate_json(saved)
+    except ValidationError as error:
+        reason = " ".join(first_error(error))
+        raise ValueError(f"saved clock {saved[:200]!r}: {reason}") from error

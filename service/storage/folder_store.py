@@ -10,32 +10,21 @@ from contextlib import suppress
 from pathlib import Path
 
 from denseface.recon.settings import Settings
-from denseface.service.errors import (
-    CorruptFileError,
-    DamagedDatabaseError,
-    DamagedFaceError,
-    StoreError,
-)
+from denseface.service.errors import CorruptFileError, DamagedFaceError, StoreError
 from denseface.service.protocol.messages import CaptureFailed, FaceDone, Frame, Result
 from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.closing import Closing
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.files import private_folder
-from denseface.service.storage._capture_rows import (
-    CaptureRows,
-    NewCapture,
-    NewOutcome,
-    insert_captures,
-    insert_outcome,
-)
+from denseface.service.storage._capture_rows import CaptureRow, CaptureRows, NewOutcome
 from denseface.service.storage._folder_layout import FolderLayout
 from denseface.service.storage._folder_lock import lock
 from denseface.service.storage._frame_cache import FrameCache
 from denseface.service.storage._record_file import wrap_os_errors
 from denseface.service.storage._recovery import recover
 from denseface.service.storage._retention import Retention
-from denseface.service.storage._store_clock import Clock, SystemClock, format_timestamp
+from denseface.service.storage._store_clock import Clock, SystemClock
 from denseface.service.storage.records import (
     FaceMetadata,
     FaceRecord,
@@ -89,7 +78,7 @@ class FolderStore(CaptureRows, Closing):
             """Name of this database; another one where it was rebuilt."""
             self.retention = Retention(
                 self._layout, database, store_clock, self._quarantine, self._forget)
-            """Removals."""
+            """Finds and removes what is old or withdrawn."""
         except OSError as error:
             os.close(self._lock)
             if isinstance(error, StoreError):
@@ -98,7 +87,7 @@ class FolderStore(CaptureRows, Closing):
 
     def close(self) -> None:
         """Save the store's clock, close the database and release the lock."""
-        with suppress(StoreError, DamagedDatabaseError):
+        with suppress(OSError):  # a full disk, a damaged database
             self._database.set_meta("clock", self._clock.save())
         self._database.close()
         os.close(self._lock)
@@ -118,18 +107,19 @@ class FolderStore(CaptureRows, Closing):
         capture_id = message.capture_id
         self.retention.finish_erasing(capture_id)
         metadata = FrameMetadata(
-            accepted_at=format_timestamp(self._clock.wall()), clock=self._clock.save(),
+            accepted_at=self._clock.timestamp(), clock=self._clock.save(),
             settings=settings.model_dump_json(), settings_hash=settings_hash,
             pressed_by=pressed_by)
         return PendingWrite(capture_id, self._layout.frame(capture_id), metadata, frame)
 
     def accept(self, frames: Sequence[WriteResult], state: CaptureState) -> None:
         """Add rows for frames that were written, all or none; their captures are in `state`."""
-        records = [_frame_record(one) for one in frames]
+        records = [one.record(Frame, FrameMetadata) for one in frames]
         with self._database.transaction() as connection:
-            insert_captures(connection, state, [NewCapture(
-                one.message.capture_id, one.metadata.settings_hash, one.checksum,
-                one.metadata.accepted_at, one.metadata.pressed_by) for one in records])
+            for one in records:
+                CaptureRow(
+                    one.message.capture_id, state, one.metadata.settings_hash, one.checksum,
+                    one.metadata.accepted_at, one.metadata.pressed_by).insert(connection)
         self._frame_cache.add(records)
         failpoint("hub.frame.stored")
 
@@ -159,19 +149,18 @@ class FolderStore(CaptureRows, Closing):
         if row is None or row.state is not CaptureState.ACCEPTED:
             raise StoreError(f"capture {capture_id} waits for no face")
         metadata = FaceMetadata(
-            accepted_at=row.accepted_at, finished_at=format_timestamp(self._clock.wall()),
+            accepted_at=row.accepted_at, finished_at=self._clock.timestamp(),
             clock=self._clock.save())
         path = self._layout.face(capture_id, message.settings_hash)
         return PendingWrite(capture_id, path, metadata, result)
 
     def finish(self, faces: Sequence[WriteResult], state: CaptureState) -> None:
         """Add rows for faces that were written, as outcomes, in order, all or none; as `accept`."""
-        records = {one.pending.capture_id: _face_record(one) for one in faces}
+        records = {one.pending.capture_id: one.record(Result, FaceMetadata) for one in faces}
         with self._database.transaction() as connection:
             for capture_id, record in records.items():
-                insert_outcome(connection, capture_id, NewOutcome(
-                    state, record.metadata.finished_at, self._clock.now(),
-                    face_sha256=record.checksum))
+                NewOutcome(state, record.metadata.finished_at, self._clock.now(),
+                           face_sha256=record.checksum).insert(connection, capture_id)
         self._recent_faces = records
         self._unread_faces.update(records)
         failpoint("hub.outcome.stored")
@@ -226,17 +215,3 @@ class FolderStore(CaptureRows, Closing):
             self._quarantine.add(path, str(error), capture_id)
             raise DamagedFaceError(capture_id, str(error)) from error
         return Packet(FaceDone(**common, face=record.message.face), record.arrays)
-
-
-def _frame_record(written: WriteResult) -> FrameRecord:
-    packet, metadata = written.pending.packet, written.pending.metadata
-    if not isinstance(packet.message, Frame) or not isinstance(metadata, FrameMetadata):
-        raise TypeError(f"a frame is accepted, found {packet.message.kind}")
-    return FrameRecord(packet.message, packet.arrays, metadata, written.checksum)
-
-
-def _face_record(written: WriteResult) -> FaceRecord:
-    packet, metadata = written.pending.packet, written.pending.metadata
-    if not isinstance(packet.message, Result) or not isinstance(metadata, FaceMetadata):
-        raise TypeError(f"a face finishes a capture, found {packet.message.kind}")
-    return FaceRecord(packet.message, packet.arrays, metadata, written.checksum)

@@ -6,7 +6,7 @@ Part 0 of the file is the metadata, JSON; the other parts are the message as it 
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Generic, TypeAlias, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -54,24 +54,22 @@ class FaceMetadata(_Metadata):
     finished_at: _Time
 
 
-@dataclass(frozen=True)
-class FrameRecord:
-    """A frame's file."""
-
-    message: Frame
-    arrays: Arrays
-    metadata: FrameMetadata
-    checksum: str
+MessageT = TypeVar("MessageT", Frame, Result)
+MetadataT = TypeVar("MetadataT", FrameMetadata, FaceMetadata)
 
 
 @dataclass(frozen=True)
-class FaceRecord:
-    """A face's file."""
+class Record(Generic[MessageT, MetadataT]):
+    """The file of a frame or a face."""
 
-    message: Result
+    message: MessageT
     arrays: Arrays
-    metadata: FaceMetadata
+    metadata: MetadataT
     checksum: str
+
+
+FrameRecord: TypeAlias = Record[Frame, FrameMetadata]
+FaceRecord: TypeAlias = Record[Result, FaceMetadata]
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ class PendingWrite:
         """Write and sync the file, not its folder; give its checksum; raises as `write_parts`."""
         return write_parts(
             self.path, [self.metadata.model_dump_json().encode(), *encode(self.packet)],
-            sync_name=False, direct=True, failpoints=self.failpoints)
+            failpoints=self.failpoints)
 
     def discard(self) -> None:
         """Remove the file; one that cannot be removed gets its row at the next start."""
@@ -113,30 +111,25 @@ def read_frame(path: Path, checksum: str | None = None) -> FrameRecord:
     CorruptFileError, StoreError
         As `read_parts`; CorruptFileError also where the file holds something else.
     """
-    packet, metadata, found = _read(path, checksum, FrameMetadata)
-    if not isinstance(packet.message, Frame):
-        raise CorruptFileError(f"{path}: holds a {packet.message.kind}, a frame expected")
-    return FrameRecord(packet.message, packet.arrays, metadata, found)
+    return _read(path, checksum, Frame, FrameMetadata)
 
 
 def read_face(path: Path, checksum: str | None = None) -> FaceRecord:
     """Read a face; errors as `read_frame`."""
-    packet, metadata, found = _read(path, checksum, FaceMetadata)
-    if not isinstance(packet.message, Result):
-        raise CorruptFileError(f"{path}: holds a {packet.message.kind}, a result expected")
-    return FaceRecord(packet.message, packet.arrays, metadata, found)
-
-
-_MetadataT = TypeVar("_MetadataT", bound=_Metadata)
+    return _read(path, checksum, Result, FaceMetadata)
 
 
 def _read(
-    path: Path, checksum: str | None, kind: type[_MetadataT]
-) -> tuple[Packet, _MetadataT, str]:
+    path: Path, checksum: str | None, kind: type[MessageT], metadata_kind: type[MetadataT]
+) -> Record[MessageT, MetadataT]:
     parts, found = read_parts(path, checksum)
     try:
-        metadata = kind.model_validate_json(bytes(parts[0]) if parts else b"")
-        return decode_stored(parts[1:]), metadata, found
+        metadata = metadata_kind.model_validate_json(bytes(parts[0]) if parts else b"")
+        packet = decode_stored(parts[1:])
     except (ProtocolError, ValidationError) as error:
         # The checksum is right: another version wrote it.
         raise CorruptFileError(f"{path}: {error}") from error
+    if not isinstance(packet.message, kind):
+        expected = kind.__name__.lower()
+        raise CorruptFileError(f"{path}: holds a {packet.message.kind}, a {expected} expected")
+    return Record(packet.message, packet.arrays, metadata, found)

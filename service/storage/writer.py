@@ -5,25 +5,26 @@ its own thread.
 """
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from queue import Empty, SimpleQueue
-from typing import Protocol
+from queue import Empty, Queue
+from typing import Protocol, TypeAlias
 
 from denseface.service.errors import StoreError
-from denseface.service.runtime.closing import Closing
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.files import sync_folder
 from denseface.service.runtime.wake_pipe import WakePipe
-from denseface.service.storage._record_file import store_error
-from denseface.service.storage.records import PendingWrite
+from denseface.service.storage._record_file import wrap_os_errors
+from denseface.service.storage.records import MessageT, MetadataT, PendingWrite, Record
 
 __all__ = ["InlineWriter", "WriteResult", "Writer", "WriterThreads", "write"]
 
 _MAX_BATCH = 8
 """Files that share one sync of their folder; the first waits for the last."""
+_Queue: TypeAlias = "Queue[PendingWrite | None]"
+"""What waits to be written; None ends the thread."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,15 @@ class WriteResult:
     """Of the file; empty where there is an error."""
     error: Exception | None = None
     """A StoreError where the disk or file system failed."""
+
+    def record(
+        self, kind: type[MessageT], metadata_kind: type[MetadataT]
+    ) -> Record[MessageT, MetadataT]:
+        """Give what was written; TypeError where it is of another kind."""
+        message, metadata = self.pending.packet.message, self.pending.metadata
+        if not isinstance(message, kind) or not isinstance(metadata, metadata_kind):
+            raise TypeError(f"expected a {kind.__name__}, found a {message.kind}")
+        return Record(message, self.pending.packet.arrays, metadata, self.checksum)
 
 
 class Writer(Protocol):
@@ -56,8 +66,13 @@ def write(pending_writes: Sequence[PendingWrite]) -> list[WriteResult]:
     The file of a frame that fails is removed.
     """
     written = [_write(pending) for pending in pending_writes]
-    failed = {folder: error for folder in {one.pending.path.parent for one in written
-                                           if one.error is None} if (error := _sync(folder))}
+    failed: dict[Path, StoreError] = {}
+    for folder in {one.pending.path.parent for one in written if one.error is None}:
+        try:
+            with wrap_os_errors(folder):
+                sync_folder(folder)
+        except StoreError as error:
+            failed[folder] = error
     written = [one if one.error else WriteResult(
         one.pending, one.checksum, failed.get(one.pending.path.parent)) for one in written]
     for one in written:
@@ -73,14 +88,6 @@ def _write(pending: PendingWrite) -> WriteResult:
         return WriteResult(pending, pending.write())
     except Exception as error:
         return WriteResult(pending, error=error)
-
-
-def _sync(folder: Path) -> StoreError | None:
-    try:
-        sync_folder(folder)
-    except OSError as error:
-        return store_error(folder, error)
-    return None
 
 
 class InlineWriter:
@@ -102,85 +109,67 @@ class InlineWriter:
         """Return: every write has its result."""
 
 
-class WriterThreads(Closing):
+class WriterThreads(WakePipe):
     """Writes frames in one thread and faces in another: a press does not wait for a face.
 
-    `fileno` is readable while there are results.
+    Readable while there are results.
     """
 
     def __init__(self) -> None:
-        self._wake = WakePipe()
-        self._closed = False
-        self._changed = threading.Condition()
-        self._unfinished = 0
+        super().__init__()
+        self._lock = threading.Lock()
         self._results: list[WriteResult] = []
-        self._frames = _WriterThread("frames", self._finished)
-        self._faces = _WriterThread("faces", self._finished)
-
-    def fileno(self) -> int:
-        """Give the descriptor to poll for reading."""
-        return self._wake.fileno()
+        self._closed = False
+        self._frames: _Queue = Queue()
+        self._faces: _Queue = Queue()
+        self._threads = [
+            threading.Thread(target=self._run, args=(queue,), name=name, daemon=True)
+            for name, queue in (("frames", self._frames), ("faces", self._faces))]
+        for thread in self._threads:
+            thread.start()
 
     def has_results(self) -> bool:
         """Whether `take_results` would give anything."""
-        with self._changed:
+        with self._lock:
             return bool(self._results)
 
     def start(self, pending: PendingWrite) -> None:
         """Begin to write a file."""
-        with self._changed:
-            self._unfinished += 1
         (self._frames if pending.is_frame else self._faces).put(pending)
 
     def take_results(self) -> list[WriteResult]:
         """Give the results since the last call."""
-        with self._changed:
+        with self._lock:
             results, self._results = self._results, []
             if results and not self._closed:
-                self._wake.drain()
+                self.drain()
         return results
 
     def wait(self) -> None:
         """Wait until every write has a result."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._unfinished == 0)
-
-    def _finished(self, written: list[WriteResult]) -> None:
-        with self._changed:
-            self._unfinished -= len(written)
-            self._results += written
-            self._wake.wake()
-            self._changed.notify_all()
+        self._frames.join()
+        self._faces.join()
 
     def close(self) -> None:
         """Finish every write and end both threads; `take_results` still gives the results."""
-        for thread in (self._frames, self._faces):
-            thread.close()
-        self._wake.close()
+        for queue in (self._frames, self._faces):
+            queue.put(None)
+        for thread in self._threads:
+            thread.join()
         self._closed = True
+        super().close()
 
-
-class _WriterThread:
-    def __init__(self, name: str, finished: Callable[[list[WriteResult]], None]) -> None:
-        self._finished = finished
-        self._waiting: SimpleQueue[PendingWrite | None] = SimpleQueue()
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
-        self._thread.start()
-
-    def put(self, pending: PendingWrite) -> None:
-        self._waiting.put(pending)
-
-    def close(self) -> None:
-        self._waiting.put(None)
-        self._thread.join()
-
-    def _run(self) -> None:
-        while (pending := self._waiting.get()) is not None:
-            batch = [pending]
+    def _run(self, queue: _Queue) -> None:
+        going_on = True
+        while going_on:
+            batch = [queue.get()]
             with suppress(Empty):
-                while len(batch) < _MAX_BATCH and (
-                        pending := self._waiting.get_nowait()) is not None:
-                    batch.append(pending)
-            self._finished(write(batch))
-            if pending is None:
-                return
+                while len(batch) < _MAX_BATCH:
+                    batch.append(queue.get_nowait())
+            going_on = None not in batch
+            results = write([one for one in batch if one])
+            with self._lock:
+                self._results += results
+                self.wake()
+            for _ in batch:
+                queue.task_done()

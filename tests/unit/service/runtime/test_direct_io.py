@@ -28,13 +28,15 @@ def written(monkeypatch):
 
 def test_it_holds_what_any_other_holds(tmp_path, monkeypatch):
     sizes = written(monkeypatch)
-    plain = write_parts(tmp_path / "plain", PARTS)
+    with monkeypatch.context() as patch:
+        patch.setattr("denseface.service.runtime.files.write_direct", lambda *_: False)
+        plain = write_parts(tmp_path / "plain", PARTS)
     assert sizes == []
-    assert write_parts(tmp_path / "direct", PARTS, direct=True) == plain
+    assert write_parts(tmp_path / "direct", PARTS) == plain
     assert (tmp_path / "direct").read_bytes() == (tmp_path / "plain").read_bytes()
     assert read_parts(tmp_path / "direct", plain)[0] == [bytes(part) for part in PARTS]
     # What a longer file left in the buffer is not in a shorter one.
-    write_parts(tmp_path / "short", PARTS[:2], direct=True)
+    write_parts(tmp_path / "short", PARTS[:2])
     assert read_parts(tmp_path / "short")[0] == [bytes(part) for part in PARTS[:2]]
     if not sizes:
         pytest.skip("the file system of the temporary folder has no direct writing")
@@ -44,7 +46,7 @@ def test_a_short_write_goes_on(tmp_path, monkeypatch):
     real = os.write
     monkeypatch.setattr(
         _direct_io.os, "write", lambda descriptor, data: real(descriptor, data[:2**20]))
-    checksum = write_parts(tmp_path / "x", PARTS, direct=True)
+    checksum = write_parts(tmp_path / "x", PARTS)
     assert read_parts(tmp_path / "x", checksum)[0] == [bytes(part) for part in PARTS]
 
 
@@ -60,7 +62,7 @@ def test_where_it_cannot_be_had_the_cache_is_used(tmp_path, monkeypatch, at):
 
     with monkeypatch.context() as patch:
         patch.setattr(_direct_io.os, "write", refuses)
-        checksum = write_parts(tmp_path / "x", PARTS, direct=True)
+        checksum = write_parts(tmp_path / "x", PARTS)
     assert calls
     assert read_parts(tmp_path / "x", checksum)[0] == [bytes(part) for part in PARTS]
 
@@ -71,5 +73,5 @@ def test_a_full_disk_is_told(tmp_path, monkeypatch):
 
     monkeypatch.setattr(_direct_io.os, "write", full)
     with pytest.raises(OSError, match="no room on the disk"):
-        write_parts(tmp_path / "x", PARTS, direct=True)
+        write_parts(tmp_path / "x", PARTS)
     assert list(tmp_path.iterdir()) == []
