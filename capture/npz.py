@@ -39,7 +39,6 @@ class _Kind(NamedTuple):
     dtype: str
     shape: str
     ndim: int
-    required: bool = True
 
 
 _KEYS = {
@@ -48,7 +47,7 @@ _KEYS = {
     "depth_timestamp_us": _Kind("int64", "()", 0),
     "color_timestamp_us": _Kind("int64", "()", 0),
     "calibration": _Kind("str", "()", 0),
-    "registered": _Kind("bool", "()", 0, required=False),
+    "registered": _Kind("bool", "()", 0),
 }
 
 
@@ -86,7 +85,8 @@ def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> Rgb
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            arrays = _read_arrays(Path(path), archive, needs_calibration=chosen is None)
+            optional = ("registered",) if chosen is None else ("registered", "calibration")
+            arrays = _read_arrays(path, archive, optional)
     except CaptureError:
         raise
     except (OSError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError,
@@ -135,7 +135,7 @@ def _own_calibration(path: str | Path, array: NDArray[Any]) -> Calibration:
 
 
 def _read_arrays(
-    path: Path, archive: zipfile.ZipFile, *, needs_calibration: bool
+    path: str | Path, archive: zipfile.ZipFile, optional: tuple[str, ...]
 ) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {}
     for member in archive.infolist():
@@ -150,7 +150,7 @@ def _read_arrays(
         with archive.open(member) as file:
             arrays[key] = _read_array(f"{path}: {key}", file, _KEYS[key])
     for key, kind in _KEYS.items():
-        if key not in arrays and kind.required and (key != "calibration" or needs_calibration):
+        if key not in arrays and key not in optional:
             raise FrameError(f"{path}: key {key!r} is missing, expected {kind.dtype} {kind.shape}")
     return arrays
 

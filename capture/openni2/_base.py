@@ -19,7 +19,6 @@ class OpenNI2Source(Source):
     _live: bool
     _device: Any = None
     _streams: Streams | None = None
-    _origin: str
 
     def __init__(self, uri: str, chosen: ChosenCalibration | None) -> None:
         self.uri = uri
@@ -48,7 +47,8 @@ class OpenNI2Source(Source):
             if self._chosen is None:
                 calibration, derivation = derive_calibration(
                     streams.properties, streams.size(DEPTH), streams.size(COLOR))
-                self._chosen = ChosenCalibration(calibration, f"{self._origin}: {derivation}")
+                origin = "device" if self._live else "recording"
+                self._chosen = ChosenCalibration(calibration, f"{origin}: {derivation}")
         except BaseException:
             self.close()
             raise

@@ -37,7 +37,6 @@ class LiveSource(OpenNI2Source):
     """
 
     _live = True
-    _origin = "device"
 
     def __init__(
         self, device_uri: str | None = None, chosen: ChosenCalibration | None = None, *,

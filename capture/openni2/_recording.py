@@ -33,7 +33,6 @@ class RecordingSource(OpenNI2Source):
     """
 
     _live = False
-    _origin = "recording"
 
     def __init__(self, path: Path, chosen: ChosenCalibration | None = None) -> None:
         super().__init__(str(path), chosen)

@@ -61,9 +61,8 @@ def run_pass(
     shrink = min(1.0, cascade_pass.face_px / typical_px)
     small = np.ascontiguousarray(gray[y:y + height, x:x + width])
     if shrink < 1:
-        columns, rows = max(1, round(width * shrink)), max(1, round(height * shrink))
-        small = np.asarray(
-            cv2.resize(small, (columns, rows), interpolation=cv2.INTER_AREA), np.uint8)
+        size = max(1, round(width * shrink)), max(1, round(height * shrink))
+        small = np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_AREA), np.uint8)
     scale_x, scale_y = small.shape[1] / width, small.shape[0] / height
     # From pixels that the cascade sees to pixels of `gray`; whole numbers are pixel centres.
     to_image = np.array([[1 / scale_x, 0, x - 0.5 + 0.5 / scale_x],

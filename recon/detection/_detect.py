@@ -10,7 +10,7 @@ import numpy as np
 from denseface.recon.arrays import Bytes
 from denseface.recon.detection._cascades import CascadePass, CenterMask, run_pass
 from denseface.recon.detection._contrast import equalize_contrast
-from denseface.recon.detection._kernels import center_depths, depths_in_box
+from denseface.recon.detection._kernels import depths_in_box
 from denseface.recon.detection._regions import CELLS, Region, regions_by_depth, without_flat
 from denseface.recon.detection._relief import bulge_mm
 from denseface.recon.errors import FaceWithoutDepthError, NoFaceError
@@ -75,19 +75,14 @@ _MIN_CENTER_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Detection:
-    """The chosen box with its depth, and all boxes that were judged.
-
-    Attributes
-    ----------
-    box : x, y, width, height; pixels of the colour image; upright, about the centre of the face,
-        however the head is tipped
-    depth_mm : median z, in the colour camera's frame, in the middle of the box
-    candidates : every box, the chosen one first, then by depth
-    """
+    """The chosen box with its depth, and all boxes that were judged."""
 
     box: Box
+    """x, y, width, height; pixels of the colour image; upright, however the head is tipped."""
     depth_mm: float
+    """Median z, in the colour camera's frame, in the middle of the box."""
     candidates: tuple[FaceCandidate, ...]
+    """Every box, the chosen one first, then by depth."""
 
 
 def detect_face(color: Bytes, registered: Registration, focal_px: float) -> Detection:
@@ -138,7 +133,8 @@ def judge_box(box: Box, registered: Registration, focal_px: float) -> FaceCandid
     x, y, w, h = box
     depths = depths_in_box(registered.pixels, registered.color_depth, registered.visible,
                            float(x), float(y), float(w), float(h))
-    z = center_depths(depths, _CENTER)
+    u, v, z = depths.T
+    z = z[(np.abs(u) < _CENTER) & (np.abs(v) < _CENTER)]
     if len(z) < _MIN_CENTER_SHARE * w * h * (_CENTER / registered.z_buffer.pitch)**2:
         return FaceCandidate(box=box, depth_mm=None, width_mm=None, verdict="no depth")
     depth = percentile(z, 50)

@@ -30,18 +30,13 @@ _MAX_NODES = 2
 
 
 class Cascade(NamedTuple):
-    """A cascade as OpenCV ships it.
-
-    Attributes
-    ----------
-    window : side of the window, pixels
-    trees : its stages
-    corners : (nodes, 12, 2) int32, (x, y) of the corners of each node's three rectangles
-    """
+    """A cascade as OpenCV ships it."""
 
     window: int
+    """Side of the window, pixels."""
     trees: Trees
     corners: Ints
+    """(nodes, 12, 2), (x, y) of the corners of each node's three rectangles."""
 
 
 @cache

@@ -23,23 +23,19 @@ _6, _7, _8, _9, _10, _11 = (np.uint64(k) for k in range(6, 12))
 
 
 class Trees(NamedTuple):
-    """The decision trees of a cascade, all of one node or all of two.
-
-    Attributes
-    ----------
-    weights : (nodes, 3) float32, of a node's rectangles; the third is 0 where there are two
-    thresholds : (nodes,) float32, of the weighted sum by the window's standard deviation
-    outcomes : (trees, 4) float32, what a tree adds to its stage: where its first node is below its
-        threshold and its last is, where the last is not, and the same where the first is not
-    stages : (stages + 1,) uint32, the first tree of each stage, and the number of all
-    stage_thresholds : (stages,) float32, what the trees of a stage must add up to
-    """
+    """The decision trees of a cascade, all of one node or all of two."""
 
     weights: Floats
+    """(nodes, 3), of a node's rectangles; the third is 0 where there are two."""
     thresholds: Floats
+    """(nodes,), of the weighted sum by the window's standard deviation."""
     outcomes: Floats
+    """(trees, 4), what a tree adds to its stage: where its first node is below its threshold and
+    its last is, where the last is not, and the same where the first is not."""
     stages: NDArray[np.uint32]
+    """(stages + 1,), the first tree of each stage, and the number of all."""
     stage_thresholds: Floats
+    """(stages,), what the trees of a stage must add up to."""
 
 
 class WindowGrid(NamedTuple):

@@ -65,15 +65,3 @@ def depths_in_box(
                 found[count, 0], found[count, 1], found[count, 2] = u, v, color_depth[i, j]
                 count += 1
     return found[:count]
-
-
-@compiled
-def center_depths(depths: Doubles, half: float) -> Doubles:
-    """Give the z of (n, 3) u, v and z with both u and v nearer to 0 than `half`."""
-    found = np.empty(len(depths))
-    count = 0
-    for i in range(len(depths)):
-        found[count] = depths[i, 2]
-        if abs(depths[i, 0]) < half and abs(depths[i, 1]) < half:
-            count += 1
-    return found[:count]
