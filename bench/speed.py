@@ -153,7 +153,7 @@ def _against_dense(case: Case, count: int, preset: Preset) -> None:
     results: dict[str, Any] = {}
 
     def fast() -> None:
-        results["fast"] = fit_surface(seeds, r0, known.smoothing).on_grid(xs, ys).ravel()
+        results["fast"] = fit_surface(seeds, r0, known.smoothing).heights(xs, ys).ravel()
 
     def dense() -> None:
         results["dense"] = dense_heights(seeds, queries, r0, known.smoothing)

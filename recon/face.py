@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, FailFast
 
+from denseface.recon.arrays import Bytes, Floats, Ints
 from denseface.recon.settings import Settings
 
 __all__ = ["Box", "DenseCloud", "Face", "FaceCandidate", "PointCloud", "Report", "Seeds"]
@@ -27,8 +28,8 @@ class PointCloud:
         Where an array's shape or dtype is not as above, or a coordinate is not finite.
     """
 
-    points: NDArray[np.float32]
-    colors: NDArray[np.uint8]
+    points: Floats
+    colors: Bytes
 
     def __post_init__(self) -> None:
         _check("points", self.points, np.float32, (len(self.points), 3))
@@ -50,9 +51,9 @@ class Seeds:
     pixels : (n, 2) int32, (row, column) in the depth image
     """
 
-    points: NDArray[np.float32]
-    colors: NDArray[np.uint8]
-    pixels: NDArray[np.int32]
+    points: Floats
+    colors: Bytes
+    pixels: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +69,9 @@ class DenseCloud(PointCloud):
     grid_step_mm : distance of neighbouring grid points, mm
     """
 
-    normals: NDArray[np.float32]
-    sigma: NDArray[np.float32]
-    cells: NDArray[np.int32]
+    normals: Floats
+    sigma: Floats
+    cells: Ints
     grid_shape: tuple[int, int]
     grid_step_mm: float
 

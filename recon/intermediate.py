@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes, Doubles, Floats
 from denseface.recon.numerics.bilinear import add_resampled
 from denseface.recon.support import Support
 
@@ -15,14 +15,14 @@ __all__ = ["NO_DEPTH_MM", "ColorSampler", "Registration", "SurfaceGrid", "ZBuffe
 NO_DEPTH_MM = np.float32(1e30)
 """z of a cell without any depth, mm. Not inf: compiled code assumes finite numbers."""
 
-ColorSampler = Callable[[NDArray[np.float32]], tuple[NDArray[np.uint8], NDArray[np.bool_]]]
+ColorSampler = Callable[[Floats], tuple[Bytes, Bools]]
 """Points, (n, 3) float32, mm, to their colours, (n, 3) uint8, and which are seen, (n,) bool."""
 
 
 class ZBuffer(NamedTuple):
     """The nearest z in the colour camera's frame, in cells of the colour image."""
 
-    nearest: NDArray[np.float32]
+    nearest: Floats
     """(rows, columns), mm, `NO_DEPTH_MM` where nothing is."""
     pitch: float
     """Side of a cell, pixels of the colour image."""
@@ -48,12 +48,12 @@ class Registration:
     rows: slice
     columns: slice
     focal_px: float
-    points: NDArray[np.float32]
-    valid: NDArray[np.bool_]
-    pixels: NDArray[np.float32]
-    color_depth: NDArray[np.float32]
-    visible: NDArray[np.bool_]
-    colors: NDArray[np.uint8]
+    points: Floats
+    valid: Bools
+    pixels: Floats
+    color_depth: Floats
+    visible: Bools
+    colors: Bytes
     z_buffer: ZBuffer
 
 
@@ -69,14 +69,12 @@ class SurfaceGrid:
     detailed : whether detail was added to the fit
     """
 
-    values: NDArray[np.float32]
+    values: Floats
     support: Support
     noise: float
     detailed: bool
 
-    def sampled(
-        self, xs: NDArray[np.float64], ys: NDArray[np.float64]
-    ) -> NDArray[np.float32]:
+    def sampled(self, xs: Doubles, ys: Doubles) -> Floats:
         """Give f, df/dx, df/dy on another axis-aligned grid: (k,), (m,) mm -> (3, m, k)."""
         columns, rows = self.support.coordinates(xs, ys)
         found = np.zeros((3, len(rows), len(columns)), np.float32)

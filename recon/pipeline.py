@@ -8,10 +8,8 @@ import time
 from functools import cache, partial
 from importlib.metadata import version
 
-import numpy as np
-from numpy.typing import NDArray
-
 from denseface.capture.frame import RgbdFrame
+from denseface.recon.arrays import Floats
 from denseface.recon.detail import add_detail
 from denseface.recon.detection import detect_face
 from denseface.recon.errors import NoDepthError, TooLittleDepthError
@@ -110,8 +108,7 @@ def _version() -> str:
 
 
 def surface_of(
-    points: NDArray[np.float32], spacing: float, settings: Settings,
-    sampler: ColorSampler | None = None,
+    points: Floats, spacing: float, settings: Settings, sampler: ColorSampler | None = None
 ) -> SurfaceGrid:
     """Fit the seeds, and add the detail that the settings ask for.
 

@@ -6,8 +6,8 @@ from typing import Self
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes, Doubles, Floats
 from denseface.recon.numerics.bilinear import exceeds
 from denseface.recon.numerics.filters import blurred
 from denseface.recon.numerics.jit import compiled
@@ -46,15 +46,15 @@ class Support:
     level : not 0, since a disc of few pixels reaches farther than its radius
     """
 
-    xs: NDArray[np.float64]
-    ys: NDArray[np.float64]
+    xs: Doubles
+    ys: Doubles
     step: float
-    seeded: NDArray[np.uint8]
-    margin: NDArray[np.float32]
+    seeded: Bytes
+    margin: Floats
     level: float
 
     @classmethod
-    def of(cls, points: NDArray[np.float32], spacing: float) -> Self:
+    def of(cls, points: Floats, spacing: float) -> Self:
         """Find where seeds support a surface.
 
         Parameters
@@ -80,7 +80,7 @@ class Support:
         return cls(xs, ys, step, seeded, margin, pixels - least).without(most == 0)
 
     @property
-    def inside(self) -> NDArray[np.bool_]:
+    def inside(self) -> Bools:
         """Which of the grid's points are supported, (rows, columns)."""
         return self.margin > 0
 
@@ -89,26 +89,22 @@ class Support:
         """Area of the supported points, mm^2."""
         return float(np.count_nonzero(self.inside) * self.step**2)
 
-    def near_seeds(self, radius: float) -> NDArray[np.uint8]:
+    def near_seeds(self, radius: float) -> Bytes:
         """Which of the grid's points have a seed within a radius, mm; 0 or 1."""
         return np.asarray(cv2.dilate(self.seeded, disc(radius / self.step)), np.uint8)
 
-    def without(self, removed: NDArray[np.bool_]) -> Self:
+    def without(self, removed: Bools) -> Self:
         """Remove some of the grid's points, up to half of the way to the next."""
         return replace(self, margin=_without(self.margin, removed, self.level))
 
-    def coordinates(
-        self, xs: NDArray[np.float64], ys: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def coordinates(self, xs: Doubles, ys: Doubles) -> tuple[Floats, Floats]:
         """Turn x and y, (k,), (m,) mm, into fractional columns and rows, clipped to the grid."""
         columns, rows = (
             np.clip((values - own[0]) / self.step, 0, len(own) - 1).astype(np.float32)
             for values, own in ((xs, self.xs), (ys, self.ys)))
         return columns, rows
 
-    def on_grid(
-        self, step: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    def on_grid(self, step: float) -> tuple[Doubles, Doubles, Bools]:
         """Sample on another grid over the same region.
 
         Parameters
@@ -125,7 +121,7 @@ class Support:
         return xs, ys, exceeds(self.margin, rows, columns, self.level)
 
 
-def _broadly_blurred(image: NDArray[np.uint8], sigma: float) -> NDArray[np.float32]:
+def _broadly_blurred(image: Bytes, sigma: float) -> Floats:
     """Blur by a broad Gaussian, on fewer pixels where they are enough."""
     every = max(1, int(sigma / _EVEN_PX))
     rows, columns = (-(-side // every) for side in image.shape)
@@ -139,15 +135,13 @@ def _broadly_blurred(image: NDArray[np.uint8], sigma: float) -> NDArray[np.float
                       np.float32)[:image.shape[0], :image.shape[1]]
 
 
-def _axis(low: float, high: float, step: float) -> NDArray[np.float64]:
+def _axis(low: float, high: float, step: float) -> Doubles:
     """Points from `low` to beyond `high`, an even number."""
     return low + step * np.arange(2 * (int((high - low) / step) // 2 + 1), dtype=np.float64)
 
 
 @compiled
-def _without(
-    margin: NDArray[np.float32], removed: NDArray[np.bool_], level: float
-) -> NDArray[np.float32]:
+def _without(margin: Floats, removed: Bools, level: float) -> Floats:
     """Give a support's margin without some points."""
     flat, out = margin.ravel(), np.empty(margin.shape, np.float32)
     mask, given, middle = removed.ravel(), out.ravel(), np.float32(level)

@@ -6,9 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.recon.arrays import Doubles, Floats
 from denseface.recon.numerics.jit import compiled
-
-__all__ = ["Cluster", "split_depths"]
 
 _STARTS = 64
 """Depths among which the best cuts are sought, before they are moved to the millimetre."""
@@ -55,7 +54,7 @@ def split_depths(z: NDArray[np.floating]) -> list[Cluster]:
 
 
 @compiled
-def _summed(z: NDArray[np.float32]) -> tuple[int, NDArray[np.float64]]:
+def _summed(z: Floats) -> tuple[int, Doubles]:
     """Give the least depth, whole mm, and running moments of the histogram, (3, bins + 1).
 
     One bin k for each millimetre from the least to the largest depth; over the bins before each,
@@ -80,7 +79,7 @@ def _summed(z: NDArray[np.float32]) -> tuple[int, NDArray[np.float64]]:
 
 
 @compiled
-def _best_cuts(sums: NDArray[np.float64], at: NDArray[np.int64]) -> tuple[int, int]:
+def _best_cuts(sums: Doubles, at: NDArray[np.int64]) -> tuple[int, int]:
     """Try every pair of some bins: (first of the second cluster, first of the third)."""
     least, best = 1e300, (at[0], at[0])
     for first in at:
@@ -94,7 +93,7 @@ def _best_cuts(sums: NDArray[np.float64], at: NDArray[np.int64]) -> tuple[int, i
 
 
 @compiled
-def _spread(sums: NDArray[np.float64], first: int, end: int) -> float:
+def _spread(sums: Doubles, first: int, end: int) -> float:
     """Sum of the bins' squared distances from their mean."""
     total = sums[1, end] - sums[1, first]
     return float(sums[2, end] - sums[2, first]
@@ -102,7 +101,7 @@ def _spread(sums: NDArray[np.float64], first: int, end: int) -> float:
 
 
 @compiled
-def _refined(second: int, third: int, sums: NDArray[np.float64]) -> tuple[int, int]:
+def _refined(second: int, third: int, sums: Doubles) -> tuple[int, int]:
     """Lloyd's algorithm: each cut goes to the middle between the means on its sides."""
     end = sums.shape[1] - 1
     for _ in range(_ROUNDS):

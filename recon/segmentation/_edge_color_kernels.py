@@ -1,23 +1,22 @@
-"""The background's part in the colours along a face's outline, compiled."""
+"""The background's part in the colours along a face's outline."""
 
 from typing import NamedTuple
 
+import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes, Ints
 from denseface.recon.numerics.jit import compiled
-
-__all__ = ["ColorSums", "MixtureLimits", "box_sums", "remove_background"]
 
 
 class ColorSums(NamedTuple):
     """Sums of the colours around each pixel of an edge, and their number: (n, 4) int32 each."""
 
-    face: NDArray[np.int32]
+    face: Ints
     """Of the face beside it."""
-    background: NDArray[np.int32]
+    background: Ints
     """Of what is behind it."""
-    distant: NDArray[np.int32]
+    distant: Ints
     """Of what is behind it or farther aside."""
 
 
@@ -38,26 +37,16 @@ class MixtureLimits(NamedTuple):
     """A background less different than this would not be noticed within the rim."""
 
 
-@compiled
-def box_sums(
-    colors: NDArray[np.uint8], mask: NDArray[np.bool_], wanted: NDArray[np.bool_], reach: int
-) -> NDArray[np.int32]:
-    """Sum the masked colours at most `reach` rows and columns from each wanted pixel.
+def summed_area_table(colors: Bytes, mask: Bools) -> Ints:
+    """Sum the masked colours, and their number, above and to the left: (H + 1, W + 1, 4) int32."""
+    known = mask.view(np.uint8)
+    return np.asarray(cv2.integral(cv2.copyTo(cv2.merge([colors, known]), known)), np.int32)
 
-    Returns (n, 4), the number of colours last, for n wanted pixels, row by row.
-    """
-    rows, columns = mask.shape
-    # Summed-area table: any box is a combination of four entries.
-    total = np.zeros((rows + 1, columns + 1, 4), np.int32)
-    for row in range(rows):
-        line = np.zeros(4, np.int32)
-        for column in range(columns):
-            if mask[row, column]:
-                for c in range(3):
-                    line[c] += colors[row, column, c]
-                line[3] += 1
-            for c in range(4):
-                total[row + 1, column + 1, c] = total[row, column + 1, c] + line[c]
+
+@compiled
+def box_sums(table: Ints, wanted: Bools, reach: int) -> Ints:
+    """Sum what is at most `reach` rows and columns from each wanted pixel, row by row: (n, 4)."""
+    rows, columns = wanted.shape
     out = np.empty((np.count_nonzero(wanted), 4), np.int32)
     i = 0
     for row in range(rows):
@@ -66,16 +55,15 @@ def box_sums(
                 top, bottom = max(row - reach, 0), min(row + reach + 1, rows)
                 left, right = max(column - reach, 0), min(column + reach + 1, columns)
                 for c in range(4):
-                    out[i, c] = (total[bottom, right, c] - total[top, right, c]
-                                 - total[bottom, left, c] + total[top, left, c])
+                    out[i, c] = (table[bottom, right, c] - table[top, right, c]
+                                 - table[bottom, left, c] + table[top, left, c])
                 i += 1
     return out
 
 
 @compiled
 def remove_background(
-    colors: NDArray[np.uint8], own: NDArray[np.bool_], edge: NDArray[np.bool_], sums: ColorSums,
-    limits: MixtureLimits,
+    colors: Bytes, own: Bools, edge: Bools, sums: ColorSums, limits: MixtureLimits
 ) -> None:
     """Remove the background's part from the edge's colours, and say which are the face's own.
 
@@ -115,8 +103,7 @@ def remove_background(
 
 @compiled
 def _unmixed(
-    color: NDArray[np.uint8], face: NDArray[np.int32], behind: NDArray[np.int32],
-    limits: MixtureLimits,
+    color: Bytes, face: Ints, behind: Ints, limits: MixtureLimits
 ) -> tuple[np.float32, np.float32, bool]:
     """Give s of a colour, the squared distance of both means, and whether it lies on their line.
 

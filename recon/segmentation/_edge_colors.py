@@ -2,8 +2,8 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes
 from denseface.recon.intermediate import Registration
 from denseface.recon.numerics.morphology import select_pixels
 from denseface.recon.numerics.push_pull import inpaint_colors
@@ -12,9 +12,8 @@ from denseface.recon.segmentation._edge_color_kernels import (
     MixtureLimits,
     box_sums,
     remove_background,
+    summed_area_table,
 )
-
-__all__ = ["seed_colors"]
 
 _RIM = np.ones((5, 5), np.uint8)
 """How far inside the outline the background may mix into a depth pixel's colour, pixels."""
@@ -38,9 +37,7 @@ _LIMITS = MixtureLimits(alike=10.0, part=0.35, distant_part=0.5, aside=0.5, asid
 """Hair before a wall is no mixture of the face's colour and the wall's."""
 
 
-def seed_colors(
-    registered: Registration, face: NDArray[np.bool_], solid: NDArray[np.uint8]
-) -> NDArray[np.uint8]:
+def seed_colors(registered: Registration, face: Bools, solid: Bytes) -> Bytes:
     """Give the colour of each pixel of the face, (n, 3) uint8, RGB, in the order of its rows.
 
     Where the colour camera does not see a pixel, its neighbours' mean. Along the outline the
@@ -68,9 +65,9 @@ def seed_colors(
     behind = _behind(registered, window, face, solid)
     own = inner.copy()
     edge = seen & ~deep
-    sums = ColorSums(box_sums(colors, deep, edge, _INSIDE // 2),
-                     box_sums(colors, behind, edge, _BESIDE // 2),
-                     box_sums(colors, behind, edge, _DISTANT // 2))
+    face_table, table = summed_area_table(colors, deep), summed_area_table(colors, behind)
+    sums = ColorSums(box_sums(face_table, edge, _INSIDE // 2), box_sums(table, edge, _BESIDE // 2),
+                     box_sums(table, edge, _DISTANT // 2))
     remove_background(colors, own, edge, sums, _LIMITS)
     close = _window(face, 0)
     colors, own, face = colors[close].copy(), own[close].copy(), face[close].copy()
@@ -78,7 +75,7 @@ def seed_colors(
     return select_pixels(colors, face)
 
 
-def _window(face: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
+def _window(face: Bools, margin: int) -> tuple[slice, slice]:
     """The rows and columns of the face, and so many more each way."""
     rows, columns = (np.flatnonzero(face.any(axis=axis)) for axis in (1, 0))
     return (slice(max(rows[0] - margin, 0), rows[-1] + margin + 1),
@@ -86,12 +83,11 @@ def _window(face: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
 
 
 def _behind(
-    registered: Registration, window: tuple[slice, slice], face: NDArray[np.bool_],
-    solid: NDArray[np.uint8],
-) -> NDArray[np.bool_]:
+    registered: Registration, window: tuple[slice, slice], face: Bools, solid: Bytes
+) -> Bools:
     """The visible pixels beside the face that are farther than any of it nearby."""
     z = registered.points[window][..., 2]
     farthest = cv2.dilate(np.where(face, z, np.float32(0)), _AROUND)
-    behind: NDArray[np.bool_] = (
+    behind: Bools = (
         registered.visible[window] & (solid == 0) & (z > farthest + np.float32(_BEHIND_MM)))
     return behind

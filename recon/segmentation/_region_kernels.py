@@ -9,11 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes, Doubles, Floats
 from denseface.recon.numerics.jit import compiled
-
-__all__ = ["FloodLimits", "nearest_pixel", "principal_axis", "priority_flood", "row_medians",
-           "square_mask", "superellipse_mask", "trim_below_drop", "trim_beside_rise",
-           "trim_to_profile"]
 
 # States of a pixel; those below _CANDIDATE are stepped over, those above it end a step.
 _UNMEASURED, _OCCLUDED, _CANDIDATE, _VISITED, _BLOCKED = 0, 1, 2, 3, 4
@@ -34,9 +31,8 @@ class FloodLimits(NamedTuple):
 
 @compiled
 def superellipse_mask(
-    valid: NDArray[np.bool_], pixels: NDArray[np.float32], center: tuple[float, float],
-    semi_axes: NDArray[np.float32],
-) -> NDArray[np.bool_]:
+    valid: Bools, pixels: Floats, center: tuple[float, float], semi_axes: Floats
+) -> Bools:
     """Mark the valid pixels seen in a superellipse of power 2.5, (H, W).
 
     That is between an ellipse (2) and a box: a head is round, and the corners of its box hold
@@ -60,10 +56,7 @@ def superellipse_mask(
 
 
 @compiled
-def square_mask(
-    mask: NDArray[np.bool_], pixels: NDArray[np.float32], center: tuple[float, float],
-    reach: float,
-) -> NDArray[np.bool_]:
+def square_mask(mask: Bools, pixels: Floats, center: tuple[float, float], reach: float) -> Bools:
     """Keep the pixels of a mask seen at most `reach` from (u, v), each way, (H, W)."""
     rows, columns = mask.shape
     u, v, most = np.float32(center[0]), np.float32(center[1]), np.float32(reach)
@@ -78,8 +71,7 @@ def square_mask(
 
 @compiled
 def nearest_pixel(
-    mask: NDArray[np.bool_], visible: NDArray[np.bool_], pixels: NDArray[np.float32],
-    center: tuple[float, float],
+    mask: Bools, visible: Bools, pixels: Floats, center: tuple[float, float]
 ) -> tuple[int, int]:
     """Find the visible pixel of a mask that is seen nearest to (u, v); (-1, -1) where none is."""
     u, v = np.float32(center[0]), np.float32(center[1])
@@ -95,9 +87,7 @@ def nearest_pixel(
 
 
 @compiled
-def row_medians(
-    z: NDArray[np.float32], mask: NDArray[np.bool_], every: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def row_medians(z: Floats, mask: Bools, every: int) -> tuple[NDArray[np.int64], Doubles]:
     """Take every k-th of the rows that the mask is not empty in.
 
     Returns their indices, and the median of their masked z.
@@ -122,9 +112,8 @@ def row_medians(
 
 @compiled
 def priority_flood(
-    z: NDArray[np.float32], candidates: NDArray[np.bool_], occluded: NDArray[np.bool_],
-    start: tuple[int, int], limits: FloodLimits,
-) -> NDArray[np.bool_]:
+    z: Floats, candidates: Bools, occluded: Bools, start: tuple[int, int], limits: FloodLimits
+) -> Bools:
     """Grow a region from a pixel over a surface, across small gaps and behind occluders.
 
     Neighbours are the next measured, not occluded pixels in the eight directions. Those among
@@ -175,18 +164,14 @@ def priority_flood(
                     bucket = max(level, int(there) - low)
                     following[place] = heads[bucket]
                     heads[bucket] = place
-    region = np.empty(z.shape, np.bool_)
-    for row in range(z.shape[0]):
-        for column in range(z.shape[1]):
-            region[row, column] = state[(row + 1) * wide + column + 1] == _VISITED
+    region: Bools = state.reshape(-1, wide)[1:-1, 1:-1] == _VISITED
     return region
 
 
 @compiled
 def _flood_states(
-    z: NDArray[np.float32], candidates: NDArray[np.bool_], occluded: NDArray[np.bool_],
-    start_z: np.float32,
-) -> tuple[NDArray[np.uint8], NDArray[np.float32], np.float32, np.float32]:
+    z: Floats, candidates: Bools, occluded: Bools, start_z: np.float32
+) -> tuple[Bytes, Floats, np.float32, np.float32]:
     """Give each pixel's state and candidate depth, flat with a blocked border, and their range."""
     rows, columns = z.shape
     wide = columns + 2
@@ -210,35 +195,30 @@ def _flood_states(
 
 
 @compiled
-def principal_axis(mask: NDArray[np.bool_]) -> tuple[float, float]:
+def principal_axis(mask: Bools) -> tuple[float, float]:
     """Give the direction of a mask's largest second moment, (down, right).
 
     A unit vector that never points up; straight down where no direction is longer.
     """
-    count = rows_sum = columns_sum = 0
+    count = down = right = both = squares = 0
     for row in range(mask.shape[0]):
         for column in range(mask.shape[1]):
             if mask[row, column]:
                 count += 1
-                rows_sum += row
-                columns_sum += column
-    down = right = both = 0.0
-    for row in range(mask.shape[0]):
-        for column in range(mask.shape[1]):
-            if mask[row, column]:
-                a, b = row - rows_sum / count, column - columns_sum / count
-                down += a * a
-                right += b * b
-                both += a * b
-    angle = 0.5 * np.arctan2(2 * both, down - right)
+                down += row
+                right += column
+                both += row * column
+                squares += row * row - column * column
+    # Whole numbers, exact: the moments about the mean, times the squared count.
+    angle = 0.5 * np.arctan2(2 * (count * both - down * right),
+                             count * squares - (down * down - right * right))
     return np.cos(angle), np.sin(angle)
 
 
 @compiled
 def trim_to_profile(
-    face: NDArray[np.bool_], z: NDArray[np.float32], pixels: NDArray[np.float32], front: float,
-    center: tuple[float, float], axis: tuple[float, float],
-    profile: tuple[NDArray[np.float64], NDArray[np.float64]],
+    face: Bools, z: Floats, pixels: Floats, front: float, center: tuple[float, float],
+    axis: tuple[float, float], profile: tuple[Doubles, Doubles],
 ) -> None:
     """Drop from `face` what lies deeper than `front` by more than a profile allows.
 
@@ -252,23 +232,18 @@ def trim_to_profile(
             if face[row, column]:
                 v = pixels[row, column, 1] - center[1]
                 v = max(v, axis[0] * v + axis[1] * (pixels[row, column, 0] - center[0]))
-                k = 0
-                while k < len(below) and v >= below[k]:
+                v = min(max(v, below[0]), below[-1])
+                k = 1
+                while k < len(below) - 1 and v > below[k]:
                     k += 1
-                if k == 0:
-                    most = behind[0]
-                elif k == len(below):
-                    most = behind[-1]
-                else:
-                    weight = (v - below[k - 1]) / (below[k] - below[k - 1])
-                    most = behind[k - 1] + weight * (behind[k] - behind[k - 1])
+                weight = (v - below[k - 1]) / (below[k] - below[k - 1])
+                most = behind[k - 1] + weight * (behind[k] - behind[k - 1])
                 face[row, column] = z[row, column] < front + most
 
 
 @compiled
 def trim_below_drop(
-    face: NDArray[np.bool_], z: NDArray[np.float32], start: tuple[int, int], least_rows: int,
-    drop: float, gap: int,
+    face: Bools, z: Floats, start: tuple[int, int], least_rows: int, drop: float, gap: int
 ) -> None:
     """Drop from `face` what straight rays downward meet behind a step in depth: neck, chest.
 
@@ -300,8 +275,7 @@ def trim_below_drop(
 
 @compiled
 def trim_beside_rise(
-    face: NDArray[np.bool_], z: NDArray[np.float32], start: tuple[int, int], least_columns: int,
-    rise: float,
+    face: Bools, z: Floats, start: tuple[int, int], least_columns: int, rise: float
 ) -> None:
     """Drop from `face` what comes nearer again on straight rays sideways: another head.
 

@@ -7,8 +7,8 @@ stay where they touch it; glasses, hands, walls, shoulders and other people may 
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes, Floats
 from denseface.recon.errors import FaceWithoutDepthError
 from denseface.recon.face import Box, Seeds
 from denseface.recon.intermediate import Registration
@@ -28,10 +28,6 @@ from denseface.recon.segmentation._region_kernels import (
     trim_beside_rise,
     trim_to_profile,
 )
-
-__all__ = ["box_window", "cluster_depths", "crop_to_box", "grow_face", "segment_face"]
-
-Mask = NDArray[np.bool_]
 
 _SEMI_AXES = np.array((0.68, 0.74, 0.80))
 """How far a face reaches sideward, up and down from the centre of its box, box widths.
@@ -156,20 +152,20 @@ def box_window(registered: Registration, box: Box) -> tuple[slice, slice]:
     return window[0], window[1]
 
 
-def _measured_crop(registered: Registration, box: Box) -> Mask:
+def _measured_crop(registered: Registration, box: Box) -> Bools:
     crop = crop_to_box(registered, box)
     if not crop.any():
         raise FaceWithoutDepthError(f"no depth was measured in the face's box {box}")
     return crop
 
 
-def crop_to_box(registered: Registration, box: Box) -> Mask:
+def crop_to_box(registered: Registration, box: Box) -> Bools:
     """Keep the measured pixels seen in the box, widened to what the face can reach, (H, W)."""
     return superellipse_mask(registered.valid, registered.pixels, _center(box),
                              (box[2] * _SEMI_AXES).astype(np.float32))
 
 
-def cluster_depths(registered: Registration, crop: Mask, box: Box) -> Mask:
+def cluster_depths(registered: Registration, crop: Bools, box: Box) -> Bools:
     """Cluster the cropped depths by k-means, Eq. (2), and keep the face's, (H, W).
 
     Taken literally, k-means always makes three clusters, and where the crop holds nothing but
@@ -188,7 +184,7 @@ def cluster_depths(registered: Registration, crop: Mask, box: Box) -> Mask:
     return crop & (z > clusters[first].first - 1) & (z < clusters[last].last + 1)
 
 
-def grow_face(registered: Registration, cluster: Mask, box: Box, focal_px: float) -> Mask:
+def grow_face(registered: Registration, cluster: Bools, box: Box, focal_px: float) -> Bools:
     """Keep what small steps connect with the middle of the box, as deep as a head, but no neck.
 
     cluster : (H, W); focal_px : of the colour camera, pixels
@@ -225,7 +221,7 @@ def grow_face(registered: Registration, cluster: Mask, box: Box, focal_px: float
                                   _EAR * box_mm * px_per_mm, px_per_mm)
 
 
-def _without_slant(z: NDArray[np.float32], middle: Mask) -> NDArray[np.float32]:
+def _without_slant(z: Floats, middle: Bools) -> Floats:
     """The depths without the slant of a face that is lifted or lowered; 0 stays 0."""
     rows, medians = row_medians(z, middle, _SLANT_ROWS)
     if len(rows) < 2:
@@ -239,7 +235,7 @@ def _without_slant(z: NDArray[np.float32], middle: Mask) -> NDArray[np.float32]:
     return np.where(z > 0, z - tilt[:, None].astype(np.float32), np.float32(0))
 
 
-def _glasses(z: NDArray[np.float32], cluster: Mask, px_per_mm: float) -> Mask:
+def _glasses(z: Floats, cluster: Bools, px_per_mm: float) -> Bools:
     """Frames of glasses: what stands before the surface, is narrow and long."""
     kernel = np.ones((2 * round(_WIRE_MM * px_per_mm / 2) + 1,) * 2, np.uint8)
     behind = cv2.dilate(np.where(cluster, z, np.float32(0)), kernel)
@@ -253,7 +249,7 @@ def _glasses(z: NDArray[np.float32], cluster: Mask, px_per_mm: float) -> Mask:
     return np.isin(parts, np.unique(parts[wires]))
 
 
-def _hand(z: NDArray[np.float32], valid: Mask, face: Mask, px_per_mm: float) -> Mask:
+def _hand(z: Floats, valid: Bools, face: Bools, px_per_mm: float) -> Bools:
     """A hand, or what else stands before the face, and its shadow in which nothing is measured."""
     nearer = (valid & ~face & (z < percentile(z[face], 50))).view(np.uint8)
     side = 2 * round(_FINGER_MM * px_per_mm / 2) + 1
@@ -268,7 +264,7 @@ def _center(box: Box) -> tuple[float, float]:
     return x + width / 2, y + height / 2
 
 
-def _central_pixel(registered: Registration, mask: Mask, box: Box) -> tuple[int, int]:
+def _central_pixel(registered: Registration, mask: Bools, box: Box) -> tuple[int, int]:
     """The depth pixel of a mask that is seen nearest the middle of the box."""
     row, column = nearest_pixel(mask, registered.visible, registered.pixels, _center(box))
     if row < 0:
@@ -277,8 +273,8 @@ def _central_pixel(registered: Registration, mask: Mask, box: Box) -> tuple[int,
 
 
 def _smooth_outline(
-    face: Mask, other: Mask, middle: tuple[int, int], ear_px: float, px_per_mm: float
-) -> Mask:
+    face: Bools, other: Bools, middle: tuple[int, int], ear_px: float, px_per_mm: float
+) -> Bools:
     """The face's area without spurs and islands.
 
     other : measured, but not of the face: at a depth edge the sensor sets pixels to either side
@@ -301,7 +297,7 @@ def _smooth_outline(
     return np.asarray(kept.repeat(2, axis=0).repeat(2, axis=1)[:face.shape[0], :face.shape[1]])
 
 
-def _solid(face: Mask) -> NDArray[np.uint8]:
+def _solid(face: Bools) -> Bytes:
     """The face's area with its holes filled, (H, W) uint8, 0 or 1."""
     closed = cv2.morphologyEx(face.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     return binary_fill_holes(np.asarray(closed, np.uint8))

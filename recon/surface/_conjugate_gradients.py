@@ -7,13 +7,9 @@ within reach is one number, and one long loop serves the whole grid.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Floats
 from denseface.recon.numerics.jit import compiled
-
-__all__ = ["NodeSystem", "conjugate_gradients"]
-
-Floats = NDArray[np.float32]
 
 
 class NodeSystem(NamedTuple):
@@ -34,18 +30,17 @@ class NodeSystem(NamedTuple):
     """(n,), 1 on the grid, 0 on unused entries."""
     width: int
     """Entries from row to row."""
-    first: int
-    """Where the grid begins."""
-    size: int
-    """Its entries, from the first to the last."""
 
 
 @compiled
 def _apply(system: NodeSystem, alpha: Floats, out: Floats) -> None:
     """Compute out = (H + lambda I - G^T G) alpha."""
-    density, decay, smoothing, G, used, width, first, size = system
-    # Slices, since an index that might be negative keeps a loop from being vectorised.
+    density, decay, smoothing, G, used, width = system
     reach = (len(decay) - 1) // 2
+    # From the grid's first entry to its last. Slices, since an index that might be negative keeps
+    # a loop from being vectorised.
+    first = reach * width + reach
+    size = len(used) - 2 * first
     here, own = out[first:first + size], alpha[first:first + size]
     itself, plane = decay[reach, reach], density[0, 0, first:first + size]
     for i in range(size):
@@ -91,12 +86,12 @@ def _dot(a: Floats, b: Floats) -> float:
 @compiled
 def conjugate_gradients(
     system: NodeSystem, right: Floats, tolerance: float, max_iterations: int
-) -> tuple[Floats, int]:
+) -> Floats:
     """Solve a system for its right side, preconditioned by the diagonal.
 
     right : (n,), 0 on unused entries; tolerance : of the preconditioned residual's norm, relative
 
-    Returns alpha, (n,), and the number of iterations.
+    Returns alpha, (n,).
     """
     middle = system.decay[(len(system.decay) - 1) // 2, (len(system.decay) - 1) // 2]
     inverse = system.used.copy()
@@ -106,9 +101,9 @@ def conjugate_gradients(
     r = right.copy()
     d = r * inverse
     start = before = _dot(r, d)
-    taken = 0
-    while taken < max_iterations and before > tolerance * tolerance * start:
-        taken += 1
+    for _ in range(max_iterations):
+        if before <= tolerance * tolerance * start:
+            break
         _apply(system, d, product)
         step = np.float32(before / _dot(d, product))
         now = 0.0
@@ -124,4 +119,4 @@ def conjugate_gradients(
         for i in range(len(d)):
             d[i] = r[i] * inverse[i] + ratio * d[i]
         before = now
-    return alpha, taken
+    return alpha

@@ -17,9 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.recon.arrays import Doubles, Floats, Ints
 from denseface.recon.numerics.jit import compiled
-
-__all__ = ["FastGaussTransform"]
 
 _NARROWER = 4.0
 """a, in units of the sharpest b."""
@@ -48,15 +47,15 @@ class FastGaussTransform:
     sharpness : a, of the Gaussian they were spread by
     """
 
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    spread: NDArray[np.float32]
+    x: Doubles
+    y: Doubles
+    spread: Floats
     sharpness: float
 
     @classmethod
     def of(
-        cls, x: NDArray[np.float64], y: NDArray[np.float64],
-        weights: tuple[NDArray[np.floating], NDArray[np.floating]], sharpest: float,
+        cls, x: Doubles, y: Doubles, weights: tuple[NDArray[np.floating], NDArray[np.floating]],
+        sharpest: float,
     ) -> "FastGaussTransform":
         """Spread two kinds of weight at (x, y), (n,) each, for Gaussians with b <= sharpest."""
         step = _STEP / np.sqrt(sharpest)
@@ -67,13 +66,11 @@ class FastGaussTransform:
         _spread(*taps_x, *taps_y, one, other, _AT_TAPS, spread)
         return cls(grid_x, grid_y, spread[:, :2 * len(grid_x)], _NARROWER * sharpest)
 
-    def weights(self, kind: int) -> NDArray[np.float32]:
+    def weights(self, kind: int) -> Floats:
         """Give one kind of weight on the grid, (ny, nx)."""
         return self.spread[:, kind::2]
 
-    def factors(
-        self, points: NDArray[np.float64], at: NDArray[np.float64], b: float
-    ) -> NDArray[np.float32]:
+    def factors(self, points: Doubles, at: Doubles, b: float) -> Floats:
         """Give what a weight at each of the grid's `points` counts in a sum at each of `at`.
 
         points : (n,), `x` or `y`; at : (k,), t; b : sharpness of the sum's Gaussian
@@ -83,14 +80,13 @@ class FastGaussTransform:
         a = self.sharpness
         e = a * b / (a - b)
         gap = (at[:, None] - points).astype(np.float32)
-        values: NDArray[np.float32] = np.exp(np.float32(-e) * gap * gap)
+        values: Floats = np.exp(np.float32(-e) * gap * gap)
         values *= np.float32((points[1] - points[0]) * np.sqrt((a + e) / np.pi))
         return values
 
     def moment_factors(
-        self, points: NDArray[np.float64], at: NDArray[np.float64], b: float,
-        center: float, scale: float,
-    ) -> NDArray[np.float32]:
+        self, points: Doubles, at: Doubles, b: float, center: float, scale: float
+    ) -> Floats:
         """Give factors for weights times 1, u, u^2, where u = (x - center) / scale, (3, k, n).
 
         Summed over the grid, s has the mean (a x + e t) / (a + e) and a variance of
@@ -105,10 +101,7 @@ class FastGaussTransform:
             [plain, first, first * u - np.float32((a + e) / (2 * (a * scale) ** 2)) * plain])
 
 
-def _taps(
-    values: NDArray[np.float64], step: float
-) -> tuple[NDArray[np.float64],
-           tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]]]:
+def _taps(values: Doubles, step: float) -> tuple[Doubles, tuple[Ints, Floats, Floats]]:
     """Give the grid's points, and each value's first tap and its Gaussian at all taps.
 
     That Gaussian is a first value and a ratio: first, first ratio, first ratio^2, ... times
@@ -125,10 +118,8 @@ def _taps(
 
 @compiled
 def _spread(
-    column: NDArray[np.int32], first_x: NDArray[np.float32], ratio_x: NDArray[np.float32],
-    row: NDArray[np.int32], first_y: NDArray[np.float32], ratio_y: NDArray[np.float32],
-    one: NDArray[np.float32], other: NDArray[np.float32], at_taps: NDArray[np.float32],
-    spread: NDArray[np.float32],
+    column: Ints, first_x: Floats, ratio_x: Floats, row: Ints, first_y: Floats, ratio_y: Floats,
+    one: Floats, other: Floats, at_taps: Floats, spread: Floats,
 ) -> None:
     """Add both weights of each point to the grid, by turns."""
     along_x, along_y = np.zeros(2 * len(at_taps), np.float32), np.zeros(_TAPS, np.float32)

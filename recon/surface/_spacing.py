@@ -2,14 +2,11 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from denseface.recon.arrays import Floats, Ints
 from denseface.recon.numerics.jit import compiled
 from denseface.recon.settings import Neighbors
-
-__all__ = ["exact_spacing", "lattice_spacing", "mean_spacing", "randomized_neighbors",
-           "randomized_spacing"]
 
 _FLANN_INDEX_KDTREE = 1
 _TREES = 4
@@ -21,9 +18,7 @@ _FAR = np.float32(1e12)
 """mm^2: any two seeds are nearer to each other, and farther from `_NOWHERE`."""
 
 
-def mean_spacing(
-    points: NDArray[np.float32], pixels: NDArray[np.int32], how: Neighbors
-) -> float:
+def mean_spacing(points: Floats, pixels: Ints, how: Neighbors) -> float:
     """Measure the mean distance, over (X, Y), of a seed to its nearest neighbour.
 
     Parameters
@@ -44,9 +39,7 @@ def mean_spacing(
     return randomized_spacing(xy) if how is Neighbors.RANDOMIZED else exact_spacing(xy)
 
 
-def randomized_neighbors(
-    xy: NDArray[np.float32], k: int, checks: int = _CHECKS
-) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+def randomized_neighbors(xy: Floats, k: int, checks: int = _CHECKS) -> tuple[Ints, Floats]:
     """Find the `k` nearest of each point, itself first, by randomized kd-trees.
 
     Silpa-Anan and Hartley, 2008, doi:10.1109/CVPR.2008.4587638, as implemented in FLANN.
@@ -68,7 +61,7 @@ def randomized_neighbors(
     return np.asarray(indices, np.int32), np.sqrt(np.asarray(squared, np.float32))
 
 
-def randomized_spacing(xy: NDArray[np.float32]) -> float:
+def randomized_spacing(xy: Floats) -> float:
     """Mean nearest-neighbour distance of (n, 2) points, mm, by randomized kd-trees."""
     indices, distances = randomized_neighbors(xy, 2)
     # An approximate search may miss the point itself; what it then lists first is a neighbour.
@@ -76,13 +69,13 @@ def randomized_spacing(xy: NDArray[np.float32]) -> float:
     return float(np.where(own, distances[:, 1], distances[:, 0]).mean())
 
 
-def exact_spacing(xy: NDArray[np.float32]) -> float:
+def exact_spacing(xy: Floats) -> float:
     """Mean nearest-neighbour distance of (n, 2) points, mm, by an exact kd-tree."""
     distances = np.asarray(cKDTree(xy).query(xy, k=2)[0])
     return float(distances[:, 1].mean())
 
 
-def lattice_spacing(points: NDArray[np.float32], pixels: NDArray[np.int32]) -> float:
+def lattice_spacing(points: Floats, pixels: Ints) -> float:
     """Mean nearest-neighbour distance over (X, Y), mm, from the 24 pixels around each point.
 
     Seeds without another seed among those pixels do not count: they are stray, and there are few.
@@ -95,9 +88,7 @@ def lattice_spacing(points: NDArray[np.float32], pixels: NDArray[np.int32]) -> f
 
 
 @compiled
-def _nearest_around(
-    points: NDArray[np.float32], pixels: NDArray[np.int32]
-) -> tuple[float, int]:
+def _nearest_around(points: Floats, pixels: Ints) -> tuple[float, int]:
     """Sum the seeds' distances to the nearest among the 24 pixels around, and count them."""
     top, left = pixels[0]
     bottom, right = top, left

@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Doubles, Floats
 from denseface.recon.numerics.jit import compiled
-
-__all__ = ["Trend", "polynomial"]
 
 _POWERS = np.array([[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]])
 """Powers of u and v in each term: 1, u, v, u^2, uv, v^2."""
@@ -31,41 +29,29 @@ class Trend:
 
     center: tuple[float, float]
     scale: float
-    normal: NDArray[np.float64]
-    beta: NDArray[np.float64]
-    residuals: NDArray[np.float32]
+    normal: Doubles
+    beta: Doubles
+    residuals: Floats
     squares: float
 
     @classmethod
-    def of(
-        cls, x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64],
-        weights: NDArray[np.float64],
-    ) -> "Trend":
+    def of(cls, x: Doubles, y: Doubles, z: Doubles, weights: Doubles) -> "Trend":
         """Fit to points, (n,) each; u and v reach from -1 to 1."""
         cx, cy = float(x.mean()), float(y.mean())
         scale = float(max(x.max() - cx, cx - x.min(), y.max() - cy, cy - y.min()))
         sums, right = _sums(x, y, z, weights, cx, cy, 1 / scale)
         normal = sums[_PRODUCT_POWERS[..., 0], _PRODUCT_POWERS[..., 1]]
-        beta: NDArray[np.float64] = np.linalg.solve(normal, right)
+        beta: Doubles = np.linalg.solve(normal, right[_POWERS[:, 0], _POWERS[:, 1]])
         residuals, squares = _residuals(x, y, z, weights, cx, cy, 1 / scale, beta)
         return cls((cx, cy), scale, normal, beta, residuals, squares)
 
 
-def polynomial(
-    xy: NDArray[np.floating], center: tuple[float, float], scale: float
-) -> NDArray[np.float64]:
-    """Give each point's 1, u, v, u^2, uv, v^2: (n, 2) to (n, 6)."""
-    u, v = ((np.asarray(xy, np.float64) - center) / scale).T
-    return np.column_stack([np.ones_like(u), u, v, u * u, u * v, v * v])
-
-
 @compiled
 def _sums(
-    x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64],
-    weights: NDArray[np.float64], cx: float, cy: float, per_scale: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sum W u^i v^j, (5, 5), 0 where i + j > 4, and W z times each term, (6,)."""
-    sums, right = np.zeros((5, 5)), np.zeros(6)
+    x: Doubles, y: Doubles, z: Doubles, weights: Doubles, cx: float, cy: float, per_scale: float
+) -> tuple[Doubles, Doubles]:
+    """Sum W u^i v^j, (5, 5), and W z u^i v^j, (5, 3)."""
+    sums, right = np.empty((5, 5)), np.empty((5, 3))
     # One loop for each power of u: more sums at once than the processor has registers are slower.
     for i in range(5):
         s0 = s1 = s2 = s3 = s4 = z0 = z1 = z2 = 0.0
@@ -88,24 +74,16 @@ def _sums(
             z0 += w * z[k]
             z1 += w * v * z[k]
             z2 += w * v * v * z[k]
-        for j, value in enumerate((s0, s1, s2, s3, s4)):
-            if i + j < 5:
-                sums[i, j] = value
-        if i == 0:
-            right[0], right[2], right[5] = z0, z1, z2
-        elif i == 1:
-            right[1], right[4] = z0, z1
-        elif i == 2:
-            right[3] = z0
+        sums[i, 0], sums[i, 1], sums[i, 2], sums[i, 3], sums[i, 4] = s0, s1, s2, s3, s4
+        right[i, 0], right[i, 1], right[i, 2] = z0, z1, z2
     return sums, right
 
 
 @compiled
 def _residuals(
-    x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64],
-    weights: NDArray[np.float64], cx: float, cy: float, per_scale: float,
-    beta: NDArray[np.float64],
-) -> tuple[NDArray[np.float32], float]:
+    x: Doubles, y: Doubles, z: Doubles, weights: Doubles, cx: float, cy: float, per_scale: float,
+    beta: Doubles,
+) -> tuple[Floats, float]:
     """Give W times the residuals of z, and the sum of W times their squares."""
     b0, b1, b2, b3, b4, b5 = beta[0], beta[1], beta[2], beta[3], beta[4], beta[5]
     residuals = np.empty(len(x), np.float32)

@@ -8,6 +8,7 @@ from denseface.recon.segmentation._edge_color_kernels import (
     MixtureLimits,
     box_sums,
     remove_background,
+    summed_area_table,
 )
 
 SKIN, WALL = np.array((200, 150, 120)), np.array((30, 220, 40))
@@ -79,7 +80,7 @@ def test_box_sums_are_sums_over_boxes():
     rng = np.random.default_rng(0)
     colors = rng.integers(0, 256, (9, 11, 3), np.uint8)
     mask, wanted = rng.random((2, 9, 11)) < 0.5
-    found = box_sums(colors, mask, wanted, 2)
+    found = box_sums(summed_area_table(colors, mask), wanted, 2)
     for (row, column), sums in zip(np.argwhere(wanted), found, strict=True):
         box = slice(max(row - 2, 0), row + 3), slice(max(column - 2, 0), column + 3)
         np.testing.assert_array_equal(sums[:3], colors[box][mask[box]].sum(axis=0))

@@ -4,8 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from denseface.recon.errors import TooLittleDepthError
-from denseface.recon.surface import MIN_SEEDS, fit_surface
+from denseface.recon.surface import MIN_SEEDS, Surface, fit_surface
 from tests.unit.recon.dense_reference import dense_heights
+from tests.unit.recon.surface.evaluate import evaluated
 
 
 def bumpy(n: int, seed: int, *, stretch: float = 1.0, hole: float = 0.0) -> np.ndarray:
@@ -16,6 +17,11 @@ def bumpy(n: int, seed: int, *, stretch: float = 1.0, hole: float = 0.0) -> np.n
     xy = xy[np.hypot(*xy.T) >= hole]
     z = 700 + 8 * np.sin(xy[:, 0] / 9) + 6 * np.cos(xy[:, 1] / 7) + 0.01 * xy[:, 0] * xy[:, 1]
     return np.column_stack([xy[:, 0] + 40, xy[:, 1] - 25, z + rng.normal(0, 1, len(xy))])
+
+
+def on_grid(surface: Surface, xs: np.ndarray, ys: np.ndarray) -> np.ndarray:
+    xy = np.stack(np.meshgrid(xs, ys), axis=-1)
+    return evaluated(surface, xy.reshape(-1, 2)).reshape(len(ys), len(xs))
 
 
 @settings(deadline=None, max_examples=40)
@@ -31,7 +37,7 @@ def test_equals_the_dense_solution(n, seed, factor, smoothing, stretch, hole, sp
     rng = np.random.default_rng(seed + 1)
     queries = points[rng.integers(0, len(points), 200), :2] + rng.normal(0, 1, (200, 2))
     exact = dense_heights(points, queries, 2 * factor, smoothing, weights)
-    assert np.abs(surface.at(queries) - exact).max() <= 0.01
+    assert np.abs(evaluated(surface, queries) - exact).max() <= 0.01
 
 
 @pytest.mark.parametrize("factor", [6, 10])
@@ -39,18 +45,15 @@ def test_stays_close_to_the_dense_solution_when_hardly_smoothed(factor):
     points = bumpy(1200, 3)
     surface = fit_surface(points, 2 * factor, 0.1)
     exact = dense_heights(points, points[:, :2], 2 * factor, 0.1, np.ones(len(points)))
-    assert np.abs(surface.at(points[:, :2]) - exact).max() <= 0.02
+    assert np.abs(evaluated(surface, points[:, :2]) - exact).max() <= 0.02
 
 
 def test_grid_and_scattered_evaluation_agree():
     surface = fit_surface(bumpy(600, 1), 14, 1)
     xs, ys = np.linspace(20, 60, 31), np.linspace(-40, -10, 23)
-    xy = np.stack(np.meshgrid(xs, ys), axis=-1)
-    np.testing.assert_allclose(
-        surface.on_grid(xs, ys).ravel(), surface.at(xy.reshape(-1, 2)), atol=1e-8)
-    heights, along_x, along_y = surface.sampled(xs, ys)
-    assert heights.dtype == along_x.dtype == along_y.dtype == np.float32
-    np.testing.assert_allclose(heights, surface.on_grid(xs, ys), atol=1e-3)
+    heights, _, _ = surface.sampled(xs, ys)
+    assert heights.dtype == np.float32
+    np.testing.assert_allclose(heights, on_grid(surface, xs, ys), atol=1e-3)
     np.testing.assert_array_equal(surface.heights(xs, ys), heights)
 
 
@@ -60,9 +63,9 @@ def test_gradient_is_the_derivative():
     _, dx, dy = surface.sampled(xs, ys)
     e = 1e-4
     np.testing.assert_allclose(
-        dx, (surface.on_grid(xs + e, ys) - surface.on_grid(xs - e, ys)) / (2 * e), atol=1e-5)
+        dx, (on_grid(surface, xs + e, ys) - on_grid(surface, xs - e, ys)) / (2 * e), atol=1e-5)
     np.testing.assert_allclose(
-        dy, (surface.on_grid(xs, ys + e) - surface.on_grid(xs, ys - e)) / (2 * e), atol=1e-5)
+        dy, (on_grid(surface, xs, ys + e) - on_grid(surface, xs, ys - e)) / (2 * e), atol=1e-5)
 
 
 def test_a_quadratic_comes_back_whatever_the_smoothing():
@@ -70,7 +73,7 @@ def test_a_quadratic_comes_back_whatever_the_smoothing():
     x, y = rng.uniform(-50, 50, (2, 400))
     z = 800 + 0.3 * x - 0.2 * y + 0.004 * x * x + 0.002 * x * y - 0.003 * y * y
     surface = fit_surface(np.column_stack([x, y, z]), 15, 100)
-    np.testing.assert_allclose(surface.at(np.column_stack([x, y])), z, atol=1e-6)
+    np.testing.assert_allclose(evaluated(surface, np.column_stack([x, y])), z, atol=1e-6)
     assert surface.noise < 1e-6
 
 
@@ -84,9 +87,9 @@ def test_noise_is_estimated():
 def test_moves_with_its_points(seed, dx, dy, dz):
     points = bumpy(300, seed)
     moved = np.add(points, (dx, dy, dz))
-    heights = fit_surface(points, 14, 2).at(points[:, :2])
+    heights = evaluated(fit_surface(points, 14, 2), points[:, :2])
     np.testing.assert_allclose(
-        fit_surface(moved, 14, 2).at(moved[:, :2]), heights + dz, atol=1e-3)
+        evaluated(fit_surface(moved, 14, 2), moved[:, :2]), heights + dz, atol=1e-3)
 
 
 def test_more_weight_draws_the_surface_nearer():
@@ -94,8 +97,8 @@ def test_more_weight_draws_the_surface_nearer():
     weights = np.ones(len(points))
     weights[0] = 1000
     points[0, 2] += 10
-    free = fit_surface(points, 14, 3).at(points[:1, :2])
-    drawn = fit_surface(points, 14, 3, weights).at(points[:1, :2])
+    free = evaluated(fit_surface(points, 14, 3), points[:1, :2])
+    drawn = evaluated(fit_surface(points, 14, 3, weights), points[:1, :2])
     assert abs(drawn - points[0, 2])[0] < 0.2 * abs(free - points[0, 2])[0]
 
 

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from denseface.recon.errors import TooLittleDepthError
 from denseface.recon.surface import MIN_SEEDS, fit_surface
 from tests.unit.recon.dense_reference import dense_heights
+from tests.unit.recon.surface.evaluate import evaluated
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -32,7 +33,8 @@ def deviation(points: np.ndarray, r0: float, smoothing: float, weights: np.ndarr
     near = np.hypot(*(points[:-1, :2] - points[1:, :2]).T) < r0
     queries = np.concatenate([points[:, :2], between[near]])
     exact = dense_heights(points, queries, r0, smoothing, weights)
-    return float(np.abs(fit_surface(points, r0, smoothing, weights).at(queries) - exact).max())
+    surface = fit_surface(points, r0, smoothing, weights)
+    return float(np.abs(evaluated(surface, queries) - exact).max())
 
 
 @settings(deadline=None, max_examples=30)
@@ -69,9 +71,9 @@ def test_a_turn_about_the_viewing_axis_turns_the_surface(seed, degrees, smoothin
     rng = np.random.default_rng(seed)
     points = waves(rng.uniform(-25, 25, (500, 2)), rng)
     there = turned(points, degrees)
-    heights = fit_surface(points, 14, smoothing).at(points[:, :2])
+    heights = evaluated(fit_surface(points, 14, smoothing), points[:, :2])
     np.testing.assert_allclose(
-        fit_surface(there, 14, smoothing).at(there[:, :2]), heights, atol=0.02)
+        evaluated(fit_surface(there, 14, smoothing), there[:, :2]), heights, atol=0.02)
 
 
 @settings(deadline=None, max_examples=20)
