@@ -12,12 +12,7 @@ from denseface.recon.face import DenseCloud, Seeds
 from denseface.recon.intermediate import ColorSampler, SurfaceGrid
 from denseface.recon.numerics.push_pull import interpolate_colors
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, pixel_coordinates
-from denseface.recon.propagation._grid_kernels import (
-    Nodes,
-    Resampling,
-    gather_points,
-    indices_of_zeros,
-)
+from denseface.recon.propagation._grid_kernels import Resampling, gather_points, indices_of_zeros
 from denseface.recon.propagation.uncertainty import standard_error, variance_components
 from denseface.recon.support import Support
 
@@ -72,9 +67,12 @@ def densify(
     every = max(1, round(_COLOR_STEP * spacing / step))
     colors = _colors(seeds, origin, every * step, spacing, _coarser(inside, every))
     columns, rows = support.coordinates(xs, ys)
+    counted = [np.arange(side, dtype=np.float32) / np.float32(every) for side in inside.shape]
+    nodes = [places / np.float32(components.every) for places in (rows, columns)]
     points, normals, colors, sigma, cells = gather_points(
-        inside, xs, ys, Resampling(surface.values, rows, columns), Nodes(colors, every),
-        Nodes(sigma, components.every))
+        inside, xs, ys, Resampling(surface.values, rows, columns),
+        Resampling(np.array(cv2.split(colors), np.float32), *counted),
+        Resampling(sigma[None], *nodes))
     if sampler is not None:
         near = support.near_seeds(_HOLE * spacing)
         hole = indices_of_zeros(near, rows, columns, cells)

@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 
-from denseface.recon.propagation._grid_kernels import (
-    Nodes,
-    Resampling,
-    gather_points,
-    indices_of_zeros,
-)
+from denseface.recon.propagation._grid_kernels import Resampling, gather_points, indices_of_zeros
 
 
 def positions(count):
     return np.arange(count, dtype=np.float32)
+
+
+def coarser(planes, every, rows, columns):
+    """Planes at every so many points of a grid."""
+    return Resampling(np.asarray(planes, np.float32), *(
+        places / np.float32(every) for places in (rows, columns)))
 
 
 def test_the_supported_points_are_gathered_row_by_row():
@@ -24,8 +25,8 @@ def test_the_supported_points_are_gathered_row_by_row():
     image = rng.integers(0, 256, (7, 9, 3), np.uint8)
     sigma = rng.random((7, 9)).astype(np.float32)
     points, normals, colors, errors, cells = gather_points(
-        support, xs, ys, Resampling(values, positions(7), positions(9)),
-        Nodes(np.pad(image, ((0, 1), (0, 1), (0, 0))), 1), Nodes(np.pad(sigma, (0, 1)), 1))
+        support, xs, ys, *(Resampling(planes, positions(7), positions(9)) for planes in (
+            values, np.moveaxis(image, -1, 0).astype(np.float32), sigma[None])))
     np.testing.assert_array_equal(errors, sigma[support])
     np.testing.assert_array_equal(cells, np.argwhere(support))
     np.testing.assert_array_equal(colors, image[support])
@@ -54,8 +55,8 @@ def test_what_is_between_the_given_points_is_in_between(every, each, finer, shap
     points, normals, colors, errors, cells = gather_points(
         np.ones(shape, bool), np.arange(float(columns)), np.arange(float(rows)),
         Resampling(values, down, right),
-        Nodes(np.dstack([ramp, ramp, 200 - ramp]).astype(np.uint8), every),
-        Nodes(2 + each * (0.3 * i - 0.1 * j), each))
+        coarser([ramp, ramp, 200 - ramp], every, positions(rows), positions(columns)),
+        coarser([2 + each * (0.3 * i - 0.1 * j)], each, down, right))
     y, x = (cells / finer).T
     np.testing.assert_allclose(points[:, 2], 700 + 3 * y - 2 * x, atol=2e-4)
     np.testing.assert_allclose(normals[:, 0] / -normals[:, 2], 0.02 * y + 0.01 * x, atol=1e-5)
@@ -68,8 +69,8 @@ def test_what_is_between_the_given_points_is_in_between(every, each, finer, shap
 def test_nothing_supported_is_nothing_gathered():
     points, normals, colors, errors, cells = gather_points(
         np.zeros((3, 4), bool), np.arange(4.0), np.arange(3.0),
-        Resampling(np.zeros((3, 3, 4), np.float32), positions(3), positions(4)),
-        Nodes(np.zeros((4, 5, 3), np.uint8), 1), Nodes(np.zeros((4, 5), np.float32), 1))
+        *(Resampling(np.zeros((planes, 3, 4), np.float32), positions(3), positions(4))
+          for planes in (3, 3, 1)))
     assert points.shape == normals.shape == colors.shape == (0, 3)
     assert errors.shape == (0,)
     assert cells.shape == (0, 2)
