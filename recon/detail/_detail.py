@@ -12,12 +12,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.detail._detail_kernels import (
-    blend_toward,
-    mirror_planes,
-    normalize_sums,
-    slopes,
-)
+from denseface.recon.detail import _detail_kernels as kernels
 from denseface.recon.detail._holes import fill_holes
 from denseface.recon.detail._mirror_kernels import HeightField
 from denseface.recon.detail._mirror_plane import find_plane
@@ -31,8 +26,6 @@ from denseface.recon.numerics.normalized_convolution import normalized_convoluti
 from denseface.recon.numerics.percentile import percentile
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, interpolate, splat
 from denseface.recon.support import Support
-
-__all__ = ["add_detail"]
 
 Image = NDArray[np.float32]
 
@@ -71,7 +64,7 @@ def add_detail(
     """
     inside = support.inside
     seeds = _SeedGrid.over(points, support)
-    residuals = points[:, 2] - seeds.interpolate(heights)
+    residuals = points[:, 2] - interpolate(heights, seeds.columns, seeds.rows)
     rim = Rim.of(inside, support.step / spacing)
     averages = _average(seeds, residuals, heights, rim, radius / support.step, spacing,
                         support.step)
@@ -79,7 +72,7 @@ def add_detail(
 
     shown = inside[_COARSE].astype(np.float32)
     inner = np.clip(2 * blurred(shown, _RIM_SPACINGS) - 1, 0, 1) * shown
-    field = HeightField(mirror_planes(heights, detail, averages.seeded, inner, spacing),
+    field = HeightField(kernels.mirror_planes(heights, detail, averages.seeded, inner, spacing),
                         np.array([support.xs[0], support.ys[0], 0.0]), spacing)
     gain, noise = _wiener_gain(
         field.planes[..., 3], inner * (1 - hole[_COARSE]), rim.broad_weight < _NARROW, spacing)
@@ -92,26 +85,22 @@ def add_detail(
             field, kept, filled[_COARSE], hole[_COARSE], plane, noise, _WINDOW_MM)
     if sampler is not None:
         surface = heights[_COARSE] + detail[_COARSE] + filled[_COARSE] + more
-        more += shading_detail(surface, shown * rim.color_weight, _slopes(surface, spacing),
-                               (support.xs[::2], support.ys[::2]), sampler)
+        more += shading_detail(
+            surface, shown * rim.color_weight, kernels.with_slopes(surface, spacing)[1:],
+            (support.xs[::2], support.ys[::2]), sampler)
     _add_upsampled(detail, more)
-    fraying = rim.fraying_correction(*_slopes(downsampled(heights), 2 * support.step), spacing)
-    detail += upsampled(fraying, detail.shape)
+    _, dz_dx, dz_dy = kernels.with_slopes(downsampled(heights), 2 * support.step)
+    detail += upsampled(rim.fraying_correction(dz_dx, dz_dy, spacing), detail.shape)
     detail += filled
-    values = np.empty((3, *detail.shape), np.float32)
-    np.add(heights, detail, out=values[0])
-    slopes(values[0], support.step, values[1], values[2])
-    noise_mm = float((residuals - seeds.interpolate(detail)).std())
-    return SurfaceGrid(values, support, noise_mm, detailed=True)
+    noise_mm = float((residuals - interpolate(detail, seeds.columns, seeds.rows)).std())
+    return SurfaceGrid(kernels.with_slopes(heights + detail, support.step), support, noise_mm,
+                       detailed=True)
 
 
 class _SeedGrid(NamedTuple):
     """Seeds over an image.
 
-    Attributes
-    ----------
-    columns, rows : (n,) float32, where they are, pixels, inside the image and off its last row
-        and column
+    columns, rows : (n,) float32, pixels, inside the image and off its last row and column
     shape : (rows, columns) of the image
     """
 
@@ -126,11 +115,11 @@ class _SeedGrid(NamedTuple):
                          for axis, low in ((0, support.xs[0]), (1, support.ys[0])))
         return cls(columns, rows, support.margin.shape)
 
-    def halved(self) -> "_SeedGrid":
+    def halved(self) -> Self:
         """The same over an image of which each pixel is four of these."""
         half = np.float32(0.5)
         columns, rows = (half * (one - half) for one in (self.columns, self.rows))
-        return _SeedGrid(columns, rows, ((self.shape[0] + 1) // 2, (self.shape[1] + 1) // 2))
+        return type(self)(columns, rows, ((self.shape[0] + 1) // 2, (self.shape[1] + 1) // 2))
 
     def scatter(self, values: Image) -> tuple[Image, Image]:
         """Sum the seeds, and their values, by bilinear weights on the four pixels around each."""
@@ -138,16 +127,10 @@ class _SeedGrid(NamedTuple):
         splat(self.columns, self.rows, values, counts, sums)
         return counts, sums
 
-    def interpolate(self, image: Image) -> Image:
-        """Read an image at the seeds, (n,)."""
-        return interpolate(image, self.columns, self.rows)
-
 
 class _Averages(NamedTuple):
     """Local averages of the residuals, (rows, columns) float32 each.
 
-    Attributes
-    ----------
     detail : mm along z, narrow averages, broad ones at the rim; 0 where a hole is filled
     seeded : 0-1, weight of the seeds
     filled : mm along z, in holes, weighted by
@@ -172,19 +155,19 @@ def _average(
     usual = float(np.float32((step / spacing) ** 2))
     blur = _blur_after_scatter(radius)
     weight, detail = (blurred(one, blur) for one in seeds.scatter(residuals))
-    seeded, missing = normalize_sums(weight, detail, usual * _FADING, usual * _FULL)
+    seeded, missing = kernels.normalize_sums(weight, detail, usual * _FADING, usual * _FULL)
     # So broad an average needs no more than every fourth point.
     counts, sums = seeds.halved().halved().scatter(residuals)
     broad = iterated_average(counts, sums, BROADER * radius / 4, 16 * usual, rim, 2)
-    blend_toward(detail, upsampled(broad, detail.shape),
-                 upsampled(rim.broad_weight, detail.shape), missing)
+    kernels.blend_toward(detail, upsampled(broad, detail.shape),
+                         upsampled(rim.broad_weight, detail.shape), missing)
     filled, hole = fill_holes(counts, sums, missing, rim, heights, detail, spacing)
     detail *= 1 - hole
     return _Averages(detail, seeded, filled, hole)
 
 
 def _blur_after_scatter(sigma: float) -> float:
-    """The standard deviation of a blur, less what bilinear weights have blurred already."""
+    """Give the standard deviation of a blur, less what bilinear weights have blurred already."""
     return math.sqrt(sigma * sigma - BILINEAR_VARIANCE)
 
 
@@ -203,13 +186,6 @@ def _wiener_gain(
     noise = percentile(seen, _NOISE_PERCENTILE) if seen.size else 0.0
     gain = 1 - np.float32(noise) / np.maximum(local, np.float32(max(noise, 1e-12)))
     return np.asarray(gain, np.float32), noise
-
-
-def _slopes(heights: Image, step: float) -> tuple[Image, Image]:
-    """Give dz/dx and dz/dy of points at a distance, mm."""
-    dz_dx, dz_dy = np.empty_like(heights), np.empty_like(heights)
-    slopes(heights, step, dz_dx, dz_dy)
-    return dz_dx, dz_dy
 
 
 def _add_upsampled(image: Image, coarse: Image) -> Image:

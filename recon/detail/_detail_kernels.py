@@ -5,38 +5,39 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["blend_toward", "mirror_planes", "normalize_sums", "slopes"]
-
 Image = NDArray[np.float32]
 
 _1 = np.uint64(1)
 
 
 @compiled
-def slopes(heights: Image, step: float, dz_dx: Image, dz_dy: Image) -> None:
-    """Set dz/dx and dz/dy by central differences; one-sided, of half the size, at the edge.
+def with_slopes(heights: Image, step: float) -> Image:
+    """Give heights, dz/dx and dz/dy, (3, rows, columns).
 
-    heights, dz_dx, dz_dy : (rows, columns), at least 2 each, mm, unitless; step : mm
+    By central differences; one-sided, of half the size, at the edge.
+
+    heights : (rows, columns), at least 2 each, mm; step : mm
     """
     rows, columns = heights.shape
+    out = np.empty((3, rows, columns), np.float32)
+    out[0] = heights
     half = np.float32(0.5 / step)
     last = np.uint64(columns - 1)
     for row in range(rows):
         line = heights[row]
         above, below = heights[max(row - 1, 0)], heights[min(row + 1, rows - 1)]
-        along_x, along_y = dz_dx[row], dz_dy[row]
+        along_x, along_y = out[1, row], out[2, row]
         for j in range(np.uint64(columns)):
             along_y[j] = half * (below[j] - above[j])
         for j in range(_1, last):
             along_x[j] = half * (line[j + _1] - line[j - _1])
         along_x[0] = half * (line[1] - line[0])
         along_x[last] = half * (line[last] - line[last - _1])
+    return out
 
 
 @compiled
-def normalize_sums(
-    weight: Image, sums: Image, fading: float, full: float
-) -> tuple[Image, Image]:
+def normalize_sums(weight: Image, sums: Image, fading: float, full: float) -> tuple[Image, Image]:
     """Divide sums by their weight, in place; means fade where the weight is near `fading`.
 
     weight, sums : (rows, columns)
@@ -71,9 +72,7 @@ def blend_toward(detail: Image, broad: Image, rim_weight: Image, missing: Image)
 
 
 @compiled
-def mirror_planes(
-    heights: Image, detail: Image, seeded: Image, inner: Image, step: float
-) -> Image:
+def mirror_planes(heights: Image, detail: Image, seeded: Image, inner: Image, step: float) -> Image:
     """Give the planes of a `HeightField`, (rows, columns, 5), at every second point.
 
     heights, detail, seeded : (2 rows, 2 columns) or one less; inner : (rows, columns), weight

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["Cells", "bandwidth", "normal_equations", "number_unknowns", "resample_filled"]
-
 Image = NDArray[np.float32]
 Indices = NDArray[np.int32]
 
@@ -30,8 +28,6 @@ _CUBIC = np.array([[-t + 2 * t**2 - t**3, 2 - 5 * t**2 + 3 * t**3,
 class Cells(NamedTuple):
     """The cells of a surface with holes, (rows, columns) each; no hole is near the outer two.
 
-    Attributes
-    ----------
     counts, sums : float32, the seeds in each cell, and the sum of what they are off the height, mm
     heights : float32, mm
     added : float32, mm, what is added to the heights; changed where a hole is

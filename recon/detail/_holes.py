@@ -13,18 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpbsv
 
-from denseface.recon.detail._hole_kernels import (
-    Cells,
-    bandwidth,
-    normal_equations,
-    number_unknowns,
-    resample_filled,
-)
+from denseface.recon.detail import _hole_kernels as kernels
 from denseface.recon.detail._rim import Rim
 from denseface.recon.numerics.filters import downsampled
 from denseface.recon.numerics.morphology import large_components
-
-__all__ = ["fill_holes"]
 
 Image = NDArray[np.float32]
 
@@ -50,8 +42,6 @@ def fill_holes(
 ) -> tuple[Image, Image]:
     """Find the heights in holes.
 
-    Parameters
-    ----------
     counts, sums : (rows, columns) float32, the seeds in each cell, two spacings wide, and the sum
         of what they are off the heights, mm
     missing : (4 rows, 4 columns) float32 or up to three fewer, 0-1, what part of the surface the
@@ -60,10 +50,8 @@ def fill_holes(
     heights, detail : as `missing`, mm: a fit and what is added to it; in holes a first guess
     spacing : mean spacing of the seeds, mm
 
-    Returns
-    -------
-    filled : as `missing`, mm: what is to be added to the heights there, times
-    hole : 0-1, how much of a place is filled; both 0 where there is no hole
+    Gives what is to be added to the heights there, mm, times how much of a place is filled, 0-1,
+    and the latter: as `missing`, both 0 where there is no hole.
     """
     distance = downsampled(rim.distance)
     inside = distance > 0
@@ -73,11 +61,12 @@ def fill_holes(
         none = np.zeros_like(missing)
         return none, none
     labels, boxes = _with_border(hole, inside)
-    cells = Cells(counts, sums, downsampled(downsampled(heights)),
-                  downsampled(downsampled(detail)), inside, np.full(labels.shape, -1, np.int32))
+    cells = kernels.Cells(
+        counts, sums, downsampled(downsampled(heights)), downsampled(downsampled(detail)), inside,
+        np.full(labels.shape, -1, np.int32))
     for label in range(1, len(boxes)):
         _minimize_bending(cells, labels, label, boxes[label], _CELL * spacing)
-    return resample_filled(cells.added, labels, missing)
+    return kernels.resample_filled(cells.added, labels, missing)
 
 
 def _with_border(
@@ -94,13 +83,13 @@ def _with_border(
 
 
 def _minimize_bending(
-    cells: Cells, labels: NDArray[np.int32], label: int, box: NDArray[np.int32], step: float
+    cells: kernels.Cells, labels: NDArray[np.int32], label: int, box: NDArray[np.int32], step: float
 ) -> None:
     """Set what is added in one hole; `step` is from cell to cell, mm."""
-    rows, columns = number_unknowns(labels, label, box, cells.numbers)
-    band = bandwidth(rows, columns, cells.numbers)
+    rows, columns = kernels.number_unknowns(labels, label, box, cells.numbers)
+    band = kernels.bandwidth(rows, columns, cells.numbers)
     for _ in range(_ITERATIONS):
-        lower, right = normal_equations(
+        lower, right = kernels.normal_equations(
             cells, rows, columns, box, band, _SMOOTHING / _CELL**2, step)
         # The lower half by rows is the upper half by columns, as LAPACK has it. Called directly:
         # solveh_banded's checks take as long as a small hole's solution.

@@ -13,18 +13,14 @@ from numpy.typing import NDArray
 from denseface.recon.numerics.jit import compiled
 from denseface.recon.numerics.linear_solve import solve_small
 
-__all__ = ["HeightField", "mirror_costs", "mirror_image", "principal_curvature_angle",
-           "refine_plane", "sample_points"]
-
 Image = NDArray[np.float32]
 Floats = NDArray[np.float64]
+Vector = tuple[float, float, float]
 
 
 class HeightField(NamedTuple):
     """A face's surface over (X, Y), on a regular grid.
 
-    Attributes
-    ----------
     planes : (rows, columns, k) float32: height, mm; facing; weight as a mirror image, 0-1; and for
         `mirror_image` besides: detail, mm along the normal; weight of the seeds, 0-1
     origin : (3,) float64, mm, x and y of the first point, and what is added to the heights
@@ -123,13 +119,14 @@ def refine_plane(
 
     Gives the normal, (3,), the offset, mm, and how many points' images met the field.
     """
-    met = 0
+    normal, met = normal.copy(), 0
     for _ in range(steps):
         a, b = _tangents(normal)
         matrix, right, met = _normal_equations(field, points, normal, offset, a, b, scale)
         moved = solve_small(matrix, right)
-        normal = normal + moved[0] * a + moved[1] * b
-        normal = normal / math.sqrt(
+        for k in range(3):
+            normal[k] += moved[0] * a[k] + moved[1] * b[k]
+        normal /= math.sqrt(
             normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
         offset += moved[2]
         if max(100 * abs(moved[0]), 100 * abs(moved[1]), abs(moved[2])) < tolerance:
@@ -138,22 +135,21 @@ def refine_plane(
 
 
 @compiled
-def _tangents(normal: Floats) -> tuple[Floats, Floats]:
-    """Give two unit vectors that span the plane, (3,) each."""
+def _tangents(normal: Floats) -> tuple[Vector, Vector]:
+    """Give two unit vectors that span the plane."""
     nx, ny, nz = normal
     if abs(nz) < 0.9:
         length = math.sqrt(nx * nx + ny * ny)
-        a = np.array([ny / length, -nx / length, 0.0])
+        a = ny / length, -nx / length, 0.0
     else:
         length = math.sqrt(ny * ny + nz * nz)
-        a = np.array([0.0, nz / length, -ny / length])
-    b = np.array([ny * a[2] - nz * a[1], nz * a[0] - nx * a[2], nx * a[1] - ny * a[0]])
-    return a, b
+        a = 0.0, nz / length, -ny / length
+    return a, (ny * a[2] - nz * a[1], nz * a[0] - nx * a[2], nx * a[1] - ny * a[0])
 
 
 @compiled
 def _normal_equations(
-    field: HeightField, points: Floats, normal: Floats, offset: float, a: Floats, b: Floats,
+    field: HeightField, points: Floats, normal: Floats, offset: float, a: Vector, b: Vector,
     scale: float,
 ) -> tuple[Floats, Floats, int]:
     """Sum the weighted normal equations of `refine_plane`, and count the images that met.

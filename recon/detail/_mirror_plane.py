@@ -7,20 +7,12 @@ count, so that a swollen cheek does not draw the plane.
 """
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.detail._mirror_kernels import (
-    HeightField,
-    mirror_costs,
-    principal_curvature_angle,
-    refine_plane,
-    sample_points,
-)
-
-__all__ = ["MirrorPlane", "find_plane"]
+from denseface.recon.detail import _mirror_kernels as kernels
 
 _TURNS = np.radians(np.arange(-40.0, 41.0, 10.0))
 """Turns of the planes to start from, away from the view from ahead, rad."""
@@ -56,23 +48,16 @@ _MIN_FACING = 0.2
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class MirrorPlane:
-    """The points p with normal . p = offset.
-
-    Attributes
-    ----------
-    normal : (3,) float64, unit vector, depth camera frame
-    offset : mm
-    """
+class MirrorPlane(NamedTuple):
+    """The points p with normal . p = offset, mm; the normal, (3,), is of unit length."""
 
     normal: Floats
     offset: float
 
 
-def find_plane(field: HeightField) -> MirrorPlane | None:
+def find_plane(field: kernels.HeightField) -> MirrorPlane | None:
     """Find the plane of symmetry of a face; None where too little of one of its sides shows."""
-    points = sample_points(field, max(1, round(_DENSE_MM / field.step)), _MIN_FACING)
+    points = kernels.sample_points(field, max(1, round(_DENSE_MM / field.step)), _MIN_FACING)
     if len(points) < _MIN_POINTS:
         return None
     middle = points.mean(axis=0)
@@ -82,27 +67,28 @@ def find_plane(field: HeightField) -> MirrorPlane | None:
     start = _coarse_plane(centered, some)
     if start is None:
         return None
-    normal, offset, met = refine_plane(
+    normal, offset, met = kernels.refine_plane(
         centered, points, *start, _SCALE_MM, _FINAL_STEPS, _TOLERANCE_MM)
     if met < _MIN_MET * len(points):
         return None
     return MirrorPlane(normal, offset + float(normal @ middle))
 
 
-def _coarse_plane(field: HeightField, points: Floats) -> tuple[Floats, float] | None:
+def _coarse_plane(field: kernels.HeightField, points: Floats) -> tuple[Floats, float] | None:
     """Search turns and offsets; give the cheapest normal and offset after some refinement."""
-    angle = principal_curvature_angle(points)
+    angle = kernels.principal_curvature_angle(points)
     level = np.array([math.cos(angle), math.sin(angle), 0.0])
     normals = np.cos(_TURNS)[:, None] * level + np.sin(_TURNS)[:, None] * (0.0, 0.0, 1.0)
-    costs = mirror_costs(
+    costs = kernels.mirror_costs(
         field, points, normals, _OFFSETS_MM, _FAR_MM**2, _MISSING * _FAR_MM**2)
     best, least = None, np.inf
     for turned in np.argsort(costs.min(axis=1), kind="stable")[:_STARTS]:
-        normal, offset, met = refine_plane(
+        normal, offset, met = kernels.refine_plane(
             field, points, normals[turned], _OFFSETS_MM[costs[turned].argmin()], _SCALE_MM,
             _COARSE_STEPS, _TOLERANCE_MM)
-        cost = mirror_costs(field, points, normal[None], np.array([offset]), _FAR_REFINED_MM**2,
-                            _MISSING * _FAR_REFINED_MM**2)[0, 0]
+        cost = kernels.mirror_costs(
+            field, points, normal[None], np.array([offset]), _FAR_REFINED_MM**2,
+            _MISSING * _FAR_REFINED_MM**2)[0, 0]
         if met >= _MIN_MET * len(points) and cost < least:
             best, least = (normal, offset), cost
     return best

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.filters import blurred, downsampled
 
-__all__ = ["BROADER", "Rim", "iterated_average"]
-
 Image = NDArray[np.float32]
 
 BROADER = 4.0
@@ -58,8 +56,6 @@ _COVERAGE_INSIDE = 0.9
 class Rim:
     """Where the rim is, place by place.
 
-    Attributes
-    ----------
     coverage : (rows, columns) float32, 0-1, how much of a Gaussian around a place is over the face
     distance : (rows, columns) float32, from the outline inward, mean spacings; negative outside
     """
@@ -92,16 +88,9 @@ class Rim:
         return np.asarray(np.clip(weight, 0, 1), np.float32)
 
     def fraying_correction(self, dz_dx: Image, dz_dy: Image, spacing: float) -> Image:
-        """Give what is to be added to the depths: an outward shift times the slope.
+        """Give what is to be added to the depths, mm: an outward shift times the slope.
 
-        Parameters
-        ----------
-        dz_dx, dz_dy : (rows, columns) float32
-        spacing : mean spacing of the seeds, mm
-
-        Returns
-        -------
-        (rows, columns) float32, mm
+        dz_dx, dz_dy : (rows, columns) float32; spacing : mean spacing of the seeds, mm
         """
         inward = [cv2.Sobel(self.coverage, cv2.CV_32F, right, 1 - right, ksize=3)
                   for right in (1, 0)]
@@ -120,18 +109,13 @@ def iterated_average(
 ) -> Image:
     """Average what the seeds show, then what that leaves of them, and so on (Richardson iteration).
 
-    Parameters
-    ----------
-    seeds : (rows, columns) float32, how many are in each cell of a grid
-    values : (rows, columns) float32, the sums of what they show, mm
+    seeds, values : (rows, columns) float32, how many seeds are in each cell of a grid, and the sums
+        of what they show, mm
     radius : of the Gaussian (standard deviation), cells
     usual : seeds in a cell where none are missing
-    rim : of a finer grid
-    finer : its pixels along the side of a cell
+    rim : of a finer grid; finer : its pixels along the side of a cell
 
-    Returns
-    -------
-    float32, mm, on the rim's grid
+    Gives float32, mm, on the rim's grid.
     """
     # On so few cells two small matrix products blur sooner than a filter does.
     down, across = (_blur_matrix(side, radius) for side in seeds.shape)

@@ -13,23 +13,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.detail._shading_kernels import (
-    Iterate,
-    ShadingSystem,
-    apply_jacobian_transpose,
-    apply_weights,
-    brightness_image,
-    conjugate_gradient_step,
-    grid_points,
-    masked_brightness,
-    shading_residuals,
-)
+from denseface.recon.detail import _shading_kernels as kernels
 from denseface.recon.detail._spherical_harmonics import fit_lighting, sample_harmonics
 from denseface.recon.intermediate import ColorSampler
 from denseface.recon.numerics.filters import blurred, upsampled
 from denseface.recon.numerics.normalized_convolution import normalized, normalized_convolution
-
-__all__ = ["shading_detail", "shape_from_shading"]
 
 Image = NDArray[np.float32]
 
@@ -67,34 +55,28 @@ _STEPS = 3
 
 
 def shading_detail(
-    heights: Image, weight: Image, slopes: tuple[Image, Image],
+    heights: Image, weight: Image, slopes: Image,
     coordinates: tuple[NDArray[np.float64], NDArray[np.float64]], sampler: ColorSampler,
 ) -> Image:
     """Find what is to be added to a surface for its shading to be that of the image.
 
-    Parameters
-    ----------
     heights : (rows, columns) float32, mm
-    weight : (rows, columns) float32, 0-1, how much a point counts
-    slopes : dz/dx, dz/dy, (rows, columns) float32
     coordinates : x of the columns, y of the rows, mm
     sampler : tells points' colours
 
-    Returns
-    -------
-    (rows, columns) float32, mm along z
+    The rest is as of `shape_from_shading`.
     """
-    points = grid_points(weight, *coordinates, heights)
+    points = kernels.grid_points(weight, *coordinates, heights)
     if not len(points):
         return np.zeros_like(heights)
     weight = weight.copy()
-    brightness = brightness_image(*sampler(points), _BRIGHTNESS, _SATURATED, weight)
+    brightness = kernels.brightness_image(*sampler(points), _BRIGHTNESS, _SATURATED, weight)
     xs = coordinates[0]
     return shape_from_shading(brightness, weight, slopes, float(xs[1] - xs[0]))
 
 
 def shape_from_shading(
-    brightness: Image, weight: Image, slopes: tuple[Image, Image], step: float
+    brightness: Image, weight: Image, slopes: Image, step: float
 ) -> Image:
     """Find what is to be added to a surface for its shading to be that of the image.
 
@@ -102,42 +84,39 @@ def shape_from_shading(
     brightness over shading: with g the change of the shading's logarithm with the slopes, it makes
     sum w (g . grad h - r)^2 + |h|^2 smallest, the last in the norm of that covariance.
 
-    Parameters
-    ----------
     brightness : (rows, columns) float32, linear, any unit; of no account where `weight` is 0
     weight : (rows, columns) float32, 0-1, how much a point counts
-    slopes : dz/dx, dz/dy, (rows, columns) float32
+    slopes : (2, rows, columns) float32, dz/dx, dz/dy
     step : distance of points, mm
 
-    Returns
-    -------
-    (rows, columns) float32, mm along z; zero where there is too little to fit the lighting
+    Gives (rows, columns) float32, mm along z; zero where there is too little to fit the lighting.
     """
-    brightness, = normalized(blurred(masked_brightness(brightness, weight), _BLUR_PX))
-    lighting, median = fit_lighting(*sample_harmonics(brightness, weight, *slopes, _SPARSE))
+    brightness, = normalized(blurred(kernels.masked_brightness(brightness, weight), _BLUR_PX))
+    dz_dx, dz_dy = slopes
+    lighting, median = fit_lighting(*sample_harmonics(brightness, weight, dz_dx, dz_dy, _SPARSE))
     if median <= 0:
         return np.zeros(weight.shape, np.float32)
-    system = shading_residuals(brightness, *slopes, lighting, _MIN_SHADING * median)
+    system = kernels.shading_residuals(brightness, dz_dx, dz_dy, lighting, _MIN_SHADING * median)
     residuals = system.residuals
     skin = ((weight > 0) & (np.abs(residuals) < np.float32(_MAX_RESIDUAL))).astype(np.float32)
     slow, = normalized_convolution(skin, _SLOW_MM / (2 * step), residuals)
     residuals -= upsampled(slow, residuals.shape)
     energy, = normalized_convolution(skin, _ENERGY_MM / (2 * step), residuals * residuals)
-    apply_weights(system, weight * skin, upsampled(energy, residuals.shape), _COLOR_NOISE,
-                  _PRECISION * step**2, step)
+    kernels.apply_weights(system, weight * skin, upsampled(energy, residuals.shape), _COLOR_NOISE,
+                          _PRECISION * step**2, step)
     return _solved(system, step)
 
 
-def _solved(system: ShadingSystem, step: float) -> Image:
+def _solved(system: kernels.ShadingSystem, step: float) -> Image:
     """Solve by conjugate gradients, with the covariance as preconditioner."""
     radius = math.sqrt(2) * _RADIUS_MM / step
     variance = _ERROR_MM**2 * 2 * math.pi * radius**2
     values, by_x, by_y = system
-    state = Iterate(*(np.zeros_like(values) for _ in Iterate._fields))
-    apply_jacobian_transpose(values, by_x, by_y, state.residual)
+    state = kernels.Iterate(*(np.zeros_like(values) for _ in kernels.Iterate._fields))
+    kernels.apply_jacobian_transpose(values, by_x, by_y, state.residual)
     norm = 1.0
     for _ in range(_STEPS):
-        norm = conjugate_gradient_step(
+        norm = kernels.conjugate_gradient_step(
             state, blurred(state.residual, radius), variance, by_x, by_y, norm)
         if norm <= 0:
             break

@@ -7,18 +7,12 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["Iterate", "ShadingSystem", "apply_jacobian", "apply_jacobian_transpose",
-           "apply_weights", "brightness_image", "conjugate_gradient_step", "grid_points",
-           "masked_brightness", "shading_residuals"]
-
 Image = NDArray[np.float32]
 
 
 class ShadingSystem(NamedTuple):
     """The linear least squares that a change of height is to solve: J h = residuals.
 
-    Attributes
-    ----------
     residuals : (rows, columns), about the logarithm of brightness over shading
     jacobian_x, jacobian_y : (rows, columns), its change with dz/dx and dz/dy; once weighted, with
         the differences of the heights on both sides
@@ -32,8 +26,6 @@ class ShadingSystem(NamedTuple):
 class Iterate(NamedTuple):
     """What conjugate gradients carry from step to step, (rows, columns) each, changed in place.
 
-    Attributes
-    ----------
     heights : the solution so far
     residual : what is left of the right side
     direction : of the search, before the preconditioner
@@ -114,8 +106,7 @@ def shading_residuals(
     """
     rows, columns = brightness.shape
     residuals, by_dx, by_dy = (
-        np.empty((rows, columns), np.float32), np.empty((rows, columns), np.float32),
-        np.empty((rows, columns), np.float32))
+        np.empty_like(brightness), np.empty_like(brightness), np.empty_like(brightness))
     one, two, least = np.float32(1), np.float32(2), np.float32(min_shading)
     l0, l1, l2, l3, l4, l5, l6, l7, l8 = lighting
     facing, shading = np.empty(columns, np.float32), np.empty(columns, np.float32)

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from denseface.recon.numerics.jit import compiled
 from denseface.recon.numerics.linear_solve import solve_small
 
-__all__ = ["fit_lighting", "sample_harmonics"]
-
 Image = NDArray[np.float32]
 Floats = NDArray[np.float64]
 

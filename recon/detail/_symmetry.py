@@ -19,18 +19,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.recon.detail import _symmetry_kernels as kernels
 from denseface.recon.detail._mirror_kernels import HeightField, mirror_image
 from denseface.recon.detail._mirror_plane import MirrorPlane
-from denseface.recon.detail._symmetry_kernels import (
-    correction,
-    mirror_moments,
-    peak_differences,
-    shrinkage_factors,
-)
 from denseface.recon.numerics.filters import blurred, upsampled
 from denseface.recon.numerics.normalized_convolution import normalized
-
-__all__ = ["symmetry_correction"]
 
 Image = NDArray[np.float32]
 
@@ -58,8 +51,6 @@ def symmetry_correction(
 ) -> Image:
     """Find what the mirror image adds to a face.
 
-    Parameters
-    ----------
     field : of five planes; its heights are those of the broad fit
     kept : (rows, columns) float32, the part of the detail that the Wiener gain keeps, mm along z
     filled : (rows, columns) float32, what is added to the broad fit in holes, mm along z
@@ -68,25 +59,22 @@ def symmetry_correction(
     noise : variance of the noise in the detail, mm^2
     window : over which detail counts as local (standard deviation), mm
 
-    Returns
-    -------
-    (rows, columns) float32, mm along z
+    Gives (rows, columns) float32, mm along z.
     """
     step = field.step
-    image = mirror_image(field, kept + filled, plane.normal, plane.offset, _MAX_DISTANCE_MM,
-                         _MIN_FACING)
+    image = mirror_image(field, kept + filled, *plane, _MAX_DISTANCE_MM, _MIN_FACING)
     v = max(noise, 1e-12)
-    moments, differences, gaps = mirror_moments(field.planes, image, hole)
+    moments, differences, gaps = kernels.mirror_moments(field.planes, image, hole)
     # Peaks are taken of all points: on every second one they would depend on which those are.
-    alike = _alike(peak_differences(differences, blurred(differences, _DIFFERENCE_MM / step),
-                                    _DIFFERENT / 2 / v), step)
-    factors = shrinkage_factors(blurred(moments, window / (2 * step)), alike, v)
+    alike = _alike(kernels.peak_differences(
+        differences, blurred(differences, _DIFFERENCE_MM / step), _DIFFERENT / 2 / v), step)
+    factors = kernels.shrinkage_factors(blurred(moments, window / (2 * step)), alike, v)
     gap_energy = upsampled(normalized(blurred(gaps, _GAP_MM / (2 * step)))[0], hole.shape)
     if hole.any():
         around, = normalized(blurred(gaps, _HOLE_GAP_MM / (2 * step)))
         gap_energy += hole * (upsampled(around, hole.shape) - gap_energy)
-    return correction(field.planes, image, kept, hole, upsampled(factors, hole.shape), gap_energy,
-                      _FIT_VARIANCE * v)
+    return kernels.correction(field.planes, image, kept, hole, upsampled(factors, hole.shape),
+                              gap_energy, _FIT_VARIANCE * v)
 
 
 def _alike(excess: Image, step: float) -> Image:

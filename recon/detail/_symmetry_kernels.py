@@ -5,15 +5,12 @@ from numpy.typing import NDArray
 
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["correction", "mirror_moments", "peak_differences", "shrinkage_factors"]
-
 Image = NDArray[np.float32]
 
 _MIN_WEIGHT = np.float32(1e-6)
 """Weights below it are taken for it, so that nothing is divided by zero."""
 _MIN_SEEDS = np.float32(0.2)
-"""Least weight of the seeds, 0-1: with less, in a hole, the mirror image fills it even where the
-sides differ."""
+"""Least weight of the seeds, 0-1: the mirror image fills holes even where the sides differ."""
 
 
 @compiled

@@ -16,20 +16,16 @@ from denseface.recon.propagation._grid_kernels import Resampling, gather_points,
 from denseface.recon.propagation.uncertainty import standard_error, variance_components
 from denseface.recon.support import Support
 
-__all__ = ["densify"]
-
 _COLOR_RADIUS = 0.58
 """Standard deviation of the Gaussian that averages the seeds' colours, mean spacings."""
 _COLOR_STEP = 0.6
-"""Distance of the points that colours are averaged at: they are no finer than the seeds, mean
-spacings."""
+"""Distance of the points that colours are averaged at, mean spacings."""
 _MIN_RADIUS_PX = 0.4
 """Least standard deviation of that Gaussian, pixels."""
 _HOLE = 1.5
 """Farther than this from every seed, over (X, Y), a point is in a hole, mean spacings."""
 _STEEP = 4.0
-"""Slope from which on a fit without seeds bridges a step: no sensor reads what it sees at so
-grazing an angle (docs/decisions/0018)."""
+"""Slope from which on a fit without seeds bridges a step (docs/decisions/0018)."""
 _UNREAD = 0.7
 """Farther than this from every seed nothing was read, mean spacings."""
 _SPECK_PX = 2
@@ -37,11 +33,7 @@ _SPECK_PX = 2
 
 
 def densify(
-    seeds: Seeds,
-    surface: SurfaceGrid,
-    spacing: float,
-    ratio: float,
-    noise_fraction: float,
+    seeds: Seeds, surface: SurfaceGrid, spacing: float, ratio: float, noise_fraction: float,
     sampler: ColorSampler | None = None,
 ) -> DenseCloud:
     """Sample the surface on a regular grid, `ratio` points for each seed.
@@ -79,15 +71,8 @@ def densify(
         if len(hole):
             own, seen = sampler(points[hole])
             colors[hole[seen]] = own[seen]
-    return DenseCloud(
-        points=points,
-        colors=colors,
-        normals=normals,
-        sigma=sigma,
-        cells=cells,
-        grid_shape=inside.shape,
-        grid_step_mm=step,
-    )
+    return DenseCloud(points=points, colors=colors, normals=normals, sigma=sigma, cells=cells,
+                      grid_shape=inside.shape, grid_step_mm=step)
 
 
 def _without_bridges(surface: SurfaceGrid, spacing: float) -> Support:

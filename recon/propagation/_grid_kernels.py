@@ -112,7 +112,7 @@ def _read_between(reader: _Reader, row: int, known: int, firsts: Indices, ends: 
     firsts, ends : `_extents`
     """
     planes, places, left, part, lines = reader
-    above = min(int(places[row]), planes.shape[1] - 2)
+    above: int = min(int(places[row]), planes.shape[1] - 2)
     if above != known:
         # As far as any row needs it that lies between these two or the next.
         first, end, behind = firsts[row], ends[row], row + 1

@@ -17,18 +17,20 @@ fitted by maximum likelihood to simulated frames with known truth (`python -m be
 """
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.numerics.filters import filtered, gaussian_taps
-from denseface.recon.propagation._uncertainty_kernels import node_statistics
+from denseface.recon.numerics.jit import compiled
 from denseface.recon.settings import Settings
 
 __all__ = ["VarianceComponents", "averaging_cutoff", "fit_cutoff", "noise_fraction",
            "standard_error", "variance_components"]
+
+Floats = NDArray[np.float32]
 
 _HOLE = 0.4
 """H, for each spacing into a hole. This and the next five: `bench/calibration.py --fit`."""
@@ -51,8 +53,7 @@ _MIN_SIGMA_MM = 0.05
 """What averaging tens of readings in whole millimetres leaves of their 0.29 mm, mm."""
 
 
-@dataclass(frozen=True, eq=False)
-class VarianceComponents:
+class VarianceComponents(NamedTuple):
     """The parts of sigma^2 before their coefficients, on every so many points of a grid.
 
     Attributes
@@ -61,10 +62,10 @@ class VarianceComponents:
     every : grid points from node to node
     """
 
-    noise: NDArray[np.float32]
-    hole: NDArray[np.float32]
-    slope: NDArray[np.float32]
-    rim: NDArray[np.float32]
+    noise: Floats
+    hole: Floats
+    slope: Floats
+    rim: Floats
     every: int
 
 
@@ -77,8 +78,7 @@ def noise_fraction(settings: Settings) -> float:
     """
     fraction = _FIT_FRACTION * fit_cutoff(settings.r0_factor, settings.smoothing) ** 2
     if settings.detail_factor is not None:
-        fraction += (_DETAIL_FRACTION * _FIT_FRACTION
-                     * averaging_cutoff(settings.detail_factor) ** 2)
+        fraction += _DETAIL_FRACTION * _FIT_FRACTION * averaging_cutoff(settings.detail_factor) ** 2
     return fraction
 
 
@@ -94,8 +94,8 @@ def averaging_cutoff(detail_factor: float) -> float:
 
 
 def variance_components(
-    points: NDArray[np.float32], support: NDArray[np.bool_], surface: NDArray[np.float32],
-    origin: tuple[float, float], step: float, spacing: float,
+    points: Floats, support: NDArray[np.bool_], surface: Floats, origin: tuple[float, float],
+    step: float, spacing: float,
 ) -> VarianceComponents:
     """Find the components of the variance, place by place.
 
@@ -126,9 +126,47 @@ def variance_components(
         rim=np.asarray(area * slope * edge, np.float32), every=every)
 
 
+@compiled
+def node_statistics(
+    points: Floats, support: NDArray[np.bool_], surface: Floats, origin: tuple[float, float],
+    step: float, every: int,
+) -> Floats:
+    """Gather what the standard error is made of on every so many grid points, the nodes.
+
+    points : (n, 3), mm; those off the support do not count
+    support : (rows, columns)
+    surface : (3, rows, columns), height, mm, dz/dx and dz/dy
+    origin : (x, y) of the grid's first point, mm; step : distance of its points, mm
+
+    Gives (rows / every, columns / every, 4), rounded up: 1 on the support, slope^2 there, seeds
+    nearest to the node, sum of their squared residuals, mm^2.
+    """
+    rows, columns = support.shape
+    heights, slopes_x, slopes_y = surface[0], surface[1], surface[2]
+    out = np.zeros(((rows + every - 1) // every, (columns + every - 1) // every, 4), np.float32)
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            row, column = i * every, j * every
+            if support[row, column]:
+                dx, dy = slopes_x[row, column], slopes_y[row, column]
+                out[i, j, 0] = 1
+                out[i, j, 1] = dx * dx + dy * dy
+    for k in range(len(points)):
+        x, y = (points[k, 0] - origin[0]) / step, (points[k, 1] - origin[1]) / step
+        row, column = int(np.floor(y + 0.5)), int(np.floor(x + 0.5))
+        if 0 <= row < rows and 0 <= column < columns and support[row, column]:
+            rest = points[k, 2] - heights[row, column] - step * (
+                slopes_x[row, column] * (x - column) + slopes_y[row, column] * (y - row))
+            i = min((row + every // 2) // every, out.shape[0] - 1)
+            j = min((column + every // 2) // every, out.shape[1] - 1)
+            out[i, j, 2] += 1
+            out[i, j, 3] += rest * rest
+    return out
+
+
 def standard_error(
     components: VarianceComponents, noise_fraction: float, *, detailed: bool
-) -> NDArray[np.float32]:
+) -> Floats:
     """Give sigma on the nodes of its components.
 
     Parameters

@@ -7,8 +7,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from denseface.recon.propagation import densify
-from denseface.recon.propagation._uncertainty_kernels import node_statistics
-from denseface.recon.propagation.uncertainty import fit_cutoff, noise_fraction
+from denseface.recon.propagation.uncertainty import fit_cutoff, node_statistics, noise_fraction
 from denseface.recon.settings import Preset, Settings
 from tests.unit.recon.shapes import disc_seeds, fitted, seeds
 
