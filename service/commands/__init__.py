@@ -18,7 +18,7 @@ COMMANDS = {
     "dead": "list, retry or drop captures that were given up",
     "purge": "remove captures: frame, face, report and row",
     "status": "say who is connected to the hub and what was done",
-    "keys": "make keys, and say which may come in from other machines",
+    "keys": "make keys, and say which may connect from other machines",
     "hub": "run the hub alone",
     "capture": "run a capture process alone",
     "worker": "run a reconstruction worker alone",

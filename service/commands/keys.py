@@ -41,10 +41,10 @@ def run(args: argparse.Namespace) -> int:
         case "allow":
             one = security.allow(folder, args.name, security.read_public(args.public),
                                  frozenset(map(Role, args.roles)))
-            print(f"{one.name} ({one.fingerprint}) may come in as {', '.join(sorted(one.roles))}")
+            print(f"{one.name} ({one.fingerprint}) may connect as {', '.join(sorted(one.roles))}")
         case "revoke":
             security.revoke(folder, args.name)
-            print(f"{args.name} may come in no more")
+            print(f"{args.name} may connect no more")
         case "list":
             for one in sorted(security.AllowList(folder), key=lambda one: one.name):
                 print(f"{one.name:20} {one.fingerprint}  {', '.join(sorted(one.roles))}")

@@ -91,11 +91,11 @@ class AllowList:
                 if _out_of_descriptors(error.__cause__):
                     self._files = before
                     return False
-                self._log.error("key not let in", reason=str(error))
+                self._log.error("key refused", reason=str(error))
                 continue
             other = found.setdefault(one.public, one)
             if other is not one:
-                self._log.error("key not let in", reason=f"{name}: the same key as {other.name}")
+                self._log.error("key refused", reason=f"{name}: the same key as {other.name}")
         changed = found != self._by_public
         self.changes += changed
         self._by_public = found

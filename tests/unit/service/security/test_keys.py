@@ -177,7 +177,7 @@ def test_the_commands(keys, capsys):
     allow_list = AllowList(keys)
     listed = run("list")[1]
     assert listed.split() == ["front", allow_list.get(public).fingerprint, "presser,", "subscriber"]
-    assert run("revoke", "front")[:2] == (0, "front may come in no more\n")
+    assert run("revoke", "front")[:2] == (0, "front may connect no more\n")
     assert run("list")[1] == ""
     status, _, error = run("revoke", "front")
     assert (status, len(error.splitlines())) == (2, 1)
