@@ -10,12 +10,5 @@ from denseface.service.client.events import (
 )
 from denseface.service.client.operator import Operator
 
-__all__ = [
-    "AsyncClient",
-    "Client",
-    "Operator",
-    "Published",
-    "PublishedFace",
-    "PublishedFailure",
-    "PublishedPreview",
-]
+__all__ = ["AsyncClient", "Client", "Operator", "Published", "PublishedFace", "PublishedFailure",
+           "PublishedPreview"]

@@ -14,10 +14,8 @@ from denseface.service.protocol.wire import Buffer, Packet
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable, publications_of
 from denseface.service.transport.connection import Credentials, connect
-from denseface.service.transport.sockets import send_parts
+from denseface.service.transport.sockets import Context, send_parts
 from denseface.service.transport.subscription import Subscription
-
-__all__ = ["BaseClient"]
 
 _SEND_RETRY_S = 0.05
 """Time between two tries to send while there is no connection, seconds."""
@@ -36,7 +34,7 @@ class BaseClient:
         self._publications = publications_of(self.address)
         self._keys = Credentials.of(settings)
         self._exchanges = Exchanges(settings.resend_s)
-        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._context: Context = zmq.Context()
         self._socket, self._monitor = connect(self._context, zmq.DEALER, self.address, self._keys)
 
     def _check_open(self) -> None:
@@ -53,11 +51,8 @@ class BaseClient:
     def _send(self, parts: Sequence[Buffer], subscription: Subscription | None) -> float:
         """Send a request, and give how long to wait for its answer until the next try, seconds.
 
-        Raises
-        ------
-        KeyRefusedError
-            The hub refuses this key, or does so meanwhile for the subscription: a key that was
-            revoked gets no answer.
+        KeyRefusedError where the hub refuses this key, for the subscription too: a key that was
+        revoked gets no answer.
         """
         self._monitor.check()
         if subscription:
@@ -71,7 +66,7 @@ class BaseClient:
         return answer
 
     def _no_answer(self, timeout: float) -> ClientTimeoutError:
-        hint = "is it running, or was this key revoked" if self._keys else (
-            "is `denseface up` running")
+        hint = (
+            "is it running, or was this key revoked" if self._keys else "is `denseface up` running")
         return ClientTimeoutError(
             f"{self.address}: no answer from the hub within {timeout:g} s, {hint}?")

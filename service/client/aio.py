@@ -20,13 +20,12 @@ from denseface.service.client.events import Published, PublishedFace, PublishedP
 from denseface.service.client.exchanges import Exchange, SendRequest, Step, deadline
 from denseface.service.client.follower import TOPICS, Follower
 from denseface.service.errors import ClientClosedError, ClientTimeoutError, ProtocolError
-from denseface.service.protocol.messages import BaseRequest, Status
+from denseface.service.protocol.message_base import BaseRequest
+from denseface.service.protocol.messages import Status
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, encode
 from denseface.service.transport.connection import receive_packet
 from denseface.service.transport.subscription import CHECK_INTERVAL_S, Subscription
-
-__all__ = ["AsyncClient"]
 
 _T = TypeVar("_T")
 
@@ -188,7 +187,7 @@ class AsyncClient(BaseClient):
             if time.monotonic() >= until:
                 raise ClientTimeoutError("nothing was published in the time allowed")
 
-    async def _readable(self, socket: "zmq.Socket[bytes]", seconds: float) -> bool:
+    async def _readable(self, socket: zmq.Socket[bytes], seconds: float) -> bool:
         """Wait until there is something to receive; False where there is nothing in this time."""
         loop = asyncio.get_running_loop()
         until = loop.time() + seconds

@@ -17,15 +17,13 @@ from denseface.service.client.events import Published, PublishedFace, PublishedP
 from denseface.service.client.exchanges import Exchange, SendRequest, Step, deadline
 from denseface.service.client.follower import TOPICS, Follower
 from denseface.service.errors import ClientTimeoutError, ProtocolError
-from denseface.service.protocol import messages
+from denseface.service.protocol.message_base import BaseRequest
 from denseface.service.protocol.messages import Status
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, encode
 from denseface.service.runtime.closing import Closing
 from denseface.service.transport.connection import receive_packet
 from denseface.service.transport.subscription import CHECK_INTERVAL_S, Subscription
-
-__all__ = ["Client"]
 
 _T = TypeVar("_T")
 
@@ -191,8 +189,7 @@ class Client(Closing, BaseClient):
                 raise ClientTimeoutError("nothing was published in the time allowed")
 
     def _send_request(
-        self, message: messages.BaseRequest, timeout: float,
-        subscription: Subscription | None = None,
+        self, message: BaseRequest, timeout: float, subscription: Subscription | None = None
     ) -> Packet:
         """Send until answered; raises as `_send`, and where the hub cannot answer."""
         self._check_open()
@@ -216,4 +213,3 @@ class Client(Closing, BaseClient):
                 continue
             if getattr(packet.message, "request", None) == request:
                 return packet
-

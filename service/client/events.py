@@ -10,9 +10,6 @@ from denseface.service.errors import CaptureFailedError, RemoteProtocolError
 from denseface.service.protocol.messages import CaptureFailed, FaceDone, Preview
 from denseface.service.protocol.wire import Packet
 
-__all__ = ["Published", "PublishedFace", "PublishedFailure", "PublishedPreview", "outcome_of",
-           "preview_of"]
-
 
 @dataclass(frozen=True)
 class PublishedFace:
@@ -56,13 +53,7 @@ class PublishedPreview:
 
 
 def outcome_of(packet: Packet) -> Published:
-    """Read `FaceDone` or `CaptureFailed`.
-
-    Raises
-    ------
-    RemoteProtocolError
-        Where it is neither, or the face is malformed.
-    """
+    """Read `FaceDone` or `CaptureFailed`; RemoteProtocolError for another, or a malformed face."""
     match packet.message:
         case FaceDone(epoch=epoch, sequence=sequence, capture_id=capture_id, face=header):
             return PublishedFace(epoch, sequence, capture_id, header.join(packet.arrays))

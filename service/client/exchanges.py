@@ -26,18 +26,8 @@ from denseface.service.errors import (
     UnknownCaptureError,
 )
 from denseface.service.protocol import messages
+from denseface.service.protocol.message_base import BaseRequest
 from denseface.service.protocol.wire import Packet
-
-__all__ = [
-    "AwaitPublication",
-    "Exchange",
-    "Exchanges",
-    "SendRequest",
-    "Step",
-    "deadline",
-    "expect",
-    "send_request",
-]
 
 _T = TypeVar("_T")
 
@@ -49,7 +39,7 @@ _LONGEST_WAIT_S = 20.0
 class SendRequest:
     """Send a request until it is answered; the result is the answer."""
 
-    message: messages.BaseRequest
+    message: BaseRequest
     timeout: float
     """Seconds."""
 
@@ -66,7 +56,7 @@ Step = SendRequest | AwaitPublication
 Exchange = Generator[Step, Packet | None, _T]
 
 
-def send_request(message: messages.BaseRequest, timeout: float) -> Exchange[Packet]:
+def send_request(message: BaseRequest, timeout: float) -> Exchange[Packet]:
     """Send a request within an exchange, and give the answer; `timeout` in seconds."""
     packet = yield SendRequest(message, timeout)
     if packet is None:
@@ -141,10 +131,7 @@ class Exchanges:
     def start(self, last: int | None, since: datetime | None) -> messages.FindStart | None:
         """Give the request that finds where to start; None where neither is given.
 
-        Raises
-        ------
-        LocalProtocolError
-            `last` is not positive, `since` has no zone, or both are given.
+        LocalProtocolError where `last` is not positive, `since` has no zone, or both are given.
         """
         if last is None and since is None:
             return None

@@ -12,20 +12,10 @@ from denseface.service.client.exchanges import (
     send_request,
 )
 from denseface.service.errors import ClientTimeoutError, LocalProtocolError, RemoteProtocolError
-from denseface.service.protocol.messages import (
-    BaseRequest,
-    CaptureFailed,
-    FaceDone,
-    GetNext,
-    GetStatus,
-    NothingNewer,
-    StartAt,
-    Status,
-)
+from denseface.service.protocol import messages
+from denseface.service.protocol.message_base import BaseRequest
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
-
-__all__ = ["TOPICS", "Follower"]
 
 TOPICS = (Topic.FACES, Topic.STATUS)
 """Topics to subscribe to."""
@@ -36,16 +26,8 @@ _REQUEST_TIMEOUT_S = 5.0
 class Follower:
     """Gives publications in order, and requests those that were missed.
 
-    A skipped number, a status with a higher number and a new epoch each tell of missed ones.
-
-    Parameters
-    ----------
-    after, last, since : as in `Client.published`
-
-    Raises
-    ------
-    LocalProtocolError
-        More than one start is given, `last` is not positive or `since` has no zone.
+    A skipped number, a status with a higher number and a new epoch each tell of missed ones. Where
+    to start, and LocalProtocolError where that cannot be, are as in `Client.published`.
     """
 
     def __init__(
@@ -66,9 +48,9 @@ class Follower:
     def start(self, timeout: float | None) -> Exchange[None]:
         """Find where to start; to be run once, after subscribing."""
         until = deadline(timeout)
-        message = self._start_request or GetStatus(request=self._exchanges.next_number())
+        message = self._start_request or messages.GetStatus(request=self._exchanges.next_number())
         found = (yield from self._request_until(message, until)).message
-        if not isinstance(found, StartAt if self._start_request else Status):
+        if not isinstance(found, messages.StartAt if self._start_request else messages.Status):
             raise RemoteProtocolError(f"the hub answered with {found.kind} to {message.kind}")
         self._epoch = found.epoch
         self._last = found.sequence if self._after is None else self._after
@@ -86,13 +68,14 @@ class Follower:
 
     def _fetch(self, until: float) -> Exchange[Packet | None]:
         packet = yield from self._request_until(
-            GetNext(request=self._exchanges.next_number(), after=self._last), until)
+            messages.GetNext(request=self._exchanges.next_number(), after=self._last), until)
         message = packet.message
-        if not isinstance(message, FaceDone | CaptureFailed | NothingNewer):
+        if not isinstance(
+                message, messages.FaceDone | messages.CaptureFailed | messages.NothingNewer):
             raise RemoteProtocolError(f"the hub answered with {message.kind} to get_next")
         if self._new_epoch(message.epoch):
             return None
-        if isinstance(message, NothingNewer):
+        if isinstance(message, messages.NothingNewer):
             # Numbers up to this one that did not come have been removed.
             self._last = max(self._last, message.sequence)
             self._behind = False
@@ -105,9 +88,9 @@ class Follower:
             self._behind = True
             return None
         message = packet.message
-        if isinstance(message, Status):
+        if isinstance(message, messages.Status):
             self._behind = self._new_epoch(message.epoch) or message.sequence > self._last
-        elif isinstance(message, FaceDone | CaptureFailed):
+        elif isinstance(message, messages.FaceDone | messages.CaptureFailed):
             if self._new_epoch(message.epoch) or message.sequence > self._last + 1:
                 self._behind = True
             elif message.sequence == self._last + 1:

@@ -7,8 +7,7 @@ from denseface.service.client.blocking import Client
 from denseface.service.client.exchanges import expect
 from denseface.service.errors import RemoteProtocolError, UnknownCaptureError
 from denseface.service.protocol import messages
-
-__all__ = ["Operator"]
+from denseface.service.protocol.message_base import BaseMessage
 
 
 class Operator(Client):
@@ -82,9 +81,8 @@ class Operator(Client):
 
     def _request_known(
         self, message: messages.RetryDead | messages.DropDead, timeout: float
-    ) -> messages.BaseMessage:
+    ) -> BaseMessage:
         answer = self._send_request(message, timeout).message
         if isinstance(answer, messages.CaptureUnknown):
-            raise UnknownCaptureError(
-                f"capture {message.capture_id}: the hub has no such capture")
+            raise UnknownCaptureError(f"capture {message.capture_id}: the hub has no such capture")
         return answer

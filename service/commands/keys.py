@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     revoke = actions.add_parser("revoke", help="let a key in no more", description=(
         "Let a key in no more. A hub that runs cuts off at once whoever uses it."))
     revoke.add_argument("name", metavar="NAME")
-    listed = actions.add_parser("list", help="say which keys are let in")
+    listed = actions.add_parser("list", help="say which keys may connect")
     for action in (new, allow, revoke, listed):
         _options.add_keys(action)
 

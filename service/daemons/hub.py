@@ -17,6 +17,7 @@ from denseface.service.errors import LocalProtocolError, RemoteProtocolError
 from denseface.service.hub import PREVIEW_PERIOD_S, Hub
 from denseface.service.monitoring import Observer, Rejections
 from denseface.service.protocol import messages
+from denseface.service.protocol.message_base import BaseMessage
 from denseface.service.protocol.outgoing import Output, Publish, send, steps
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Buffer, Packet, decode_to_hub, encode
@@ -167,7 +168,7 @@ class _EventLoop:
             failpoint("hub.outcome.published")
 
 
-def _denied(incoming: Incoming, message: messages.BaseMessage, missing: str) -> Output:
+def _denied(incoming: Incoming, message: BaseMessage, missing: str) -> Output:
     """Give the one line that tells a sender which role its key lacks."""
     has = ", ".join(sorted(incoming.sender.roles))
     text = f"refused: {missing}, the key {incoming.sender.name} has {has}"

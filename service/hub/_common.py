@@ -7,8 +7,6 @@ from denseface.service.hub.peers import Peers
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage import FolderStore, Writer
 
-__all__ = ["Common"]
-
 
 class Common(NamedTuple):
     """What the parts of the hub share."""

@@ -15,8 +15,6 @@ from denseface.service.protocol.states import (
 )
 from denseface.service.storage import FolderStore, WriteResult
 
-__all__ = ["Captures"]
-
 
 class Captures:
     """States of captures: those that a restart forgets are here, the others in the store's rows."""
@@ -37,12 +35,7 @@ class Captures:
         return (self.state(capture_id), event) in TRANSITIONS
 
     def advance(self, capture_id: str, event: CaptureEvent) -> None:
-        """Change a state by an event that changes no row.
-
-        Raises
-        ------
-        TransitionError
-            Where it cannot happen in the capture's state.
+        """Change a state by an event that changes no row; TransitionError where it cannot happen.
         """
         self._note(capture_id, advance(self.state(capture_id), event))
 

@@ -43,8 +43,6 @@ from denseface.service.storage import (
     WriteResult,
 )
 
-__all__ = ["Hub"]
-
 _VERSION = version("denseface")
 """Of this package, as the status says it."""
 
@@ -84,9 +82,7 @@ class Hub:
         self._status_due = 0.0
         self._log = structlog.get_logger("hub")
 
-    def receive(
-        self, now: float, peer: bytes, packet: Packet, key: str = ""
-    ) -> list[Output]:
+    def receive(self, now: float, peer: bytes, packet: Packet, key: str = "") -> list[Output]:
         """Handle one message and return what to send.
 
         Parameters
@@ -117,9 +113,7 @@ class Hub:
     def written(self, now: float, *, wait: bool = False) -> list[Output]:
         """Give written files their rows and return what to send; raises as `receive`.
 
-        Parameters
-        ----------
-        wait : until all that is being written has its row; no job is sent then
+        With `wait`, until all that is being written has its row; no job is sent then.
         """
         outputs: list[Output] = []
         try:
@@ -136,8 +130,7 @@ class Hub:
         while True:
             yield from self._written(now, written)
             yield from self._jobs.dispatch(now)
-            written = self._writer.take_results()
-            if not written:
+            if not (written := self._writer.take_results()):
                 return
 
     def _written(self, now: float, written: Sequence[WriteResult]) -> Iterator[Output]:
@@ -204,9 +197,7 @@ class Hub:
         """Return the routing ids of all sensors and workers."""
         return [*self._peers.sensors, *self._peers.workers]
 
-    def _receive(
-        self, now: float, peer: bytes, packet: Packet, key: str
-    ) -> Iterator[Output]:
+    def _receive(self, now: float, peer: bytes, packet: Packet, key: str) -> Iterator[Output]:
         match packet.message:
             case messages.Press() as message:
                 yield from self._presses.press(now, peer, message, self._jobs.queued, key)

@@ -20,8 +20,6 @@ from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.storage import CaptureRow, WriteResult
 
-__all__ = ["Jobs"]
-
 _LOST = ("WorkerLost", "the worker that held it went away")
 """Error and reason of a job whose worker is gone."""
 _RETRY_S = 1.0

@@ -14,8 +14,6 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState
 
-__all__ = ["Maintenance"]
-
 _BATCH = 20
 """Captures removed in one go: more would stall the event loop."""
 _PAGE = 50
@@ -32,8 +30,7 @@ class Maintenance:
     def __init__(
         self, common: Common, presses: Presses, jobs: Jobs, outcomes: Outcomes, counters: Counters
     ) -> None:
-        self._store = common.store
-        self._captures = common.captures
+        self._store, self._captures = common.store, common.captures
         self._retention_s = common.settings.retention
         self._sweep_s = min(_SWEEP_S, (self._retention_s or _SWEEP_S) / 10)
         self._presses = presses
@@ -118,8 +115,7 @@ class Maintenance:
         left = len(going) == _BATCH
         if message.everything and not left:
             self._store.retention.clear_quarantine()
-        yield send(peer, messages.Removed(
-            request=message.request, removed=len(going), left=left))
+        yield send(peer, messages.Removed(request=message.request, removed=len(going), left=left))
 
     def _remove(self, capture_ids: Sequence[str]) -> Iterator[Output]:
         if not capture_ids:

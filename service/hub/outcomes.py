@@ -1,7 +1,7 @@
 """Outcomes are published, and sent to whoever asks for them."""
 
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from denseface.service.errors import DamagedFaceError
 from denseface.service.protocol import messages
@@ -10,16 +10,13 @@ from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.storage import FolderStore
 
-__all__ = ["Outcomes"]
-
 _MAX_WAITERS = 1000
 """Requests that may wait for an outcome; beyond, they are answered at once."""
 _MAX_WAITERS_PER_CLIENT = 100
 """As `_MAX_WAITERS`, of one client."""
 
 
-@dataclass(frozen=True)
-class _Waiter:
+class _Waiter(NamedTuple):
     capture_id: str
     deadline: float
 
@@ -30,12 +27,9 @@ class Outcomes:
     def __init__(
         self, store: FolderStore, requeue_damaged: Callable[[DamagedFaceError, bool], None]
     ) -> None:
-        """Read outcomes from a store.
+        """Read outcomes from a store; `requeue_damaged` has a damaged face made again.
 
-        Parameters
-        ----------
-        requeue_damaged : has a damaged face made again; its flag is False where the face was
-            damaged as soon as it was written, which counts as an attempt
+        Its flag is False where the face was damaged as soon as it was written: an attempt.
         """
         self._store = store
         self._requeue_damaged = requeue_damaged
@@ -117,9 +111,8 @@ class Outcomes:
     def tick(self, now: float) -> Iterator[Output]:
         """Answer the requests whose wait is over."""
         for peer, request in [key for key, one in self._waiters.items() if now >= one.deadline]:
-            waiter = self._waiters.pop((peer, request))
-            yield send(peer, messages.CapturePending(
-                request=request, capture_id=waiter.capture_id))
+            capture_id, _ = self._waiters.pop((peer, request))
+            yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
 
 
 def _answer(peer: bytes, request: int, packet: Packet) -> Send:

@@ -4,8 +4,6 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Literal
 
-__all__ = ["MAX_PEERS", "Peers", "SensorPeer", "WorkerPeer"]
-
 MAX_PEERS = 256
 """Most sensors, and most workers: so many fit into a `Status`. Others are not taken."""
 

@@ -17,8 +17,6 @@ from denseface.service.runtime.bounded_dict import BoundedDict
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.storage import WriteResult
 
-__all__ = ["Presses", "settings_hash"]
-
 _MIB = 2**20
 """Bytes."""
 _MAX_REFUSALS = 1000
@@ -60,11 +58,7 @@ class Presses:
         accepted : called with each capture whose frame is safe
         sensors_due : until then a missing sensor may just not have connected yet, seconds
         """
-        self._store = common.store
-        self._captures = common.captures
-        self._writer = common.writer
-        self._peers = common.peers
-        self._settings = common.settings
+        self._store, self._captures, self._writer, self._peers, self._settings = common
         self._accepted = accepted
         self._sensors_due = sensors_due
         self._recon = recon
@@ -99,9 +93,7 @@ class Presses:
         obstacle = self._obstacle(queued)
         if sensor is None or obstacle:
             reason, why = obstacle or ("no_sensor", "no sensor is connected")
-            self._log.warning("press refused", capture_id=capture_id, reason=why)
-            yield self._refusal(peer, messages.PressRefused(
-                request=request, capture_id=capture_id, reason=reason, message=why))
+            yield from self._refuse_all(capture_id, {peer: request}, reason, why)
             return
         self._captures.advance(capture_id, CaptureEvent.PRESSED)
         self._log.info("pressed", capture_id=capture_id, sensor=sensor.name)
@@ -166,8 +158,7 @@ class Presses:
             yield send(presser, messages.PressAccepted(request=request, capture_id=capture_id))
 
     def _not_saved(self, capture_id: str, error: Exception) -> Iterator[Output]:
-        sender = self._presses[capture_id].frame_sender
-        if sender is not None:
+        if (sender := self._presses[capture_id].frame_sender) is not None:
             yield send(sender, messages.FrameRefused(capture_id=capture_id, message=str(error)))
         yield from self._refuse(capture_id, "disk", str(error))
 
@@ -183,33 +174,32 @@ class Presses:
         """End a press without a capture and tell all who pressed."""
         if press := self._presses.pop(capture_id, None):
             self._captures.advance(capture_id, event)
-            self._log.warning("press refused", capture_id=capture_id, reason=why)
-            for presser, request in press.pressers.items():
-                yield self._refusal(presser, messages.PressRefused(
-                    request=request, capture_id=capture_id, reason=reason, message=why))
+            yield from self._refuse_all(capture_id, press.pressers, reason, why)
 
-    def _refusal(self, peer: bytes, refused: messages.PressRefused) -> Output:
-        self._refused[peer, refused.capture_id, refused.request] = refused
-        return send(peer, refused)
+    def _refuse_all(
+        self, capture_id: str, pressers: dict[bytes, int], reason: messages.PressReason, why: str
+    ) -> Iterator[Output]:
+        self._log.warning("press refused", capture_id=capture_id, reason=why)
+        for peer, request in pressers.items():
+            refused = messages.PressRefused(
+                request=request, capture_id=capture_id, reason=reason, message=why)
+            self._refused[peer, capture_id, request] = refused
+            yield send(peer, refused)
 
     def purge(self, capture_id: str | None) -> Iterator[Output]:
         """Refuse one press whose frame is awaited, or all where None."""
         for waiting in [capture_id] if capture_id else list(self._presses):
-            yield from self._refuse(
-                waiting, "purged", "purged by an operator", CaptureEvent.PURGED)
+            yield from self._refuse(waiting, "purged", "purged by an operator", CaptureEvent.PURGED)
 
     def sensor_gone(self, peer: bytes, reason: str) -> Iterator[Output]:
         """Refuse the presses that a sensor was asked for."""
         for capture_id in [key for key, press in self._presses.items()
                            if press.sensor == peer and press.frame_sender is None]:
-            yield from self._refuse(
-                capture_id, "sensor_gone", f"the sensor went away ({reason})")
+            yield from self._refuse(capture_id, "sensor_gone", f"the sensor went away ({reason})")
 
     def tick(self, now: float) -> Iterator[Output]:
         """Refuse presses whose frame is late."""
-        late = [key for key, press in self._presses.items()
-                if now >= press.deadline and press.frame_sender is None]
-        for capture_id in late:
-            limit = self._settings.take_timeout_s
-            yield from self._refuse(
-                capture_id, "timeout", f"no frame from the sensor in {limit:g} s")
+        why = f"no frame from the sensor in {self._settings.take_timeout_s:g} s"
+        for capture_id in [key for key, press in self._presses.items()
+                           if now >= press.deadline and press.frame_sender is None]:
+            yield from self._refuse(capture_id, "timeout", why)

@@ -13,8 +13,6 @@ from denseface.service.protocol.outgoing import Output, Publish, send
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 
-__all__ = ["PREVIEW_PERIOD_S", "Previews"]
-
 PREVIEW_PERIOD_S = 0.1
 """Shortest time between two previews, seconds."""
 

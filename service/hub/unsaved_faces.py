@@ -4,8 +4,6 @@ from denseface.service.errors import StoreError
 from denseface.service.protocol.wire import Packet
 from denseface.service.storage import FolderStore, PendingWrite, Writer
 
-__all__ = ["UnsavedFaces"]
-
 _MAX_UNSAVED = 16
 """Faces in memory, beyond which no job is sent and a face that the disk refuses is dropped."""
 
@@ -32,10 +30,7 @@ class UnsavedFaces:
     def retry_refused(self) -> bool:
         """Write again what the disk refused; True where there is room for more faces.
 
-        Raises
-        ------
-        StoreError
-            Where the store cannot be read.
+        StoreError where the store cannot be read.
         """
         for capture_id, again in self._refused.items():
             if not again:

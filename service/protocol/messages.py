@@ -7,63 +7,31 @@ of it is a case of `Hub.receive`, and `docs/wire.md` says what it is for.
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BaseModel, ConfigDict, FailFast, Field, model_validator
 
 from denseface.recon.settings import Settings
 from denseface.service.protocol.message_base import (
     BaseAnswer,
+    BaseMessage,
+    BaseRequest,
+    CaptureId,
     Digest,
+    FromHub,
     Moment,
     Name,
     Number,
     PeerName,
     Seconds,
     Text,
+    ToHub,
     Token,
-)
-from denseface.service.protocol.message_base import (
-    BaseMessage as BaseMessage,
-)
-from denseface.service.protocol.message_base import (
-    BaseRequest as BaseRequest,
-)
-from denseface.service.protocol.message_base import (
-    CaptureId as CaptureId,
-)
-from denseface.service.protocol.message_base import (
-    FromHub as FromHub,
-)
-from denseface.service.protocol.message_base import (
-    ToHub as ToHub,
-)
-from denseface.service.protocol.operator_messages import (
-    DeadLetter as DeadLetter,
-)
-from denseface.service.protocol.operator_messages import (
-    DeadLetters as DeadLetters,
-)
-from denseface.service.protocol.operator_messages import (
-    DropDead as DropDead,
-)
-from denseface.service.protocol.operator_messages import (
-    ListDead as ListDead,
-)
-from denseface.service.protocol.operator_messages import (
-    Purge as Purge,
-)
-from denseface.service.protocol.operator_messages import (
-    Removed as Removed,
-)
-from denseface.service.protocol.operator_messages import (
-    RetryDead as RetryDead,
 )
 from denseface.service.protocol.payload import FaceHeader, FrameHeader, PreviewHeader
 from denseface.service.protocol.roles import Role
 from denseface.service.protocol.status import Latency as Latency
 from denseface.service.protocol.status import Status as Status
 
-PressReason = Literal[
-    "no_sensor", "sensor", "sensor_gone", "timeout", "queue", "disk", "purged"]
+PressReason = Literal["no_sensor", "sensor", "sensor_gone", "timeout", "queue", "disk", "purged"]
 """Why there is no capture; a label of the metric of refused presses."""
 
 
@@ -225,6 +193,80 @@ class Preview(_WithPreview, FromHub):
     """Names the hub's process, which numbers previews."""
     sequence: Number
     """A number that is missing was not delivered and cannot be asked for."""
+
+
+# --- operator to hub, and the answers
+
+class ListDead(BaseRequest):
+    """Give the next captures that were given up, by sequence number."""
+
+    kind: Literal["list_dead"] = "list_dead"
+    after: Number = 0
+
+
+class RetryDead(BaseRequest):
+    """Try a capture again that was given up, with all its attempts."""
+
+    kind: Literal["retry_dead"] = "retry_dead"
+    capture_id: CaptureId
+
+
+class DropDead(BaseRequest):
+    """Remove a capture that was given up."""
+
+    kind: Literal["drop_dead"] = "drop_dead"
+    capture_id: CaptureId
+
+
+class Purge(BaseRequest):
+    """Remove captures, whatever became of them; repeat while some are left."""
+
+    kind: Literal["purge"] = "purge"
+    capture_id: CaptureId | None = None
+    before: Moment | None = None
+    """What was accepted before this time."""
+    everything: bool = False
+    """Also all that is in quarantine."""
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if (self.capture_id is not None) + (self.before is not None) + self.everything != 1:
+            raise ValueError("expected one of capture_id, before and everything")
+        return self
+
+
+class DeadLetter(BaseModel):
+    """A capture that was given up; its frame is kept."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    sequence: Number
+    capture_id: CaptureId
+    error: Name
+    message: Annotated[str, Field(max_length=300)]
+    """Its first characters."""
+    attempts: Number
+    accepted_at: Name
+    """UTC, ISO 8601."""
+    finished_at: Name
+
+
+class DeadLetters(BaseAnswer):
+    """The answer to `ListDead`."""
+
+    kind: Literal["dead_letters"] = "dead_letters"
+    letters: Annotated[tuple[DeadLetter, ...], Field(max_length=50), FailFast()]
+    """None where there are no more."""
+
+
+class Removed(BaseAnswer):
+    """The answer to `DropDead` and `Purge`."""
+
+    kind: Literal["removed"] = "removed"
+    removed: Number
+    """Captures removed now."""
+    left: bool
+    """More are to be removed: repeat the request."""
 
 
 # --- sensor and worker to hub

@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from denseface.service.protocol.messages import FromHub, Job
+from denseface.service.protocol.message_base import FromHub
+from denseface.service.protocol.messages import Job
 from denseface.service.protocol.payload import Arrays
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet

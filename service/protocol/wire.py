@@ -108,9 +108,7 @@ def decode_from_hub(parts: Sequence[Buffer]) -> Packet:
     return _decode(parts, _FROM_HUB, MAX_HEADER_BYTES)
 
 
-def _decode(
-    parts: Sequence[Buffer], reader: TypeAdapter[_MessageT], most: int
-) -> Packet:
+def _decode(parts: Sequence[Buffer], reader: TypeAdapter[_MessageT], most: int) -> Packet:
     if not 1 <= len(parts) <= MAX_PARTS:
         raise RemoteProtocolError(f"message has {len(parts)} parts, 1 to {MAX_PARTS} expected",
                                   "oversized" if parts else "truncated")

@@ -117,7 +117,7 @@ class AllowList:
         except OSError as error:
             if _out_of_descriptors(error):  # a flood of connections must not revoke keys
                 return self._files or {}
-            self._log.error("allow-list unreadable, nobody is let in", reason=str(error))
+            self._log.error("allow-list unreadable, nobody may connect", reason=str(error))
             return {}
         return files
 

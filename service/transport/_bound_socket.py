@@ -8,8 +8,7 @@ from denseface.service.errors import AddressError
 from denseface.service.monitoring import Rejections
 from denseface.service.security import AllowList, KeyPair
 from denseface.service.transport.handshakes import HandshakeMonitor
-
-__all__ = ["BoundSocket", "ServerCredentials"]
+from denseface.service.transport.sockets import Socket
 
 _HANDSHAKE_MS = 10_000
 """Longest time for a handshake, milliseconds; then libzmq closes the connection."""
@@ -33,8 +32,8 @@ class BoundSocket:
     """
 
     def __init__(
-        self, socket: "zmq.Socket[bytes]", address: str, domain: bytes,
-        credentials: ServerCredentials | None, rejections: Rejections,
+        self, socket: Socket, address: str, domain: bytes, credentials: ServerCredentials | None,
+        rejections: Rejections,
     ) -> None:
         self.socket = socket
         self.monitor: HandshakeMonitor | None = None

@@ -1,4 +1,8 @@
-"""Addresses of the hub: its own, and the one for publications that follows from it."""
+"""Addresses of the hub: its own, and the one for publications that follows from it.
+
+Every function raises AddressError where the address is neither `ipc://` nor `tcp://`, or its path
+or port is impossible.
+"""
 
 import socket
 from ipaddress import ip_address
@@ -18,13 +22,7 @@ _MAX_SOCKET_PATH = 107 - len(_PUBLICATIONS)
 
 
 def socket_file(address: str) -> Path | None:
-    """Give the file of an `ipc://` address, None for `tcp://`.
-
-    Raises
-    ------
-    AddressError
-        Where the address is neither, or its path or port is impossible.
-    """
+    """Give the file of an `ipc://` address, None for `tcp://`."""
     if address.startswith("ipc://"):
         path = Path(address.removeprefix("ipc://"))
         if not path.is_absolute() or len(str(path)) > _MAX_SOCKET_PATH:
@@ -37,13 +35,7 @@ def socket_file(address: str) -> Path | None:
 
 
 def publications_of(address: str) -> str:
-    """Give where the hub of this address publishes: the next port, or the file beside.
-
-    Raises
-    ------
-    AddressError
-        As `socket_file`.
-    """
+    """Give where the hub of this address publishes: the next port, or the file beside."""
     if socket_file(address):
         return address + _PUBLICATIONS
     host, port = _host_and_port(address)
@@ -51,13 +43,7 @@ def publications_of(address: str) -> str:
 
 
 def is_local(address: str) -> bool:
-    """Say whether only this machine reaches an address: `ipc`, or a loopback TCP address.
-
-    Raises
-    ------
-    AddressError
-        As `socket_file`.
-    """
+    """Say whether only this machine reaches an address: `ipc`, or a loopback TCP address."""
     if socket_file(address):
         return True
     try:
@@ -67,14 +53,9 @@ def is_local(address: str) -> bool:
 
 
 def check_bindable(address: str) -> None:
-    """Make the folder of an `ipc` address, and refuse an address that another hub serves.
+    """Make the folder of an `ipc` address.
 
-    Raises
-    ------
-    AddressError
-        As `socket_file`.
-    HubRunningError
-        Where a hub answers there: binding would silently take its place.
+    HubRunningError where another hub answers there: binding would silently take its place.
     """
     path = socket_file(address)
     if path is None:
@@ -91,15 +72,8 @@ def check_bindable(address: str) -> None:
 def check_connectable(address: str) -> None:
     """Refuse a malformed address, and a default one where somebody else might be the hub.
 
-    The folder of the default address is made if it is missing: in a shared temporary folder
-    anyone else could make it, and receive faces.
-
-    Raises
-    ------
-    AddressError
-        As `socket_file`.
-    SettingsError
-        Where the folder is not this user's.
+    The folder of the default address is made if it is missing: in a shared temporary folder anyone
+    else could make it, and receive faces. SettingsError where it is not this user's.
     """
     path = socket_file(address)
     if path and path.parent == runtime_folder():

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Self
 
 import zmq
-from zmq.utils.monitor import parse_monitor_message
+from zmq.utils.monitor import recv_monitor_message
 
 from denseface.service.errors import KeyFileError, KeyRefusedError
 from denseface.service.protocol.wire import Packet, decode_from_hub
 from denseface.service.security import KeyPair, read_pair, read_public
 from denseface.service.settings import ServiceSettings
-from denseface.service.transport.sockets import open_socket
+from denseface.service.transport.sockets import Context, Socket, open_socket
 
 __all__ = ["ConnectionMonitor", "Credentials", "connect", "receive_packet"]
 
@@ -37,12 +37,8 @@ class Credentials:
     def of(cls, settings: ServiceSettings) -> Self | None:
         """Read the keys that the settings name; None where they name none.
 
-        A socket file is local and needs no keys: none are read for it.
-
-        Raises
-        ------
-        KeyFileError
-            Where a file cannot be used, or one of the two is missing.
+        A socket file is local: no keys are read for it. KeyFileError where a key file cannot be
+        used, or one of the two is missing.
         """
         key, hub = settings.key, settings.hub_key
         if settings.address.startswith("ipc://") or (key is None and hub is None):
@@ -52,7 +48,7 @@ class Credentials:
             raise KeyFileError(f"{settings.address}: one key without the other: expected {missing}")
         return cls(read_pair(key), read_public(hub))
 
-    def apply(self, socket: "zmq.Socket[bytes]") -> None:
+    def apply(self, socket: Socket) -> None:
         """Set them on a socket before it connects."""
         socket.set(zmq.CURVE_SERVERKEY, self.hub.encode())
         socket.set(zmq.CURVE_PUBLICKEY, self.pair.public.encode())
@@ -62,7 +58,7 @@ class Credentials:
 class ConnectionMonitor:
     """Reads how a socket's handshakes end and remembers why the last one failed."""
 
-    def __init__(self, socket: "zmq.Socket[bytes]", address: str, keys: Credentials | None) -> None:
+    def __init__(self, socket: Socket, address: str, keys: Credentials | None) -> None:
         self._socket = socket
         self._address = address
         self._keys = keys
@@ -76,7 +72,7 @@ class ConnectionMonitor:
         """Read what happened; True where it is a new refusal."""
         before = str(self.refused)
         while self._monitor.poll(0):
-            event = parse_monitor_message(self._monitor.recv_multipart())
+            event = recv_monitor_message(self._monitor)
             self._note(zmq.Event(event["event"]), event["value"])
         if self._reconnect_at is not None and time.monotonic() >= self._reconnect_at:
             self._reconnect()
@@ -131,8 +127,8 @@ class ConnectionMonitor:
 
 
 def connect(
-    context: "zmq.Context[zmq.Socket[bytes]]", kind: int, address: str, keys: Credentials | None
-) -> "tuple[zmq.Socket[bytes], ConnectionMonitor]":
+    context: Context, kind: int, address: str, keys: Credentials | None
+) -> tuple[Socket, ConnectionMonitor]:
     """Connect a socket to the hub, which may be started later."""
     socket = open_socket(context, kind, address)
     if kind == zmq.DEALER:
@@ -145,12 +141,6 @@ def connect(
     return socket, monitor
 
 
-def receive_packet(socket: "zmq.Socket[bytes]", flags: int = 0) -> Packet:
-    """Receive what the hub sends to a DEALER.
-
-    Raises
-    ------
-    RemoteProtocolError
-        It is malformed.
-    """
+def receive_packet(socket: Socket, flags: int = 0) -> Packet:
+    """Receive what the hub sends to a DEALER; RemoteProtocolError where it is malformed."""
     return decode_from_hub([part.buffer for part in socket.recv_multipart(flags, copy=False)])

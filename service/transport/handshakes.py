@@ -9,9 +9,10 @@ import socket
 from contextlib import suppress
 
 import zmq
-from zmq.utils.monitor import parse_monitor_message
+from zmq.utils.monitor import recv_monitor_message
 
 from denseface.service.monitoring import Rejections
+from denseface.service.transport.sockets import Socket
 
 __all__ = ["HandshakeMonitor", "address_of"]
 
@@ -31,7 +32,7 @@ _DETAILS = {
 class HandshakeMonitor:
     """Counts the failed handshakes of one bound socket."""
 
-    def __init__(self, listening: "zmq.Socket[bytes]", rejections: Rejections) -> None:
+    def __init__(self, listening: Socket, rejections: Rejections) -> None:
         self._rejections = rejections
         self._listening = listening
         self.socket = listening.get_monitor_socket(int(_EVENTS))
@@ -46,10 +47,9 @@ class HandshakeMonitor:
         """Read and count what happened."""
         for _ in range(_BURST):
             try:
-                parts = self.socket.recv_multipart(zmq.DONTWAIT)
+                event = recv_monitor_message(self.socket, zmq.DONTWAIT)
             except zmq.Again:
                 return
-            event = parse_monitor_message(parts)
             self._note(zmq.Event(event["event"]), event["value"])
 
     def forget(self) -> None:
@@ -93,17 +93,15 @@ def address_of(descriptor: int) -> str:
 
     The descriptor may be another file's by now, or that of a socket of another kind.
     """
-    try:
+    with suppress(OSError):
         copy = os.dup(descriptor)
-    except OSError:
-        return "gone"
-    try:
-        connection = socket.socket(fileno=copy)
-    except OSError:
-        os.close(copy)
-        return "gone"
-    with connection, suppress(OSError):
-        if connection.family in (socket.AF_INET, socket.AF_INET6):
-            host, port, *_ = connection.getpeername()
-            return f"{host}:{port}"
+        try:
+            connection = socket.socket(fileno=copy)
+        except OSError:
+            os.close(copy)
+            raise
+        with connection:
+            if connection.family in (socket.AF_INET, socket.AF_INET6):
+                host, port, *_ = connection.getpeername()
+                return f"{host}:{port}"
     return "gone"

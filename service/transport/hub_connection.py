@@ -9,7 +9,8 @@ import structlog
 import zmq
 
 from denseface.service.errors import ProtocolError
-from denseface.service.protocol.messages import Denied, Goodbye, Heartbeat, ToHub
+from denseface.service.protocol.message_base import ToHub
+from denseface.service.protocol.messages import Denied, Goodbye, Heartbeat
 from denseface.service.protocol.payload import Arrays
 from denseface.service.protocol.wire import Packet, encode
 from denseface.service.runtime.background import Background
@@ -17,7 +18,7 @@ from denseface.service.runtime.signals import StopSignal
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable
 from denseface.service.transport.connection import Credentials, connect, receive_packet
-from denseface.service.transport.sockets import send_parts
+from denseface.service.transport.sockets import Context, send_parts
 
 __all__ = ["HubConnection"]
 
@@ -33,7 +34,7 @@ class HubConnection:
         keys = Credentials.of(settings)
         self._heartbeat_s = settings.heartbeat_s
         self._log = structlog.get_logger(name)
-        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._context: Context = zmq.Context()
         self._socket, self._monitor = connect(self._context, zmq.DEALER, settings.address, keys)
         self._denied = ""
 

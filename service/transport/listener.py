@@ -19,15 +19,9 @@ from denseface.service.protocol.wire import MAX_HEADER_BYTES, MAX_PARTS, Buffer
 from denseface.service.security import AllowedKey
 from denseface.service.security.permissions import ALL_ROLES, ROLES_BY_TOPIC
 from denseface.service.security.zap import MESSAGES_DOMAIN, PUBLICATIONS_DOMAIN
+from denseface.service.transport import sockets
 from denseface.service.transport._bound_socket import BoundSocket, ServerCredentials
 from denseface.service.transport.addresses import publications_of, socket_file
-from denseface.service.transport.sockets import (
-    TooLongError,
-    open_socket,
-    publish_parts,
-    receive_parts,
-    send_parts,
-)
 
 __all__ = ["Incoming", "Listener"]
 
@@ -62,21 +56,14 @@ class Incoming:
 
 
 class Listener:
-    """Binds both sockets of one address.
+    """Binds both sockets of one address; AddressError where it cannot be had.
 
-    Parameters
-    ----------
-    credentials : where None, whoever can open the address has every role
-
-    Raises
-    ------
-    AddressError
-        Where the address cannot be had.
+    Where `credentials` is None, whoever can open the address has every role.
     """
 
     def __init__(
-        self, context: "zmq.Context[zmq.Socket[bytes]]", address: str,
-        credentials: ServerCredentials | None, rejections: Rejections,
+        self, context: sockets.Context, address: str, credentials: ServerCredentials | None,
+        rejections: Rejections,
     ) -> None:
         self.address = address
         self._credentials = credentials
@@ -87,9 +74,9 @@ class Listener:
         """Messages with keys that are no longer allowed, since the last tick."""
         self.subscriptions: dict[Topic, int] = dict.fromkeys(Topic, 0)
         """Number of subscriptions to each topic."""
-        router = open_socket(context, zmq.ROUTER, address)
+        router = sockets.open_socket(context, zmq.ROUTER, address)
         router.set(zmq.ROUTER_MANDATORY, 1)
-        publisher = open_socket(context, zmq.XPUB, address)
+        publisher = sockets.open_socket(context, zmq.XPUB, address)
         publisher.set(zmq.XPUB_MANUAL, 1)
         publisher.set(zmq.MAXMSGSIZE, _MAX_SUBSCRIPTION_BYTES)
         if credentials:
@@ -105,7 +92,7 @@ class Listener:
             raise
 
     @property
-    def sockets(self) -> "list[zmq.Socket[bytes]]":
+    def sockets(self) -> list[zmq.Socket[bytes]]:
         """What is to be polled for reading: the ROUTER, then those of `read_events`."""
         both = self._router, self._publisher
         return [*(one.socket for one in both), *(one.monitor.socket for one in both if one.monitor)]
@@ -122,11 +109,11 @@ class Listener:
         """Give the messages that have come, a burst of them at most."""
         for _ in range(_BURST):
             try:
-                first, parts = receive_parts(
+                first, parts = sockets.receive_parts(
                     self._router.socket, MAX_PARTS, MAX_HEADER_BYTES + MAX_PAYLOAD_BYTES)
             except zmq.Again:
                 return
-            except TooLongError as error:
+            except sockets.TooLongError as error:
                 user = self._user(error.first)
                 self._rejections.note("oversized", key=user.name if user else None,
                                       address=_address(error.first), detail=str(error))
@@ -143,10 +130,10 @@ class Listener:
                 one.monitor.read()
         for _ in range(_BURST):
             try:
-                first, _ = receive_parts(self._publisher.socket, 0, 0)
+                first, _ = sockets.receive_parts(self._publisher.socket, 0, 0)
             except zmq.Again:
                 return
-            except TooLongError as error:
+            except sockets.TooLongError as error:
                 self._rejections.note("malformed", address=_address(error.first),
                                       detail="sent to the publications")
                 continue
@@ -157,7 +144,7 @@ class Listener:
         if not self.is_allowed(peer):
             return False
         try:
-            return send_parts(self._router.socket, [peer[_TOKEN_BYTES:], *parts])
+            return sockets.send_parts(self._router.socket, [peer[_TOKEN_BYTES:], *parts])
         except zmq.ZMQError as error:
             if error.errno != zmq.EHOSTUNREACH:
                 raise
@@ -165,7 +152,7 @@ class Listener:
 
     def publish(self, topic: Topic, parts: Sequence[Buffer]) -> bool:
         """Send to all who subscribed to a topic; False where one at least could not take it."""
-        return publish_parts(self._publisher.socket, [topic.encode(), *parts])
+        return sockets.publish_parts(self._publisher.socket, [topic.encode(), *parts])
 
     def is_allowed(self, peer: bytes) -> bool:
         """Say whether a peer's key is allowed still, with the roles that it had."""

@@ -18,6 +18,7 @@ from denseface.service.settings import ServiceSettings
 from denseface.service.transport._bound_socket import ServerCredentials
 from denseface.service.transport.addresses import check_bindable, is_local, socket_file
 from denseface.service.transport.listener import Incoming, Listener
+from denseface.service.transport.sockets import Context
 
 __all__ = ["Listeners", "server_credentials"]
 
@@ -27,21 +28,15 @@ class _Pollable(Protocol):
 
 
 class Listeners:
-    """Listens at every address that the settings name.
+    """Listens at every address that the settings name; `receive` waits for `wakes` too.
 
-    Parameters
-    ----------
-    wakes : what `receive` waits for too
-
-    Raises
-    ------
-    AddressError, KeyFileError, HubRunningError
-        Where an address cannot be had, or other machines could reach it and there are no keys.
+    AddressError, KeyFileError or HubRunningError where an address cannot be had, or other machines
+    could reach it and there are no keys.
     """
 
     def __init__(
-        self, context: "zmq.Context[zmq.Socket[bytes]]", settings: ServiceSettings,
-        rejections: Rejections, wakes: Sequence[_Pollable],
+        self, context: Context, settings: ServiceSettings, rejections: Rejections,
+        wakes: Sequence[_Pollable],
     ) -> None:
         self._allow_list: AllowList | None = None
         self._changes = 0
@@ -115,10 +110,8 @@ class Listeners:
     def receive(self, timeout_ms: int) -> Iterator[Incoming]:
         """Wait, then give the messages that have come.
 
-        Raises
-        ------
-        AuthenticatorStoppedError
-            libzmq refuses every new connection until the hub is started again.
+        AuthenticatorStoppedError where libzmq refuses every new connection until the hub is started
+        again.
         """
         if self._authenticator and self._authenticator.socket.closed:
             raise AuthenticatorStoppedError(
@@ -160,19 +153,15 @@ def _guarded_addresses(settings: ServiceSettings) -> list[str]:
     for address in settings.listen:
         if socket_file(address):
             raise AddressError(f"{address}: --listen expects tcp://HOST:PORT")
-    return [*settings.listen] if is_local(settings.address) else [
-        settings.address, *settings.listen]
+    own = [] if is_local(settings.address) else [settings.address]
+    return [*own, *settings.listen]
 
 
 def server_credentials(settings: ServiceSettings) -> ServerCredentials:
     """Read the hub's key pair and its allow-list.
 
-    Raises
-    ------
-    AddressError
-        Where there is no hub key, or no key is allowed.
-    KeyFileError
-        Where the hub's key cannot be used.
+    AddressError where there is no hub key or no key is allowed, KeyFileError where the hub's key
+    cannot be used.
     """
     address = _guarded_addresses(settings)[0]
     path = settings.key or settings.keys / f"{HUB_NAME}.secret"

@@ -8,7 +8,11 @@ from denseface.service.errors import RemoteProtocolError
 from denseface.service.protocol.payload import MAX_ARRAY_BYTES
 from denseface.service.protocol.wire import Buffer
 
-__all__ = ["TooLongError", "open_socket", "publish_parts", "receive_parts", "send_parts"]
+__all__ = ["Context", "Socket", "TooLongError", "open_socket", "publish_parts", "receive_parts",
+           "send_parts"]
+
+Socket = zmq.Socket[bytes]
+Context = zmq.Context[Socket]
 
 _HIGH_WATER_MARK = 16
 """Messages that may wait in one direction for one peer, some of many megabytes; beyond it they
@@ -20,21 +24,15 @@ _RECONNECT_MS, _RECONNECT_MAX_MS = 50, 500
 
 
 class TooLongError(RemoteProtocolError):
-    """A message had more parts or bytes than it may; all of it was dropped.
-
-    Attributes
-    ----------
-    first : its first part, which carries what libzmq knows of the sender
-    """
+    """A message had more parts or bytes than it may; all of it was dropped."""
 
     def __init__(self, message: str, first: zmq.Frame) -> None:
         super().__init__(message, "oversized")
         self.first = first
+        """Its first part, which carries what libzmq knows of the sender."""
 
 
-def open_socket(
-    context: "zmq.Context[zmq.Socket[bytes]]", kind: int, address: str
-) -> "zmq.Socket[bytes]":
+def open_socket(context: Context, kind: int, address: str) -> Socket:
     """Make a socket for an address, with high-water marks, linger and size limit set."""
     socket = context.socket(kind)
     if address.startswith("tcp://["):
@@ -48,7 +46,7 @@ def open_socket(
     return socket
 
 
-def send_parts(socket: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bool:
+def send_parts(socket: Socket, parts: Sequence[Buffer]) -> bool:
     """Send without waiting; False where nobody can take it now.
 
     Large parts are not copied and must not be changed afterwards.
@@ -60,7 +58,7 @@ def send_parts(socket: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bool:
     return True
 
 
-def publish_parts(publisher: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bool:
+def publish_parts(publisher: Socket, parts: Sequence[Buffer]) -> bool:
     """Send to all subscribers of an XPUB; False where a subscriber's queue was found full.
 
     The others get the message all the same. libzmq skips a full queue unseen until half of it was
@@ -79,19 +77,11 @@ def publish_parts(publisher: "zmq.Socket[bytes]", parts: Sequence[Buffer]) -> bo
     return True
 
 
-def receive_parts(
-    socket: "zmq.Socket[bytes]", most: int, most_bytes: int
-) -> tuple[zmq.Frame, list[zmq.Frame]]:
+def receive_parts(socket: Socket, most: int, most_bytes: int) -> tuple[zmq.Frame, list[zmq.Frame]]:
     """Receive without waiting: the first part with its properties, and those that follow it.
 
-    What is beyond the limits is received and dropped.
-
-    Raises
-    ------
-    zmq.Again
-        Where there is none.
-    TooLongError
-        Where more than `most` parts or `most_bytes` bytes follow the first.
+    zmq.Again where there is none, TooLongError where more than `most` parts or `most_bytes` bytes
+    follow the first: all of them are received and dropped.
     """
     first = frame = socket.recv(zmq.DONTWAIT, copy=False, track=False)
     parts: list[zmq.Frame] = []

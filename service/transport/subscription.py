@@ -7,7 +7,7 @@ from denseface.service.protocol.payload import MAX_PAYLOAD_BYTES
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import MAX_HEADER_BYTES, MAX_PARTS, Packet, decode_from_hub
 from denseface.service.transport.connection import Credentials, connect
-from denseface.service.transport.sockets import receive_parts
+from denseface.service.transport.sockets import Context, receive_parts
 
 __all__ = ["CHECK_INTERVAL_S", "Subscription"]
 
@@ -19,7 +19,7 @@ class Subscription:
     """Subscribes to topics of the publications at an address."""
 
     def __init__(
-        self, context: "zmq.Context[zmq.Socket[bytes]]", address: str, keys: Credentials | None,
+        self, context: Context, address: str, keys: Credentials | None,
         topics: tuple[Topic, ...],
     ) -> None:
         self.socket, self.monitor = connect(context, zmq.SUB, address, keys)
@@ -33,13 +33,7 @@ class Subscription:
             self.socket.close(linger=0)
 
     def receive(self) -> Packet | None:
-        """Give what has come; None where it is malformed.
-
-        Raises
-        ------
-        zmq.Again
-            Nothing has come.
-        """
+        """Give what has come, None where it is malformed; zmq.Again where nothing has."""
         try:
             _, parts = receive_parts(self.socket, MAX_PARTS, MAX_HEADER_BYTES + MAX_PAYLOAD_BYTES)
             return decode_from_hub([part.buffer for part in parts])

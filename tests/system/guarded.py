@@ -16,6 +16,7 @@ from zmq.utils.monitor import parse_monitor_message
 
 from denseface.service.client import Client
 from denseface.service.protocol import messages
+from denseface.service.protocol.message_base import BaseMessage, BaseRequest
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.roles import Role
 from denseface.service.protocol.wire import Packet, decode_from_hub, encode
@@ -51,7 +52,7 @@ class Peer:
         self.monitor = self.socket.get_monitor_socket()
         self.socket.connect(address)
 
-    def send(self, message: messages.BaseMessage, arrays=None) -> None:
+    def send(self, message: BaseMessage, arrays=None) -> None:
         self.socket.send_multipart(encode(Packet(message, arrays or {})))
 
     def receive(self, kind: str) -> Packet:
@@ -62,7 +63,7 @@ class Peer:
                 return packet
         raise AssertionError(f"no {kind} came")
 
-    def request(self, message: messages.BaseRequest) -> messages.BaseMessage:
+    def request(self, message: BaseRequest) -> BaseMessage:
         self.send(message)
         while self.socket.poll(LIMIT_MS):
             answer = decode_from_hub(self.socket.recv_multipart()).message

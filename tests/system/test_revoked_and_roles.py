@@ -12,6 +12,7 @@ import zmq
 from denseface.service.client import Operator
 from denseface.service.errors import ClientTimeoutError, KeyRefusedError
 from denseface.service.protocol import messages
+from denseface.service.protocol.message_base import BaseRequest
 from denseface.service.protocol.roles import Role
 from denseface.service.protocol.wire import Packet, encode
 from denseface.service.security import revoke
@@ -158,7 +159,7 @@ def test_the_wrong_role_is_told_so(hub, connect, refused, role, message):
         _foreign(hub, connect)
     peer = connect(*as_role(hub, role))
     peer.send(message)
-    kind = "request_failed" if isinstance(message, messages.BaseRequest) else "denied"
+    kind = "request_failed" if isinstance(message, BaseRequest) else "denied"
     said = peer.receive(kind).message.message
     assert said.startswith(f"refused: {message.kind} needs the role ")
     assert said.endswith(f"the key {role} has {role}")

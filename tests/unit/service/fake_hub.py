@@ -9,6 +9,7 @@ import numpy as np
 import zmq
 
 from denseface.service.protocol import messages
+from denseface.service.protocol.message_base import BaseMessage
 from denseface.service.protocol.payload import FaceHeader, PreviewHeader
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, decode_to_hub, encode
@@ -94,7 +95,7 @@ class FakeHub:
                             self._router.send_multipart([peer, *encode(answer)])
                 self._changed.notify_all()
 
-    def _answers(self, message: messages.BaseMessage) -> Iterator[Packet]:
+    def _answers(self, message: BaseMessage) -> Iterator[Packet]:
         request = getattr(message, "request", 0)
         match message:
             case messages.Press(capture_id=capture_id):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from denseface.recon.settings import Settings
 from denseface.service.hub import Hub, settings_hash
 from denseface.service.protocol import messages
+from denseface.service.protocol.message_base import BaseMessage
 from denseface.service.protocol.outgoing import Output, Publish, Send
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.topics import Topic
@@ -30,16 +31,16 @@ class Bench:
     hub: Hub
     store: FolderStore
     now: float = 100.0
-    published: list[messages.BaseMessage] = field(default_factory=list)
+    published: list[BaseMessage] = field(default_factory=list)
 
-    def say(self, peer: bytes, message, arrays=None) -> list[tuple[bytes, messages.BaseMessage]]:
+    def say(self, peer: bytes, message, arrays=None) -> list[tuple[bytes, BaseMessage]]:
         return self._sent(self.hub.receive(self.now, peer, Packet(message, arrays or {})))
 
-    def wait(self, seconds: float) -> list[tuple[bytes, messages.BaseMessage]]:
+    def wait(self, seconds: float) -> list[tuple[bytes, BaseMessage]]:
         self.now += seconds
         return self._sent(self.hub.tick(self.now))
 
-    def _sent(self, outputs: list[Output]) -> list[tuple[bytes, messages.BaseMessage]]:
+    def _sent(self, outputs: list[Output]) -> list[tuple[bytes, BaseMessage]]:
         self.published += [one.packet.message for one in outputs
                            if isinstance(one, Publish) and one.topic is Topic.FACES]
         return [(one.peer, one.packet.message) for one in outputs if isinstance(one, Send)]
