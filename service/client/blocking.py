@@ -37,7 +37,8 @@ class Client(Closing, BaseClient):
     key, hub_key : files of one's own secret key and of the hub's public one, for a hub elsewhere;
         where None, `DENSEFACE_KEY` and `DENSEFACE_HUB_KEY`
 
-    Every call raises `KeyRefusedError` where the hub refuses this key.
+    Every call raises `KeyRefusedError` where the hub refuses this key, and `ClientTimeoutError`
+    where nothing came in `timeout` seconds.
 
     Raises
     ------
@@ -57,7 +58,6 @@ class Client(Closing, BaseClient):
         ----------
         capture_id : letters, digits, `-`, `_`, at most 64; pressing an id again is the same
             capture; where None, a new one
-        timeout : seconds
 
         Raises
         ------
@@ -79,8 +79,6 @@ class Client(Closing, BaseClient):
             The capture ended without a face.
         UnknownCaptureError
             The hub has no such capture.
-        ClientTimeoutError
-            It is not finished in `timeout` seconds.
         """
         return self._run(self._exchanges.get(capture_id, timeout))
 
@@ -112,8 +110,6 @@ class Client(Closing, BaseClient):
 
         Raises
         ------
-        ClientTimeoutError
-            Nothing came in `timeout` seconds.
         LocalProtocolError
             More than one start is given, `last` is not positive or `since` has no zone.
         """
@@ -127,16 +123,8 @@ class Client(Closing, BaseClient):
         """Follow what the sensor sees, ten times a second at most: always the newest.
 
         Nothing is kept of them: what does not come in time is skipped. A live sensor shows its
-        newest picture, a recording the one that the next press gives.
-
-        Parameters
-        ----------
-        timeout : longest wait for the next one, seconds; where None, for ever
-
-        Raises
-        ------
-        ClientTimeoutError
-            Nothing came in `timeout` seconds.
+        newest picture, a recording the one that the next press gives. `timeout` is the longest wait
+        for the next one, seconds; where None, for ever.
         """
         with closing(self._subscribe(Topic.PREVIEW)) as subscription:
             while True:
@@ -148,13 +136,7 @@ class Client(Closing, BaseClient):
                 yield preview
 
     def status(self, *, timeout: float = 5.0) -> Status:
-        """Ask who is there and what was done.
-
-        Raises
-        ------
-        ClientTimeoutError
-            The hub did not answer.
-        """
+        """Ask who is there and what was done."""
         return self._run(self._exchanges.status(timeout))
 
     def _run(self, exchange: Exchange[_T], subscription: Subscription | None = None) -> _T:

@@ -14,13 +14,7 @@ class Operator(Client):
     """A `Client` that may also remove."""
 
     def dead(self, *, timeout: float = 5.0) -> Iterator[messages.DeadLetter]:
-        """List the captures that were given up and are kept, by sequence number.
-
-        Raises
-        ------
-        ClientTimeoutError
-            The hub did not answer in `timeout` seconds; so for every call.
-        """
+        """List the captures that were given up and are kept, by sequence number."""
         after = 0
         while True:
             answer = self._send_request(messages.ListDead(

@@ -35,8 +35,7 @@ class Captures:
         return (self.state(capture_id), event) in TRANSITIONS
 
     def advance(self, capture_id: str, event: CaptureEvent) -> None:
-        """Change a state by an event that changes no row; TransitionError where it cannot happen.
-        """
+        """Change a state by an event that changes no row; TransitionError where it cannot be."""
         self._note(capture_id, advance(self.state(capture_id), event))
 
     @contextmanager
@@ -55,33 +54,30 @@ class Captures:
     ) -> Iterator[tuple[WriteResult, Exception | None]]:
         """Give written files their rows, and yield each with its error or None; errors come first.
 
-        Parameters
-        ----------
-        event : FRAME_SAVED or FACE_SAVED
+        The event is FRAME_SAVED or FACE_SAVED.
         """
         yield from ((one, one.error) for one in written if one.error)
-        good = [one for one in written if one.error is None]
-        if len(good) > 1:  # one sync of the database for all
-            try:
-                self._write_rows(event, good)
-            except StoreError as error:
-                structlog.get_logger("hub").warning(
-                    "rows are written one by one", reason=str(error))
-            else:
-                yield from ((one, None) for one in good)
-                return
-        for one in good:
-            try:
-                self._write_rows(event, [one])
-            except StoreError as error:
-                yield one, error
-            else:
-                yield one, None
+        if good := [one for one in written if one.error is None]:
+            yield from self._save_rows(event, good)
 
-    def _write_rows(self, event: CaptureEvent, written: Sequence[WriteResult]) -> None:
-        write = (self._store.accept if event is CaptureEvent.FRAME_SAVED else self._store.finish)
-        with self.transition(event, *(one.pending.capture_id for one in written)) as state:
-            write(written, state)
+    def _save_rows(
+        self, event: CaptureEvent, written: Sequence[WriteResult]
+    ) -> Iterator[tuple[WriteResult, StoreError | None]]:
+        """Write rows with one sync of the database, or one by one where that fails."""
+        write = self._store.accept if event is CaptureEvent.FRAME_SAVED else self._store.finish
+        try:
+            with self.transition(event, *(one.pending.capture_id for one in written)) as state:
+                write(written, state)
+        except StoreError as error:
+            if len(written) == 1:
+                yield written[0], error
+                return
+            structlog.get_logger("hub").warning("rows are written one by one", reason=str(error))
+        else:
+            yield from ((one, None) for one in written)
+            return
+        for one in written:
+            yield from self._save_rows(event, [one])
 
     def _note(self, capture_id: str, state: CaptureState) -> None:
         if state in IN_MEMORY:

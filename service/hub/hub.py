@@ -85,16 +85,13 @@ class Hub:
     def receive(self, now: float, peer: bytes, packet: Packet, key: str = "") -> list[Output]:
         """Handle one message and return what to send.
 
+        DamagedDatabaseError where the hub must end; the next one rebuilds the database.
+
         Parameters
         ----------
         now : seconds, of a monotonic clock
         peer : routing id of the sender's connection
         key : fingerprint of the sender's key; empty where it needed none
-
-        Raises
-        ------
-        DamagedDatabaseError
-            The hub must end; the next one rebuilds the database.
         """
         outputs: list[Output] = []
         try:

@@ -20,6 +20,8 @@ from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.storage import CaptureRow, WriteResult
 
+_Answer = messages.Result | messages.JobFailed
+
 _LOST = ("WorkerLost", "the worker that held it went away")
 """Error and reason of a job whose worker is gone."""
 _RETRY_S = 1.0
@@ -33,16 +35,14 @@ class Jobs:
         self, common: Common, publish: Callable[[str], Iterator[Output]], rejections: Rejections
     ) -> None:
         """Queue what the store has unfinished; `publish` publishes a capture's outcome."""
-        self._store = common.store
-        self._captures = common.captures
-        self._peers = common.peers
-        self._attempts = common.settings.attempts
+        self._store, self._captures, writer, self._peers, settings = common
+        self._attempts = settings.attempts
         self._publish = publish
         self._rejections = rejections
-        self._queue = deque(common.store.unfinished())
+        self._queue = deque(self._store.unfinished())
         self._last_errors: dict[str, tuple[str, str]] = {}
         """Error and reason of the last attempt that failed, for a dead letter."""
-        self._unsaved_faces = UnsavedFaces(common.store, common.writer)
+        self._unsaved_faces = UnsavedFaces(self._store, writer)
         self._paused_until = 0.0
         self._log = structlog.get_logger("hub")
         if self._queue:
@@ -242,9 +242,7 @@ class Jobs:
             self._last_errors[capture_id] = error, reason
             self._queue.appendleft(capture_id)
 
-    def _take_answer(
-        self, peer: bytes, answer: messages.Result | messages.JobFailed, event: CaptureEvent
-    ) -> bool:
+    def _take_answer(self, peer: bytes, answer: _Answer, event: CaptureEvent) -> bool:
         """Take an answered job from its worker and say whether the answer is expected."""
         capture_id = answer.capture_id
         useful = self._is_expected(answer, event)
@@ -262,9 +260,7 @@ class Jobs:
                 "replayed", capture_id=capture_id, detail=f"{event}, not asked for")
         return useful
 
-    def _is_expected(
-        self, answer: messages.Result | messages.JobFailed, event: CaptureEvent
-    ) -> bool:
+    def _is_expected(self, answer: _Answer, event: CaptureEvent) -> bool:
         stored = self._store.find(answer.capture_id)
         asked = stored and (stored.settings_hash, stored.frame_sha256)
         return (asked == (answer.settings_hash, answer.frame_sha256)

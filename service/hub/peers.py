@@ -54,12 +54,11 @@ class Peers:
         self.sensors[peer] = SensorPeer(peer, name, now)
         return new
 
-    def worker_ready(self, peer: bytes, name: str, credit: int, now: float) -> WorkerPeer:
+    def worker_ready(self, peer: bytes, name: str, credit: int, now: float) -> None:
         """Mark a worker as free, unless this credit was used before."""
         worker = self.workers.setdefault(peer, WorkerPeer(peer, name, now))
         if credit > worker.credit:
             worker.credit, worker.free, worker.seen = credit, True, now
-        return worker
 
     def heartbeat(self, peer: bytes, holding: str | None, now: float) -> bool:
         """Note a heartbeat; False where the peer has to say that it is ready.

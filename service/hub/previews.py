@@ -18,12 +18,7 @@ PREVIEW_PERIOD_S = 0.1
 
 
 class Previews:
-    """Asks the sensor for previews and publishes them.
-
-    Parameters
-    ----------
-    timeout_s : after which a preview that did not come is asked for again, seconds
-    """
+    """Asks the sensor for previews and publishes them; again after `timeout_s` without one."""
 
     def __init__(self, peers: Peers, timeout_s: float) -> None:
         self._peers = peers

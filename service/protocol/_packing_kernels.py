@@ -4,8 +4,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["pack", "to_float16_bits"]
-
 
 # Without the GIL: another thread computes the next face meanwhile.
 @njit(cache=True, nogil=True)

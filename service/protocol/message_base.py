@@ -7,9 +7,6 @@ from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, FailF
 
 from denseface.service.protocol.payload import Payload
 
-__all__ = ["BaseAnswer", "BaseMessage", "BaseRequest", "CaptureId", "Digest", "FromHub", "Moment",
-           "Name", "Names", "Number", "PeerName", "Seconds", "Text", "ToHub", "Token"]
-
 CaptureId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
 """Chosen by whoever pressed; also part of file names, hence no dots and no slashes."""
 
@@ -54,7 +51,7 @@ class BaseMessage(BaseModel):
     @property
     def payload(self) -> Payload | None:
         """The part of this header that describes the arrays behind it."""
-        return None
+        return next((one for _, one in self if isinstance(one, Payload)), None)
 
 
 class ToHub(BaseMessage):

@@ -35,28 +35,8 @@ PressReason = Literal["no_sensor", "sensor", "sensor_gone", "timeout", "queue", 
 """Why there is no capture; a label of the metric of refused presses."""
 
 
-class _WithFrame(BaseMessage):
-    frame: FrameHeader
-
-    @property
-    def payload(self) -> FrameHeader:
-        return self.frame
-
-
 class _WithFace(BaseMessage):
     face: FaceHeader
-
-    @property
-    def payload(self) -> FaceHeader:
-        return self.face
-
-
-class _WithPreview(BaseMessage):
-    preview: PreviewHeader
-
-    @property
-    def payload(self) -> PreviewHeader:
-        return self.preview
 
 
 # --- client to hub
@@ -185,9 +165,10 @@ class CaptureFailed(_Outcome):
     """Given up after repeated attempts; the frame is kept."""
 
 
-class Preview(_WithPreview, FromHub):
+class Preview(FromHub):
     """What the sensor sees: published on topic `preview` and not stored."""
 
+    preview: PreviewHeader
     kind: Literal["preview"] = "preview"
     epoch: Token
     """Names the hub's process, which numbers previews."""
@@ -302,9 +283,10 @@ class Goodbye(ToHub):
     kind: Literal["goodbye"] = "goodbye"
 
 
-class Frame(_WithFrame, ToHub):
+class Frame(ToHub):
     """The frame that was asked for."""
 
+    frame: FrameHeader
     kind: Literal["frame"] = "frame"
     capture_id: CaptureId
 
@@ -317,9 +299,10 @@ class FrameFailed(ToHub):
     message: Text
 
 
-class PreviewFrame(_WithPreview, ToHub):
+class PreviewFrame(ToHub):
     """The preview that was asked for."""
 
+    preview: PreviewHeader
     kind: Literal["preview_frame"] = "preview_frame"
 
 
@@ -390,9 +373,10 @@ class FrameRefused(FromHub):
     message: Text
 
 
-class Job(_WithFrame, FromHub):
+class Job(FromHub):
     """Make a face of this frame."""
 
+    frame: FrameHeader
     kind: Literal["job"] = "job"
     capture_id: CaptureId
     attempt: Number

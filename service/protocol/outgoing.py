@@ -9,8 +9,6 @@ from denseface.service.protocol.payload import Arrays
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 
-__all__ = ["Output", "Publish", "Send", "send", "steps"]
-
 
 @dataclass(frozen=True)
 class Send:

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from denseface.recon.face import DenseCloud
 
-__all__ = ["PackedCloud", "pack", "unpack", "warm_packing"]
-
 _UNIT = 32767
 """Stands for 1 in a normal's component."""
 _SIGMA_MM = 1e-4, 65e3
@@ -35,11 +33,8 @@ class PackedCloud:
     sigma : (n,) float16, mm
     grid_shape, grid_step_mm : as of the cloud
 
-    Raises
-    ------
-    ValueError
-        Where a coordinate is not finite, sigma not positive, or there are not as many points as
-        places with one.
+    ValueError where a coordinate is not finite, sigma not positive, or there are not as many points
+    as places with one.
     """
 
     support: NDArray[np.uint8]
@@ -74,11 +69,8 @@ _INFINITE = int(np.array(np.inf, np.float16).view(np.uint16))
 def pack(cloud: DenseCloud) -> PackedCloud:
     """Pack a cloud.
 
-    Raises
-    ------
-    ValueError
-        Where a point is not at its place on a grid, they are not sorted, a normal points away from
-        the camera, or sigma is beyond what 16 bits hold in full (0.0001 to 65,000 mm).
+    ValueError where a point is not at its place on a grid, they are not sorted, a normal points
+    away from the camera, or sigma is beyond what 16 bits hold in full (0.0001 to 65,000 mm).
     """
     # Importing numba takes most of a second, which a reader of faces need not wait for.
     from denseface.service.protocol import _packing_kernels

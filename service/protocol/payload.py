@@ -17,9 +17,6 @@ from denseface.recon.face import Face, PointCloud, Report
 from denseface.service.errors import LocalProtocolError, RemoteProtocolError
 from denseface.service.protocol.packing import PackedCloud, pack, unpack
 
-__all__ = ["MAX_ARRAY_BYTES", "MAX_PAYLOAD_BYTES", "MAX_PREVIEW_SIDE", "ArrayInfo", "Arrays",
-           "FaceHeader", "FrameHeader", "Payload", "PreviewHeader"]
-
 MAX_ARRAY_BYTES = 32 * 2**20
 """Largest single array; also MAXMSGSIZE of every socket."""
 MAX_PAYLOAD_BYTES = 96 * 2**20
@@ -40,10 +37,6 @@ _ITEM_BYTES = {"<u2": 2, "|u1": 1, "<f4": 4, "<i2": 2, "<f2": 2}
 """Size of one element of each dtype."""
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
 @dataclass(frozen=True)
 class ArrayInfo:
     """One raw buffer: little-endian, C order."""
@@ -61,7 +54,9 @@ class ArrayInfo:
         return _ITEM_BYTES[self.dtype] * math.prod(self.shape)
 
 
-class _PayloadHeader(_Model):
+class _PayloadHeader(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
     arrays: Annotated[tuple[ArrayInfo, ...], Field(max_length=16), FailFast()] = ()
     """The buffers that follow, in order; filled in from `layout` where not given."""
 
@@ -76,12 +71,11 @@ class _PayloadHeader(_Model):
             object.__setattr__(self, "arrays", expected)
         elif self.arrays != expected:
             raise ValueError(f"arrays must be {_names(expected)}, found {_names(self.arrays)}")
-        sizes = [info.nbytes for info in expected]
-        for info, size in zip(expected, sizes, strict=True):
-            if size > MAX_ARRAY_BYTES:
+        for info in expected:
+            if info.nbytes > MAX_ARRAY_BYTES:
                 raise ValueError(
-                    f"array {info.name} has {size} bytes, at most {MAX_ARRAY_BYTES} allowed")
-        total = sum(sizes)
+                    f"array {info.name} has {info.nbytes} bytes, at most {MAX_ARRAY_BYTES} allowed")
+        total = sum(info.nbytes for info in expected)
         if total > MAX_PAYLOAD_BYTES:
             raise ValueError(f"arrays have {total} bytes, at most {MAX_PAYLOAD_BYTES} allowed")
         return self
@@ -113,13 +107,7 @@ class FrameHeader(_PayloadHeader):
         return header, {"depth": frame.depth, "color": frame.color}
 
     def join(self, arrays: Arrays) -> RgbdFrame:
-        """Put the frame together again.
-
-        Raises
-        ------
-        RemoteProtocolError
-            Where header and arrays do not make a frame.
-        """
+        """Put the frame together again; RemoteProtocolError where they do not make one."""
         try:
             return RgbdFrame(
                 arrays["depth"], arrays["color"], self.depth_timestamp_us, self.color_timestamp_us,
@@ -161,23 +149,16 @@ class FaceHeader(_PayloadHeader):
 
     @classmethod
     def of(cls, face: Face) -> tuple[Self, Arrays]:
-        """Take a face apart.
-
-        Raises
-        ------
-        LocalProtocolError
-            Where its dense cloud cannot be packed: `service.protocol.packing.pack`.
-        """
-        initial = face.initial
+        """Take a face apart; LocalProtocolError where its dense cloud cannot be packed."""
         try:
             dense = pack(face.dense)
         except ValueError as error:
             raise LocalProtocolError(f"face: {error}") from error
         header = cls(
-            report=face.report, initial_points=len(initial), dense_points=len(dense.z),
+            report=face.report, initial_points=len(face.initial), dense_points=len(dense.z),
             grid_shape=dense.grid_shape, grid_step_mm=dense.grid_step_mm)
         return header, {
-            "initial_points": initial.points, "initial_colors": initial.colors,
+            "initial_points": face.initial.points, "initial_colors": face.initial.colors,
             "dense_support": dense.support, "dense_x": dense.x, "dense_y": dense.y,
             "dense_z": dense.z, "dense_colors": dense.colors, "dense_normals": dense.normals,
             "dense_sigma": dense.sigma}
@@ -189,10 +170,7 @@ class FaceHeader(_PayloadHeader):
     def join(self, arrays: Arrays) -> Face:
         """Put the face together again.
 
-        Raises
-        ------
-        RemoteProtocolError
-            Where header and arrays do not make a face, or a coordinate is not finite.
+        RemoteProtocolError where header and arrays make none, or a coordinate is not finite.
         """
         initial, dense = self._clouds(arrays)
         return Face(initial, unpack(dense), self.report)

@@ -2,8 +2,6 @@
 
 from enum import StrEnum
 
-__all__ = ["Role"]
-
 
 class Role(StrEnum):
     """What a key is for; what each may say is in `service.protocol.messages.TO_HUB`."""

@@ -6,8 +6,6 @@ does the store where it makes rows again from files.
 
 from enum import StrEnum
 
-__all__ = ["IN_MEMORY", "TRANSITIONS", "CaptureEvent", "CaptureState", "TransitionError", "advance"]
-
 
 class CaptureState(StrEnum):
     """Where a capture stands. From ACCEPTED on it is on the disk."""
@@ -117,13 +115,7 @@ class TransitionError(RuntimeError):
 
 
 def advance(state: CaptureState | None, event: CaptureEvent) -> CaptureState:
-    """Give the state after an event.
-
-    Raises
-    ------
-    TransitionError
-        Where the event cannot happen in this state.
-    """
+    """Give the state after an event; TransitionError where it cannot happen in this state."""
     try:
         return TRANSITIONS[state, event]
     except KeyError:

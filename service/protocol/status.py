@@ -6,8 +6,6 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from denseface.service.protocol.message_base import BaseAnswer, Name, Names, Number, Token
 
-__all__ = ["Latency", "Status"]
-
 _TimeS = Annotated[float, Field(ge=0)]
 _Counts = Annotated[dict[Name, Number], Field(default_factory=dict, max_length=64)]
 

@@ -2,8 +2,6 @@
 
 from enum import StrEnum
 
-__all__ = ["Topic"]
-
 
 class Topic(StrEnum):
     """What may be subscribed to."""

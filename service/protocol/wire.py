@@ -18,9 +18,6 @@ from denseface.service.protocol.message_base import BaseMessage, FromHub, ToHub
 from denseface.service.protocol.messages import FROM_HUB, TO_HUB
 from denseface.service.protocol.payload import Arrays
 
-__all__ = ["MAX_HEADER_BYTES", "MAX_HEADER_BYTES_TO_HUB", "MAX_PARTS", "Buffer", "Packet",
-           "decode_from_hub", "decode_stored", "decode_to_hub", "encode"]
-
 MAX_HEADER_BYTES = 256 * 1024
 """Longest header, from the hub or stored, bytes."""
 MAX_HEADER_BYTES_TO_HUB = 64 * 1024
@@ -55,17 +52,14 @@ class Packet:
 def encode(packet: Packet) -> list[Buffer]:
     """Write a message: bytes for the header, views of the arrays' memory behind it.
 
-    Raises
-    ------
-    LocalProtocolError
-        Where the arrays are not those that the header describes, or the header is too long.
+    LocalProtocolError where the arrays are not those that the header describes, or it is too long.
     """
     message, arrays = packet.message, packet.arrays
     header = message.model_dump_json().encode()
     if len(header) > MAX_HEADER_BYTES:
         raise LocalProtocolError(
             f"{message.kind}: header has {len(header)} bytes, at most {MAX_HEADER_BYTES} allowed")
-    infos = message.payload.arrays if message.payload else ()
+    infos = payload.arrays if (payload := message.payload) else ()
     if set(arrays) != {info.name for info in infos}:
         raise LocalProtocolError(
             f"{message.kind}: arrays {sorted(arrays)} given, "
@@ -84,16 +78,10 @@ def _raw(array: NDArray[Any]) -> memoryview:
 
 
 def decode_to_hub(parts: Sequence[Buffer]) -> Packet:
-    """Read a message that the hub may receive.
+    """Read a message that the hub may receive: its header, then one buffer for each array.
 
-    Parameters
-    ----------
-    parts : header, then one buffer for each array; arrays of the result are read-only views
-
-    Raises
-    ------
-    RemoteProtocolError
-        Where a limit is exceeded, or a field, dtype, shape or size is wrong.
+    Arrays of the result are read-only views. RemoteProtocolError where a limit is exceeded, or a
+    field, dtype, shape or size is wrong.
     """
     return _decode(parts, _TO_HUB, MAX_HEADER_BYTES_TO_HUB)
 
@@ -117,7 +105,7 @@ def _decode(parts: Sequence[Buffer], reader: TypeAdapter[_MessageT], most: int) 
         raise RemoteProtocolError(
             f"header has {len(header)} bytes, at most {most} allowed", "oversized")
     message = _header(bytes(header), reader)
-    infos = message.payload.arrays if message.payload else ()
+    infos = payload.arrays if (payload := message.payload) else ()
     if len(buffers) != len(infos):
         raise RemoteProtocolError(
             f"{message.kind}: {len(buffers)} arrays follow, {len(infos)} announced", "truncated")

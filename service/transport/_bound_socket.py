@@ -25,10 +25,7 @@ class ServerCredentials:
 class BoundSocket:
     """Binds a socket, cuts all its connections and binds it again.
 
-    Parameters
-    ----------
-    domain : ZAP domain, by which the authenticator tells sockets apart
-    credentials : where None, whoever can open the address may connect
+    By its ZAP domain the authenticator knows it; without credentials anybody may connect.
     """
 
     def __init__(

@@ -13,8 +13,6 @@ from denseface.service.errors import AddressError, HubRunningError
 from denseface.service.runtime.files import private_folder
 from denseface.service.settings import runtime_folder
 
-__all__ = ["check_bindable", "check_connectable", "is_local", "publications_of", "socket_file"]
-
 _PUBLICATIONS = ".publications"
 """Ending of the socket file for publications."""
 _MAX_SOCKET_PATH = 107 - len(_PUBLICATIONS)

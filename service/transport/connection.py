@@ -15,8 +15,6 @@ from denseface.service.security import KeyPair, read_pair, read_public
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.sockets import Context, Socket, open_socket
 
-__all__ = ["ConnectionMonitor", "Credentials", "connect", "receive_packet"]
-
 _MIN_BROKEN_OFF = 3
 """Handshakes that break off in a row until the keys are blamed: a hub may have ended in one."""
 _RECONNECT_S = 2.0

@@ -14,8 +14,6 @@ from zmq.utils.monitor import recv_monitor_message
 from denseface.service.monitoring import Rejections
 from denseface.service.transport.sockets import Socket
 
-__all__ = ["HandshakeMonitor", "address_of"]
-
 _BURST = 64
 """Events read at a time."""
 _E = zmq.Event

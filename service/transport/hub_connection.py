@@ -20,8 +20,6 @@ from denseface.service.transport.addresses import check_connectable
 from denseface.service.transport.connection import Credentials, connect, receive_packet
 from denseface.service.transport.sockets import Context, send_parts
 
-__all__ = ["HubConnection"]
-
 _RETRY_S = 0.1
 """Interval between heartbeats while the hub is not there, seconds."""
 
@@ -55,10 +53,7 @@ class HubConnection:
     ) -> Iterator[Packet | None]:
         """Give what the hub sends, and None at every heartbeat and when a call of `wake` ended.
 
-        Parameters
-        ----------
-        stop : ends the iteration
-        holding : gives the capture that this process works on
+        `stop` ends the iteration; `holding` gives the capture that this process works on.
         """
         poller = zmq.Poller()
         for readable in (self._socket, stop, wake):

@@ -23,8 +23,6 @@ from denseface.service.transport import sockets
 from denseface.service.transport._bound_socket import BoundSocket, ServerCredentials
 from denseface.service.transport.addresses import publications_of, socket_file
 
-__all__ = ["Incoming", "Listener"]
-
 _TOKEN_BYTES = 8
 """Length of what names a key with its roles, at the start of a peer's name."""
 _LOCAL = bytes(_TOKEN_BYTES)

@@ -20,8 +20,6 @@ from denseface.service.transport.addresses import check_bindable, is_local, sock
 from denseface.service.transport.listener import Incoming, Listener
 from denseface.service.transport.sockets import Context
 
-__all__ = ["Listeners", "server_credentials"]
-
 
 class _Pollable(Protocol):
     def fileno(self) -> int: ...

@@ -8,9 +8,6 @@ from denseface.service.errors import RemoteProtocolError
 from denseface.service.protocol.payload import MAX_ARRAY_BYTES
 from denseface.service.protocol.wire import Buffer
 
-__all__ = ["Context", "Socket", "TooLongError", "open_socket", "publish_parts", "receive_parts",
-           "send_parts"]
-
 Socket = zmq.Socket[bytes]
 Context = zmq.Context[Socket]
 

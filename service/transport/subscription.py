@@ -9,8 +9,6 @@ from denseface.service.protocol.wire import MAX_HEADER_BYTES, MAX_PARTS, Packet,
 from denseface.service.transport.connection import Credentials, connect
 from denseface.service.transport.sockets import Context, receive_parts
 
-__all__ = ["CHECK_INTERVAL_S", "Subscription"]
-
 CHECK_INTERVAL_S = 1.0
 """Interval at which a client asks whether the hub still accepts its key, seconds."""
 
