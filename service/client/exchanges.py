@@ -17,14 +17,8 @@ from typing import TypeVar
 from pydantic import ValidationError
 
 from denseface.recon.face import Face
+from denseface.service import errors
 from denseface.service.client.events import PublishedFailure, outcome_of
-from denseface.service.errors import (
-    ClientTimeoutError,
-    LocalProtocolError,
-    PressRefusedError,
-    RemoteProtocolError,
-    UnknownCaptureError,
-)
 from denseface.service.protocol import messages
 from denseface.service.protocol.message_base import BaseRequest
 from denseface.service.protocol.wire import Packet
@@ -67,7 +61,7 @@ def send_request(message: BaseRequest, timeout: float) -> Exchange[Packet]:
 def expect(answer: object, kind: type[_T]) -> _T:
     """Give an answer of the kind expected back; RemoteProtocolError for another."""
     if not isinstance(answer, kind):
-        raise RemoteProtocolError(
+        raise errors.RemoteProtocolError(
             f"the hub answered with {type(answer).__name__}, {kind.__name__} expected")
     return answer
 
@@ -82,11 +76,8 @@ class Exchanges:
 
     def __init__(self, resend_s: float) -> None:
         self._resend_s = resend_s
-        self._requests = itertools.count(1)
-
-    def next_number(self) -> int:
-        """Give the number of the next request."""
-        return next(self._requests)
+        self.next_number = itertools.count(1).__next__
+        """Gives the number of the next request."""
 
     def press(self, capture_id: str | None, timeout: float) -> Exchange[str]:
         """See `Client.press`."""
@@ -94,11 +85,11 @@ class Exchanges:
         try:
             message = messages.Press(request=self.next_number(), capture_id=chosen)
         except ValidationError as error:
-            raise LocalProtocolError(
+            raise errors.LocalProtocolError(
                 f"capture id {chosen!r}: expected letters, digits, - and _, at most 64") from error
         answer = (yield from send_request(message, timeout)).message
         if isinstance(answer, messages.PressRefused):
-            raise PressRefusedError(f"press refused: {answer.message}", answer.reason)
+            raise errors.PressRefusedError(f"press refused: {answer.message}", answer.reason)
         expect(answer, messages.PressAccepted)
         return chosen
 
@@ -112,10 +103,11 @@ class Exchanges:
                 wait_s=min(max(left, 0.0), _LONGEST_WAIT_S)), left + self._resend_s)
             match answer.message:
                 case messages.CaptureUnknown():
-                    raise UnknownCaptureError(f"capture {capture_id}: the hub has no such capture")
+                    raise errors.UnknownCaptureError(
+                        f"capture {capture_id}: the hub has no such capture")
                 case messages.CapturePending():
                     if time.monotonic() >= until:
-                        raise ClientTimeoutError(
+                        raise errors.ClientTimeoutError(
                             f"capture {capture_id}: accepted, no face within {timeout:g} s")
                 case _:
                     outcome = outcome_of(answer)
@@ -138,6 +130,6 @@ class Exchanges:
         try:
             return messages.FindStart(request=self.next_number(), last=last, since=since)
         except ValidationError as error:
-            raise LocalProtocolError(
+            raise errors.LocalProtocolError(
                 f"expected a positive last, found {last}, or a since with a zone, found {since}"
             ) from error

@@ -6,19 +6,13 @@ in `service.protocol.states`.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from importlib.metadata import version
-from typing import Literal
 
 import structlog
 
 from denseface.recon.settings import Settings
-from denseface.service.errors import (
-    DamagedDatabaseError,
-    DamagedFaceError,
-    ServiceError,
-    StoreError,
-)
+from denseface.service import errors, storage
 from denseface.service.hub._common import Common
 from denseface.service.hub.captures import Captures
 from denseface.service.hub.jobs import Jobs
@@ -34,14 +28,6 @@ from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage import (
-    FaceMetadata,
-    FolderStore,
-    FrameMetadata,
-    InlineWriter,
-    Writer,
-    WriteResult,
-)
 
 _VERSION = version("denseface")
 """Of this package, as the status says it."""
@@ -62,12 +48,12 @@ class Hub:
     """
 
     def __init__(
-        self, store: FolderStore, settings: ServiceSettings, recon: Settings,
+        self, store: storage.FolderStore, settings: ServiceSettings, recon: Settings,
         figures: Figures | None = None, rejections: Rejections | None = None,
-        writer: Writer | None = None, opened: float = -math.inf,
+        writer: storage.Writer | None = None, opened: float = -math.inf,
     ) -> None:
         self._store = store
-        self._writer = writer or InlineWriter()
+        self._writer = writer or storage.InlineWriter()
         self._figures = figures or Figures()
         self._rejections = rejections or Rejections(self._figures.counters)
         self._settings = settings
@@ -97,9 +83,9 @@ class Hub:
         try:
             outputs.extend(self._receive(now, peer, packet, key))
             outputs.extend(self._process_writes(now))
-        except DamagedDatabaseError:
+        except errors.DamagedDatabaseError:
             raise
-        except ServiceError as error:
+        except errors.ServiceError as error:
             self._log.error("message failed", kind=packet.message.kind, reason=str(error))
             request = getattr(packet.message, "request", None)
             if request is not None:
@@ -115,9 +101,9 @@ class Hub:
         outputs: list[Output] = []
         try:
             outputs.extend(self._finish_writes(now) if wait else self._process_writes(now))
-        except DamagedDatabaseError:
+        except errors.DamagedDatabaseError:
             raise
-        except ServiceError as error:
+        except errors.ServiceError as error:
             self._log.error("not saved", reason=str(error))
         return outputs
 
@@ -130,11 +116,11 @@ class Hub:
             if not (written := self._writer.take_results()):
                 return
 
-    def _written(self, now: float, written: Sequence[WriteResult]) -> Iterator[Output]:
+    def _written(self, now: float, written: Sequence[storage.WriteResult]) -> Iterator[Output]:
         yield from self._presses.written(
-            [one for one in written if isinstance(one.pending.metadata, FrameMetadata)])
+            [one for one in written if isinstance(one.pending.metadata, storage.FrameMetadata)])
         yield from self._jobs.written(
-            now, [one for one in written if isinstance(one.pending.metadata, FaceMetadata)])
+            now, [one for one in written if isinstance(one.pending.metadata, storage.FaceMetadata)])
 
     def _finish_writes(self, now: float) -> Iterator[Output]:
         self._writer.wait()
@@ -157,9 +143,9 @@ class Hub:
             if now >= self._status_due:
                 self._status_due = now + self._settings.heartbeat_s
                 outputs.append(Publish(Topic.STATUS, Packet(self._status())))
-        except DamagedDatabaseError:
+        except errors.DamagedDatabaseError:
             raise
-        except ServiceError as error:
+        except errors.ServiceError as error:
             self._log.error("tick failed", reason=str(error))
         return outputs
 
@@ -181,7 +167,7 @@ class Hub:
         """Give the fingerprint of the key that pressed a capture; None where there is none."""
         try:
             stored = self._store.find(capture_id)
-        except StoreError as error:
+        except errors.StoreError as error:
             self._log.error("presser not read", reason=str(error))
             return None
         return stored.pressed_by if stored else None
@@ -212,18 +198,18 @@ class Hub:
             case messages.GetStatus(request=request):
                 yield send(peer, self._status(request))
             case messages.SensorReady(name=name, source=source):
-                if self._has_room("sensor", peer, name) and self._peers.sensor_ready(
-                        peer, name, now):
+                if (self._has_room("sensor", self._peers.sensors, peer, name)
+                        and self._peers.sensor_ready(peer, name, now)):
                     self._log.info("sensor ready", name=name, source=source)
             case messages.WorkerReady(name=name, credit=credit):
-                if self._has_room("worker", peer, name):
+                if self._has_room("worker", self._peers.workers, peer, name):
                     self._worker_ready(now, peer, name, credit)
             case messages.Heartbeat(holding=holding):
                 if not self._peers.heartbeat(peer, holding, now):
                     yield send(peer, messages.Announce())
             case messages.Goodbye():
                 if worker := self._peers.workers.get(peer):
-                    self._jobs.worker_stopped(worker)
+                    self._jobs.hand_back(worker, [*worker.jobs])
                 yield from self._disconnected(peer, "goodbye")
             case messages.Frame() as message:
                 yield from self._presses.frame(peer, message, packet)
@@ -236,11 +222,11 @@ class Hub:
             case messages.JobFailed() as message:
                 yield from self._jobs.failed(peer, message)
 
-    def _requeue_damaged(self, error: DamagedFaceError, kept_before: bool) -> None:
+    def _requeue_damaged(self, error: errors.DamagedFaceError, kept_before: bool) -> None:
         self._jobs.requeue_damaged(error.capture_id, str(error), reset_attempts=kept_before)
 
-    def _has_room(self, kind: Literal["sensor", "worker"], peer: bytes, name: str) -> bool:
-        room = self._peers.has_room(kind, peer)
+    def _has_room(self, kind: str, known: Collection[bytes], peer: bytes, name: str) -> bool:
+        room = peer in known or len(known) < MAX_PEERS
         if not room:
             self._log.error("too many", kind=kind, name=name, most=MAX_PEERS)
         return room
@@ -283,5 +269,5 @@ class Hub:
     def _free_bytes(self) -> int | None:
         try:
             return self._store.free_bytes()
-        except StoreError:
+        except errors.StoreError:
             return None

@@ -20,8 +20,6 @@ from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.storage import CaptureRow, WriteResult
 
-_Answer = messages.Result | messages.JobFailed
-
 _LOST = ("WorkerLost", "the worker that held it went away")
 """Error and reason of a job whose worker is gone."""
 _RETRY_S = 1.0
@@ -168,16 +166,12 @@ class Jobs:
 
     def worker_lost(self, worker: WorkerPeer) -> None:
         """Queue again what a worker held that is gone; only its first job counts as an attempt."""
-        self._hand_back(worker, worker.jobs[1:])
+        self.hand_back(worker, worker.jobs[1:])
         while worker.jobs:
             self._take_back(worker.jobs.pop(), *_LOST)
 
-    def worker_stopped(self, worker: WorkerPeer) -> None:
-        """Queue again what a worker held that was told to stop; none counts as an attempt."""
-        self._hand_back(worker, list(worker.jobs))
-
-    def _hand_back(self, worker: WorkerPeer, capture_ids: Sequence[str]) -> None:
-        """Queue jobs again; they count as no attempt."""
+    def hand_back(self, worker: WorkerPeer, capture_ids: Sequence[str]) -> None:
+        """Queue jobs of a worker again; they count as no attempt."""
         for capture_id in reversed(capture_ids):
             worker.jobs.remove(capture_id)
             try:
@@ -242,10 +236,16 @@ class Jobs:
             self._last_errors[capture_id] = error, reason
             self._queue.appendleft(capture_id)
 
-    def _take_answer(self, peer: bytes, answer: _Answer, event: CaptureEvent) -> bool:
+    def _take_answer(
+        self, peer: bytes, answer: messages.Result | messages.JobFailed, event: CaptureEvent
+    ) -> bool:
         """Take an answered job from its worker and say whether the answer is expected."""
         capture_id = answer.capture_id
-        useful = self._is_expected(answer, event)
+        stored = self._store.find(capture_id)
+        useful = (
+            stored is not None and stored.settings_hash == answer.settings_hash
+            and stored.frame_sha256 == answer.frame_sha256
+            and self._captures.allows(capture_id, event))
         worker = self._peers.workers.get(peer)
         if worker and capture_id in worker.jobs:
             at = worker.jobs.index(capture_id)
@@ -259,12 +259,6 @@ class Jobs:
             self._rejections.note(
                 "replayed", capture_id=capture_id, detail=f"{event}, not asked for")
         return useful
-
-    def _is_expected(self, answer: _Answer, event: CaptureEvent) -> bool:
-        stored = self._store.find(answer.capture_id)
-        asked = stored and (stored.settings_hash, stored.frame_sha256)
-        return (asked == (answer.settings_hash, answer.frame_sha256)
-                and self._captures.allows(answer.capture_id, event))
 
     def _holder(self, capture_id: str) -> WorkerPeer | None:
         return next((worker for worker in self._peers.workers.values()

@@ -21,7 +21,8 @@ _PAGE = 50
 _SWEEP_S = 600.0
 """Longest time between two sweeps for what is too old, seconds."""
 
-_Request = messages.ListDead | messages.RetryDead | messages.DropDead | messages.Purge
+_DeadLetterRequest = messages.RetryDead | messages.DropDead
+_Request = messages.ListDead | _DeadLetterRequest | messages.Purge
 
 
 class Maintenance:
@@ -68,40 +69,33 @@ class Maintenance:
             case messages.ListDead(request=request, after=after):
                 yield send(peer, messages.DeadLetters(
                     request=request, letters=tuple(self._store.dead_letters(after, _PAGE))))
-            case messages.RetryDead():
-                yield from self._retry(peer, message)
-            case messages.DropDead():
-                yield from self._drop(peer, message)
+            case messages.RetryDead() | messages.DropDead():
+                yield from self._dead_letter(peer, message)
             case messages.Purge():
                 yield from self._purge(peer, message)
 
-    def _retry(self, peer: bytes, message: messages.RetryDead) -> Iterator[Output]:
+    def _dead_letter(self, peer: bytes, message: _DeadLetterRequest) -> Iterator[Output]:
+        """Retry or drop a capture that was given up."""
         capture_id, request = message.capture_id, message.request
+        retry = isinstance(message, messages.RetryDead)
         stored = self._store.find(capture_id)
         if stored is None:
             yield send(peer, messages.CaptureUnknown(request=request, capture_id=capture_id))
-        elif stored.state is CaptureState.ACCEPTED:  # a repeat
+        elif retry and stored.state is CaptureState.ACCEPTED:  # a repeat
             yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
-        elif not self._captures.allows(capture_id, CaptureEvent.RETRIED):
-            yield _no_dead_letter(peer, message, stored.state)
-        else:
+        elif stored.state is not CaptureState.DEAD:
+            yield send(peer, messages.RequestFailed(
+                request=request, message=f"capture {capture_id} is {stored.state}, no dead letter"))
+        elif retry:
             self._store.frame(capture_id)  # StoreError where it is damaged: the dead letter stays
             with self._captures.transition(CaptureEvent.RETRIED, capture_id) as state:
                 self._store.reopen(capture_id, state, reset_attempts=True)
             self._jobs.add(capture_id)
             self._log.info("dead letter retried", capture_id=capture_id)
             yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
-
-    def _drop(self, peer: bytes, message: messages.DropDead) -> Iterator[Output]:
-        stored = self._store.find(message.capture_id)
-        if stored is None:
-            yield send(peer, messages.CaptureUnknown(
-                request=message.request, capture_id=message.capture_id))
-        elif stored.state is not CaptureState.DEAD:
-            yield _no_dead_letter(peer, message, stored.state)
         else:
-            yield from self._remove([message.capture_id])
-            yield send(peer, messages.Removed(request=message.request, removed=1, left=False))
+            yield from self._remove([capture_id])
+            yield send(peer, messages.Removed(request=request, removed=1, left=False))
 
     def _purge(self, peer: bytes, message: messages.Purge) -> Iterator[Output]:
         if message.capture_id is not None:
@@ -127,11 +121,3 @@ class Maintenance:
         self._counters.add("removed", "operator", len(capture_ids))
         self._log.info("removed by an operator", captures=len(capture_ids))
         yield from self._outcomes.removed(capture_ids)
-
-
-def _no_dead_letter(
-    peer: bytes, message: messages.RetryDead | messages.DropDead, state: CaptureState
-) -> Output:
-    return send(peer, messages.RequestFailed(
-        request=message.request,
-        message=f"capture {message.capture_id} is {state}, no dead letter"))

@@ -1,8 +1,6 @@
 """The sensors and workers that are connected to the hub, and whether they are alive."""
 
-from collections.abc import Collection
 from dataclasses import dataclass, field
-from typing import Literal
 
 MAX_PEERS = 256
 """Most sensors, and most workers: so many fit into a `Status`. Others are not taken."""
@@ -42,11 +40,6 @@ class Peers:
 
     sensors: dict[bytes, SensorPeer] = field(default_factory=dict)
     workers: dict[bytes, WorkerPeer] = field(default_factory=dict)
-
-    def has_room(self, kind: Literal["sensor", "worker"], peer: bytes) -> bool:
-        """Whether a peer is one of this kind, or can become one."""
-        known: Collection[bytes] = self.sensors if kind == "sensor" else self.workers
-        return peer in known or len(known) < MAX_PEERS
 
     def sensor_ready(self, peer: bytes, name: str, now: float) -> bool:
         """Add a sensor; True where it is new."""
