@@ -7,13 +7,13 @@ from denseface.service.client.blocking import Client
 from denseface.service.client.exchanges import expect
 from denseface.service.errors import RemoteProtocolError, UnknownCaptureError
 from denseface.service.protocol import messages
-from denseface.service.protocol.message_base import BaseMessage
+from denseface.service.protocol.message_base import BaseMessage, DeadLetter
 
 
 class Operator(Client):
     """A `Client` that may also remove."""
 
-    def dead(self, *, timeout: float = 5.0) -> Iterator[messages.DeadLetter]:
+    def dead(self, *, timeout: float = 5.0) -> Iterator[DeadLetter]:
         """List the captures that were given up and are kept, by sequence number."""
         after = 0
         while True:

@@ -74,3 +74,19 @@ class BaseAnswer(FromHub):
 
     request: Number = 0
     """The request answered; 0 where nobody asked: a publication."""
+
+
+class DeadLetter(BaseModel):
+    """A capture that was given up; its frame is kept."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    sequence: Number
+    capture_id: CaptureId
+    error: Name
+    message: Annotated[str, Field(max_length=300)]
+    """Its first characters."""
+    attempts: Number
+    accepted_at: Name
+    """UTC, ISO 8601."""
+    finished_at: Name

@@ -7,7 +7,7 @@ of it is a case of `Hub.receive`, and `docs/wire.md` says what it is for.
 
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, FailFast, Field, model_validator
+from pydantic import FailFast, Field, model_validator
 
 from denseface.recon.settings import Settings
 from denseface.service.protocol.message_base import (
@@ -15,6 +15,7 @@ from denseface.service.protocol.message_base import (
     BaseMessage,
     BaseRequest,
     CaptureId,
+    DeadLetter,
     Digest,
     FromHub,
     Moment,
@@ -214,22 +215,6 @@ class Purge(BaseRequest):
         if (self.capture_id is not None) + (self.before is not None) + self.everything != 1:
             raise ValueError("expected one of capture_id, before and everything")
         return self
-
-
-class DeadLetter(BaseModel):
-    """A capture that was given up; its frame is kept."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    sequence: Number
-    capture_id: CaptureId
-    error: Name
-    message: Annotated[str, Field(max_length=300)]
-    """Its first characters."""
-    attempts: Number
-    accepted_at: Name
-    """UTC, ISO 8601."""
-    finished_at: Name
 
 
 class DeadLetters(BaseAnswer):

@@ -5,7 +5,7 @@ from datetime import datetime
 from sqlite3 import Connection
 
 from denseface.service.errors import StoreError
-from denseface.service.protocol.messages import DeadLetter
+from denseface.service.protocol.message_base import DeadLetter
 from denseface.service.protocol.states import CaptureState
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.storage._database import Database

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from denseface.recon.settings import Preset, Settings
 from denseface.service.errors import LocalProtocolError, ProtocolError, RemoteProtocolError
 from denseface.service.protocol import messages, wire
+from denseface.service.protocol.message_base import DeadLetter
 from denseface.service.protocol.payload import (
     MAX_ARRAY_BYTES,
     FaceHeader,
@@ -77,7 +78,7 @@ from_hub = st.one_of(
     plain(messages.StartAt, request=numbers, epoch=hashes, sequence=numbers),
     plain(messages.Removed, request=numbers, removed=numbers, left=st.booleans()),
     plain(messages.DeadLetters, request=numbers, letters=st.lists(st.builds(
-        messages.DeadLetter, sequence=numbers, capture_id=ids, error=texts, message=texts,
+        DeadLetter, sequence=numbers, capture_id=ids, error=texts, message=texts,
         attempts=numbers, accepted_at=texts, finished_at=texts), max_size=3).map(tuple)),
     plain(messages.CaptureFailed, request=numbers, epoch=hashes, sequence=numbers, capture_id=ids,
           error=texts, message=texts, dead=st.booleans()),
