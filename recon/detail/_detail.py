@@ -10,8 +10,8 @@ import math
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Floats
 from denseface.recon.detail import _detail_kernels as kernels
 from denseface.recon.detail._holes import fill_holes
 from denseface.recon.detail._mirror_kernels import HeightField
@@ -26,8 +26,6 @@ from denseface.recon.numerics.normalized_convolution import normalized_convoluti
 from denseface.recon.numerics.percentile import percentile
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, interpolate, splat
 from denseface.recon.support import Support
-
-Image = NDArray[np.float32]
 
 _FULL = 0.4
 """Below this part of the usual weight of seeds lies a hole, or the rim."""
@@ -47,8 +45,8 @@ _COARSE = np.s_[::2, ::2]
 
 
 def add_detail(
-    heights: Image, support: Support, points: NDArray[np.float32], spacing: float,
-    radius: float, *, symmetry: bool = False, sampler: ColorSampler | None = None,
+    heights: Floats, support: Support, points: Floats, spacing: float, radius: float, *,
+    symmetry: bool = False, sampler: ColorSampler | None = None,
 ) -> SurfaceGrid:
     """Add to a broad fit what its seeds show besides.
 
@@ -104,12 +102,12 @@ class _SeedGrid(NamedTuple):
     shape : (rows, columns) of the image
     """
 
-    columns: Image
-    rows: Image
+    columns: Floats
+    rows: Floats
     shape: tuple[int, ...]
 
     @classmethod
-    def over(cls, points: NDArray[np.float32], support: Support) -> Self:
+    def over(cls, points: Floats, support: Support) -> Self:
         """Place (n, 3) points, mm, on the grid of their support."""
         columns, rows = (((points[:, axis] - low) / support.step).astype(np.float32)
                          for axis, low in ((0, support.xs[0]), (1, support.ys[0])))
@@ -121,7 +119,7 @@ class _SeedGrid(NamedTuple):
         columns, rows = (half * (one - half) for one in (self.columns, self.rows))
         return type(self)(columns, rows, ((self.shape[0] + 1) // 2, (self.shape[1] + 1) // 2))
 
-    def scatter(self, values: Image) -> tuple[Image, Image]:
+    def scatter(self, values: Floats) -> tuple[Floats, Floats]:
         """Sum the seeds, and their values, by bilinear weights on the four pixels around each."""
         counts, sums = np.zeros(self.shape, np.float32), np.zeros(self.shape, np.float32)
         splat(self.columns, self.rows, values, counts, sums)
@@ -137,14 +135,14 @@ class _Averages(NamedTuple):
     hole : 0-1
     """
 
-    detail: Image
-    seeded: Image
-    filled: Image
-    hole: Image
+    detail: Floats
+    seeded: Floats
+    filled: Floats
+    hole: Floats
 
 
 def _average(
-    seeds: _SeedGrid, residuals: Image, heights: Image, rim: Rim, radius: float, spacing: float,
+    seeds: _SeedGrid, residuals: Floats, heights: Floats, rim: Rim, radius: float, spacing: float,
     step: float,
 ) -> _Averages:
     """Average the residuals, and fill holes.
@@ -171,9 +169,7 @@ def _blur_after_scatter(sigma: float) -> float:
     return math.sqrt(sigma * sigma - BILINEAR_VARIANCE)
 
 
-def _wiener_gain(
-    detail: Image, inner: Image, narrow: NDArray[np.bool_], step: float
-) -> tuple[Image, float]:
+def _wiener_gain(detail: Floats, inner: Floats, narrow: Bools, step: float) -> tuple[Floats, float]:
     """Give the gain, 0-1, place by place, and the variance of noise, mm^2.
 
     detail : mm along the normal: along z, noise and detail both grow where a face is steep
@@ -188,7 +184,7 @@ def _wiener_gain(
     return np.asarray(gain, np.float32), noise
 
 
-def _add_upsampled(image: Image, coarse: Image) -> Image:
+def _add_upsampled(image: Floats, coarse: Floats) -> Floats:
     """Add in place what is known at every second point each way, bilinear; give the image."""
     rows, columns = ((np.arange(side) / 2).astype(np.float32) for side in image.shape)
     add_resampled(image, coarse, rows, columns)

@@ -1,17 +1,15 @@
 """Slopes of a surface on a grid, and what its detail is weighed by, compiled."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Floats
 from denseface.recon.numerics.jit import compiled
-
-Image = NDArray[np.float32]
 
 _1 = np.uint64(1)
 
 
 @compiled
-def with_slopes(heights: Image, step: float) -> Image:
+def with_slopes(heights: Floats, step: float) -> Floats:
     """Give heights, dz/dx and dz/dy, (3, rows, columns).
 
     By central differences; one-sided, of half the size, at the edge.
@@ -37,7 +35,9 @@ def with_slopes(heights: Image, step: float) -> Image:
 
 
 @compiled
-def normalize_sums(weight: Image, sums: Image, fading: float, full: float) -> tuple[Image, Image]:
+def normalize_sums(
+    weight: Floats, sums: Floats, fading: float, full: float
+) -> tuple[Floats, Floats]:
     """Divide sums by their weight, in place; means fade where the weight is near `fading`.
 
     weight, sums : (rows, columns)
@@ -60,7 +60,7 @@ def normalize_sums(weight: Image, sums: Image, fading: float, full: float) -> tu
 
 
 @compiled
-def blend_toward(detail: Image, broad: Image, rim_weight: Image, missing: Image) -> None:
+def blend_toward(detail: Floats, broad: Floats, rim_weight: Floats, missing: Floats) -> None:
     """Blend detail in place toward a broad average, by the larger of two weights, 0-1.
 
     All are (rows, columns).
@@ -72,7 +72,9 @@ def blend_toward(detail: Image, broad: Image, rim_weight: Image, missing: Image)
 
 
 @compiled
-def mirror_planes(heights: Image, detail: Image, seeded: Image, inner: Image, step: float) -> Image:
+def mirror_planes(
+    heights: Floats, detail: Floats, seeded: Floats, inner: Floats, step: float
+) -> Floats:
     """Give the planes of a `HeightField`, (rows, columns, 5), at every second point.
 
     heights, detail, seeded : (2 rows, 2 columns) or one less; inner : (rows, columns), weight

@@ -4,12 +4,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Doubles, Floats, Ints
 from denseface.recon.numerics.jit import compiled
-
-Image = NDArray[np.float32]
-Indices = NDArray[np.int32]
 
 _RIDGE = 1e-4
 """Ridge toward the height at hand, in seeds, that keeps singular systems solvable."""
@@ -35,18 +32,16 @@ class Cells(NamedTuple):
     numbers : int32, the number of each unknown of the hole at hand, -1 elsewhere
     """
 
-    counts: Image
-    sums: Image
-    heights: Image
-    added: Image
-    inside: NDArray[np.bool_]
-    numbers: Indices
+    counts: Floats
+    sums: Floats
+    heights: Floats
+    added: Floats
+    inside: Bools
+    numbers: Ints
 
 
 @compiled
-def number_unknowns(
-    labels: Indices, label: int, box: Indices, numbers: Indices
-) -> tuple[Indices, Indices]:
+def number_unknowns(labels: Ints, label: int, box: Ints, numbers: Ints) -> tuple[Ints, Ints]:
     """Number a hole's cells in `numbers`, and give their rows and columns, (n,) each.
 
     labels : (rows, columns), number of the hole that a cell is in
@@ -67,7 +62,7 @@ def number_unknowns(
 
 
 @compiled
-def bandwidth(rows: Indices, columns: Indices, numbers: Indices) -> int:
+def bandwidth(rows: Ints, columns: Ints, numbers: Ints) -> int:
     """Give the largest difference of the numbers of cells that share a second difference."""
     band = 0
     for i in range(len(rows)):
@@ -80,9 +75,8 @@ def bandwidth(rows: Indices, columns: Indices, numbers: Indices) -> int:
 
 @compiled
 def normal_equations(
-    cells: Cells, rows: Indices, columns: Indices, box: Indices, band: int, smoothing: float,
-    step: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    cells: Cells, rows: Ints, columns: Ints, box: Ints, band: int, smoothing: float, step: float
+) -> tuple[Doubles, Doubles]:
     """Give the normal equations of a hole's unknowns, linearized about its slopes.
 
     smoothing : weight of the bending against the seeds' squares, mm^2 over mm^2
@@ -132,7 +126,7 @@ def normal_equations(
 
 
 @compiled
-def resample_filled(added: Image, labels: Indices, weight: Image) -> tuple[Image, Image]:
+def resample_filled(added: Floats, labels: Ints, weight: Floats) -> tuple[Floats, Floats]:
     """Interpolate what cells say at four times as many points each way, by cubic convolution.
 
     added, labels : (rows, columns), of cells

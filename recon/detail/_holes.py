@@ -10,15 +10,13 @@ docs/decisions/0019.
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dpbsv
 
+from denseface.recon.arrays import Bools, Floats, Ints
 from denseface.recon.detail import _hole_kernels as kernels
 from denseface.recon.detail._rim import Rim
 from denseface.recon.numerics.filters import downsampled
 from denseface.recon.numerics.morphology import large_components
-
-Image = NDArray[np.float32]
 
 _MISSING = 0.5
 """Cells of which a larger part is missing are a hole."""
@@ -37,9 +35,9 @@ _ITERATIONS = 2
 
 
 def fill_holes(
-    counts: Image, sums: Image, missing: Image, rim: Rim, heights: Image, detail: Image,
+    counts: Floats, sums: Floats, missing: Floats, rim: Rim, heights: Floats, detail: Floats,
     spacing: float,
-) -> tuple[Image, Image]:
+) -> tuple[Floats, Floats]:
     """Find the heights in holes.
 
     counts, sums : (rows, columns) float32, the seeds in each cell, two spacings wide, and the sum
@@ -69,9 +67,7 @@ def fill_holes(
     return kernels.resample_filled(cells.added, labels, missing)
 
 
-def _with_border(
-    hole: NDArray[np.bool_], inside: NDArray[np.bool_]
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def _with_border(hole: Bools, inside: Bools) -> tuple[Ints, Ints]:
     """Number holes with their borders: labels, 0 elsewhere, and a box for each, (labels, 5)."""
     side = 2 * _BORDER + 1
     ellipse = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
@@ -83,7 +79,7 @@ def _with_border(
 
 
 def _minimize_bending(
-    cells: kernels.Cells, labels: NDArray[np.int32], label: int, box: NDArray[np.int32], step: float
+    cells: kernels.Cells, labels: Ints, label: int, box: Ints, step: float
 ) -> None:
     """Set what is added in one hole; `step` is from cell to cell, mm."""
     rows, columns = kernels.number_unknowns(labels, label, box, cells.numbers)

@@ -8,13 +8,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Doubles, Floats
 from denseface.recon.numerics.jit import compiled
 from denseface.recon.numerics.linear_solve import solve_small
 
-Image = NDArray[np.float32]
-Floats = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 
@@ -27,13 +25,13 @@ class HeightField(NamedTuple):
     step : distance of the points, mm
     """
 
-    planes: Image
-    origin: Floats
+    planes: Floats
+    origin: Doubles
     step: float
 
 
 @compiled
-def sample_points(field: HeightField, every: int, min_facing: float) -> Floats:
+def sample_points(field: HeightField, every: int, min_facing: float) -> Doubles:
     """Give every so many of a field's points, (n, 3) mm, that count and face the camera."""
     planes, origin, step = field
     rows, columns = planes.shape[:2]
@@ -50,7 +48,7 @@ def sample_points(field: HeightField, every: int, min_facing: float) -> Floats:
 
 
 @compiled
-def principal_curvature_angle(points: Floats) -> float:
+def principal_curvature_angle(points: Doubles) -> float:
     """Give the direction, from x toward y, rad, in which points curve away from the camera most.
 
     points : (n, 3), mm, about their mean; a quadric is fitted to them
@@ -71,9 +69,9 @@ def principal_curvature_angle(points: Floats) -> float:
 
 @compiled
 def mirror_costs(
-    field: HeightField, points: Floats, normals: Floats, offsets: Floats, limit: float,
+    field: HeightField, points: Doubles, normals: Doubles, offsets: Doubles, limit: float,
     missing: float,
-) -> Floats:
+) -> Doubles:
     """Give the mean squared distance of points' mirror images from the field, mm^2.
 
     points : (n, 3), normals : (a, 3), offsets : (b,)
@@ -106,9 +104,9 @@ def mirror_costs(
 
 @compiled
 def refine_plane(
-    field: HeightField, points: Floats, normal: Floats, offset: float, scale: float, steps: int,
+    field: HeightField, points: Doubles, normal: Doubles, offset: float, scale: float, steps: int,
     tolerance: float,
-) -> tuple[Floats, float, int]:
+) -> tuple[Doubles, float, int]:
     """Take Gauss-Newton steps toward the plane that mirrors points onto the field.
 
     Unknown are the normal's turn about two axes, rad, and the offset's change, mm. Ends when none
@@ -135,7 +133,7 @@ def refine_plane(
 
 
 @compiled
-def _tangents(normal: Floats) -> tuple[Vector, Vector]:
+def _tangents(normal: Doubles) -> tuple[Vector, Vector]:
     """Give two unit vectors that span the plane."""
     nx, ny, nz = normal
     if abs(nz) < 0.9:
@@ -149,9 +147,9 @@ def _tangents(normal: Floats) -> tuple[Vector, Vector]:
 
 @compiled
 def _normal_equations(
-    field: HeightField, points: Floats, normal: Floats, offset: float, a: Vector, b: Vector,
+    field: HeightField, points: Doubles, normal: Doubles, offset: float, a: Vector, b: Vector,
     scale: float,
-) -> tuple[Floats, Floats, int]:
+) -> tuple[Doubles, Doubles, int]:
     """Sum the weighted normal equations of `refine_plane`, and count the images that met.
 
     Residuals r, mm along the field's normal, have the weight 1 / (1 + (r / scale)^2)^2.
@@ -200,9 +198,9 @@ def _normal_equations(
 
 @compiled
 def mirror_image(
-    field: HeightField, added: Image, normal: Floats, offset: float, max_distance: float,
+    field: HeightField, added: Floats, normal: Doubles, offset: float, max_distance: float,
     min_facing: float,
-) -> Image:
+) -> Floats:
     """Sample a field at the mirror image of each of its points, (k, rows, columns) float32.
 
     added : (rows, columns), mm, added to the heights: of that surface the points are mirrored

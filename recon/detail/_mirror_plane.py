@@ -10,8 +10,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Doubles
 from denseface.recon.detail import _mirror_kernels as kernels
 
 _TURNS = np.radians(np.arange(-40.0, 41.0, 10.0))
@@ -45,13 +45,11 @@ _MIN_POINTS = 200
 _MIN_FACING = 0.2
 """Points that face the camera by less (cosine) do not count."""
 
-Floats = NDArray[np.float64]
-
 
 class MirrorPlane(NamedTuple):
     """The points p with normal . p = offset, mm; the normal, (3,), is of unit length."""
 
-    normal: Floats
+    normal: Doubles
     offset: float
 
 
@@ -74,7 +72,7 @@ def find_plane(field: kernels.HeightField) -> MirrorPlane | None:
     return MirrorPlane(normal, offset + float(normal @ middle))
 
 
-def _coarse_plane(field: kernels.HeightField, points: Floats) -> tuple[Floats, float] | None:
+def _coarse_plane(field: kernels.HeightField, points: Doubles) -> tuple[Doubles, float] | None:
     """Search turns and offsets; give the cheapest normal and offset after some refinement."""
     angle = kernels.principal_curvature_angle(points)
     level = np.array([math.cos(angle), math.sin(angle), 0.0])

@@ -11,11 +11,9 @@ from typing import Self
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Floats
 from denseface.recon.numerics.filters import blurred, downsampled
-
-Image = NDArray[np.float32]
 
 BROADER = 4.0
 """Radius of the broad average, in radii of the narrow one."""
@@ -60,11 +58,11 @@ class Rim:
     distance : (rows, columns) float32, from the outline inward, mean spacings; negative outside
     """
 
-    coverage: Image
-    distance: Image
+    coverage: Floats
+    distance: Floats
 
     @classmethod
-    def of(cls, support: NDArray[np.bool_], step: float) -> Self:
+    def of(cls, support: Bools, step: float) -> Self:
         """Find the rim of a support, on a grid of half the points each way.
 
         support : (rows, columns) bool
@@ -76,18 +74,18 @@ class Rim:
         return cls(coverage, downsampled(distance))
 
     @property
-    def broad_weight(self) -> Image:
+    def broad_weight(self) -> Floats:
         """Weight of the broad average, 0-1."""
         return _smoothstep(self.distance, _BROAD_ALONE, _BROAD_ENDS)
 
     @property
-    def color_weight(self) -> Image:
+    def color_weight(self) -> Floats:
         """How much of a colour seen there is the face's and not of what is behind it, 0-1."""
         weight = (self.distance - np.float32(_COLOR_BEHIND)) / np.float32(
             _COLOR_OWN - _COLOR_BEHIND)
         return np.asarray(np.clip(weight, 0, 1), np.float32)
 
-    def fraying_correction(self, dz_dx: Image, dz_dy: Image, spacing: float) -> Image:
+    def fraying_correction(self, dz_dx: Floats, dz_dy: Floats, spacing: float) -> Floats:
         """Give what is to be added to the depths, mm: an outward shift times the slope.
 
         dz_dx, dz_dy : (rows, columns) float32; spacing : mean spacing of the seeds, mm
@@ -105,8 +103,8 @@ class Rim:
 
 
 def iterated_average(
-    seeds: Image, values: Image, radius: float, usual: float, rim: Rim, finer: int
-) -> Image:
+    seeds: Floats, values: Floats, radius: float, usual: float, rim: Rim, finer: int
+) -> Floats:
     """Average what the seeds show, then what that leaves of them, and so on (Richardson iteration).
 
     seeds, values : (rows, columns) float32, how many seeds are in each cell of a grid, and the sums
@@ -135,14 +133,14 @@ def iterated_average(
     return inside + _smoothstep(rim.distance, 0, _RIM_ITERATIONS_END) * (total - inside)
 
 
-def _blur_matrix(side: int, sigma: float) -> Image:
+def _blur_matrix(side: int, sigma: float) -> Floats:
     """The (side, side) matrix that blurs columns by a Gaussian, zero outside."""
     steps = np.arange(side)
     taps = np.exp(steps**2 / (-2 * sigma * sigma)) / (math.sqrt(2 * math.pi) * sigma)
     return taps.astype(np.float32)[np.abs(np.subtract.outer(steps, steps))]
 
 
-def _smoothstep(values: Image, one: float, none: float) -> Image:
+def _smoothstep(values: Floats, one: float, none: float) -> Floats:
     """Fall from 1, up to `one`, to 0, from `none` on, by 3 t^2 - 2 t^3."""
     t = np.clip((np.float32(none) - values) / np.float32(none - one), 0, 1)
     return np.asarray(t * t * (3 - 2 * t), np.float32)

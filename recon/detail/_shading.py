@@ -11,15 +11,13 @@ moustaches, shadows' edges. Constants: docs/decisions/0016.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Doubles, Floats
 from denseface.recon.detail import _shading_kernels as kernels
 from denseface.recon.detail._spherical_harmonics import fit_lighting, sample_harmonics
 from denseface.recon.intermediate import ColorSampler
 from denseface.recon.numerics.filters import blurred, upsampled
 from denseface.recon.numerics.normalized_convolution import normalized, normalized_convolution
-
-Image = NDArray[np.float32]
 
 _GAMMA = 2.2
 """Exponent from a channel's value to linear light, close to sRGB's curve."""
@@ -55,9 +53,9 @@ _STEPS = 3
 
 
 def shading_detail(
-    heights: Image, weight: Image, slopes: Image,
-    coordinates: tuple[NDArray[np.float64], NDArray[np.float64]], sampler: ColorSampler,
-) -> Image:
+    heights: Floats, weight: Floats, slopes: Floats, coordinates: tuple[Doubles, Doubles],
+    sampler: ColorSampler,
+) -> Floats:
     """Find what is to be added to a surface for its shading to be that of the image.
 
     heights : (rows, columns) float32, mm
@@ -75,9 +73,7 @@ def shading_detail(
     return shape_from_shading(brightness, weight, slopes, float(xs[1] - xs[0]))
 
 
-def shape_from_shading(
-    brightness: Image, weight: Image, slopes: Image, step: float
-) -> Image:
+def shape_from_shading(brightness: Floats, weight: Floats, slopes: Floats, step: float) -> Floats:
     """Find what is to be added to a surface for its shading to be that of the image.
 
     Of all changes h with a Gaussian's covariance, the one that best explains r, the logarithm of
@@ -107,7 +103,7 @@ def shape_from_shading(
     return _solved(system, step)
 
 
-def _solved(system: kernels.ShadingSystem, step: float) -> Image:
+def _solved(system: kernels.ShadingSystem, step: float) -> Floats:
     """Solve by conjugate gradients, with the covariance as preconditioner."""
     radius = math.sqrt(2) * _RADIUS_MM / step
     variance = _ERROR_MM**2 * 2 * math.pi * radius**2

@@ -3,11 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes, Doubles, Floats
 from denseface.recon.numerics.jit import compiled
-
-Image = NDArray[np.float32]
 
 
 class ShadingSystem(NamedTuple):
@@ -18,9 +16,9 @@ class ShadingSystem(NamedTuple):
         the differences of the heights on both sides
     """
 
-    residuals: Image
-    jacobian_x: Image
-    jacobian_y: Image
+    residuals: Floats
+    jacobian_x: Floats
+    jacobian_y: Floats
 
 
 class Iterate(NamedTuple):
@@ -32,16 +30,14 @@ class Iterate(NamedTuple):
     smooth_direction : the same after it
     """
 
-    heights: Image
-    residual: Image
-    direction: Image
-    smooth_direction: Image
+    heights: Floats
+    residual: Floats
+    direction: Floats
+    smooth_direction: Floats
 
 
 @compiled
-def grid_points(
-    weight: Image, xs: NDArray[np.float64], ys: NDArray[np.float64], heights: Image
-) -> Image:
+def grid_points(weight: Floats, xs: Doubles, ys: Doubles, heights: Floats) -> Floats:
     """Give the points of a grid whose weight is not zero, (n, 3), row by row."""
     points = np.empty((np.count_nonzero(weight), 3), np.float32)
     count = 0
@@ -55,8 +51,8 @@ def grid_points(
 
 @compiled
 def brightness_image(
-    colors: NDArray[np.uint8], seen: NDArray[np.bool_], table: Image, saturated: int, weight: Image
-) -> Image:
+    colors: Bytes, seen: Bools, table: Floats, saturated: int, weight: Floats
+) -> Floats:
     """Put the linear brightness of `grid_points` back on their grid; 0 elsewhere.
 
     colors : (n, 3), RGB; seen : (n,)
@@ -80,7 +76,7 @@ def brightness_image(
 
 
 @compiled
-def masked_brightness(brightness: Image, weight: Image) -> Image:
+def masked_brightness(brightness: Floats, weight: Floats) -> Floats:
     """Give (rows, columns, 2): 1 and the brightness where the weight is above zero, else 0."""
     out = np.zeros((*weight.shape, 2), np.float32)
     for i in range(weight.shape[0]):
@@ -92,8 +88,7 @@ def masked_brightness(brightness: Image, weight: Image) -> Image:
 
 @compiled
 def shading_residuals(
-    brightness: Image, dz_dx: Image, dz_dy: Image, lighting: NDArray[np.float32],
-    min_shading: float,
+    brightness: Floats, dz_dx: Floats, dz_dy: Floats, lighting: Floats, min_shading: float
 ) -> ShadingSystem:
     """Compare brightness b with the shading s that the lighting makes of the normals.
 
@@ -139,7 +134,7 @@ def shading_residuals(
 
 @compiled
 def apply_weights(
-    system: ShadingSystem, weight: Image, energy: Image, color_noise: float, precision: float,
+    system: ShadingSystem, weight: Floats, energy: Floats, color_noise: float, precision: float,
     step: float,
 ) -> None:
     """Multiply a system by the roots of its weights, and make slopes those of differences.
@@ -161,7 +156,7 @@ def apply_weights(
 
 
 @compiled
-def apply_jacobian(heights: Image, by_x: Image, by_y: Image, out: Image) -> None:
+def apply_jacobian(heights: Floats, by_x: Floats, by_y: Floats, out: Floats) -> None:
     """Write J h: the heights' differences along x and y, weighted and summed.
 
     All (rows, columns); the outermost points of `out` are left alone.
@@ -174,7 +169,7 @@ def apply_jacobian(heights: Image, by_x: Image, by_y: Image, out: Image) -> None
 
 
 @compiled
-def apply_jacobian_transpose(values: Image, by_x: Image, by_y: Image, out: Image) -> None:
+def apply_jacobian_transpose(values: Floats, by_x: Floats, by_y: Floats, out: Floats) -> None:
     """Write the transpose of `apply_jacobian` times values."""
     rows, columns = values.shape
     for i in range(1, rows - 1):
@@ -186,7 +181,7 @@ def apply_jacobian_transpose(values: Image, by_x: Image, by_y: Image, out: Image
 
 @compiled
 def conjugate_gradient_step(
-    state: Iterate, smooth_residual: Image, variance: float, by_x: Image, by_y: Image,
+    state: Iterate, smooth_residual: Floats, variance: float, by_x: Floats, by_y: Floats,
     previous: float,
 ) -> float:
     """Take a step of preconditioned conjugate gradients for (J^T J + C^-1) h = J^T r.

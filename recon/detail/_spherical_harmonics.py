@@ -6,13 +6,10 @@ doi:10.1364/JOSAA.18.002448.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Doubles, Floats
 from denseface.recon.numerics.jit import compiled
 from denseface.recon.numerics.linear_solve import solve_small
-
-Image = NDArray[np.float32]
-Floats = NDArray[np.float64]
 
 _TERMS = 9
 """Harmonics up to order two."""
@@ -30,8 +27,8 @@ _RIDGE = 1e-4
 
 @compiled
 def sample_harmonics(
-    brightness: Image, weight: Image, dz_dx: Image, dz_dy: Image, every: int
-) -> tuple[Floats, Floats]:
+    brightness: Floats, weight: Floats, dz_dx: Floats, dz_dy: Floats, every: int
+) -> tuple[Doubles, Doubles]:
     """Give the real harmonics of the unit normals without their constants, and the brightness.
 
     Of every so many points each way whose weight is above a half: (9, n) and (n,).
@@ -59,7 +56,7 @@ def sample_harmonics(
 
 
 @compiled
-def fit_lighting(basis: Floats, samples: Floats) -> tuple[NDArray[np.float32], float]:
+def fit_lighting(basis: Doubles, samples: Doubles) -> tuple[Floats, float]:
     """Fit harmonics to brightness by robust least squares: weights of Geman and McClure, 1987.
 
     basis, samples : (9, n), (n,), of `sample_harmonics`
@@ -90,7 +87,7 @@ def fit_lighting(basis: Floats, samples: Floats) -> tuple[NDArray[np.float32], f
 
 
 @compiled
-def _weighted_least_squares(basis: Floats, samples: Floats, weights: Floats) -> Floats:
+def _weighted_least_squares(basis: Doubles, samples: Doubles, weights: Doubles) -> Doubles:
     """Solve the normal equations, with a ridge; (9,)."""
     count = len(samples)
     matrix, right = np.zeros((_TERMS, _TERMS)), np.zeros(_TERMS)

@@ -17,15 +17,13 @@ import math
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Floats
 from denseface.recon.detail import _symmetry_kernels as kernels
 from denseface.recon.detail._mirror_kernels import HeightField, mirror_image
 from denseface.recon.detail._mirror_plane import MirrorPlane
 from denseface.recon.numerics.filters import blurred, upsampled
 from denseface.recon.numerics.normalized_convolution import normalized
-
-Image = NDArray[np.float32]
 
 _MAX_DISTANCE_MM = 12.0
 """A mirror image farther than this from the face is of something else, mm."""
@@ -46,9 +44,9 @@ _DIFFERENT = 1.15
 
 
 def symmetry_correction(
-    field: HeightField, kept: Image, filled: Image, hole: Image, plane: MirrorPlane, noise: float,
-    window: float,
-) -> Image:
+    field: HeightField, kept: Floats, filled: Floats, hole: Floats, plane: MirrorPlane,
+    noise: float, window: float,
+) -> Floats:
     """Find what the mirror image adds to a face.
 
     field : of five planes; its heights are those of the broad fit
@@ -77,7 +75,7 @@ def symmetry_correction(
                               gap_energy, _FIT_VARIANCE * v)
 
 
-def _alike(excess: Image, step: float) -> Image:
+def _alike(excess: Floats, step: float) -> Floats:
     """Say how far the sides are alike but for noise, 0-1, from their difference over noise."""
     reach = _REACH_MM / (2 * step)
     side = 2 * math.ceil(reach) + 1

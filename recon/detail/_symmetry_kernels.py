@@ -1,11 +1,9 @@
 """Local moments of a face and its mirror image, compiled."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Floats
 from denseface.recon.numerics.jit import compiled
-
-Image = NDArray[np.float32]
 
 _MIN_WEIGHT = np.float32(1e-6)
 """Weights below it are taken for it, so that nothing is divided by zero."""
@@ -14,7 +12,7 @@ _MIN_SEEDS = np.float32(0.2)
 
 
 @compiled
-def mirror_moments(planes: Image, image: Image, hole: Image) -> tuple[Image, Image, Image]:
+def mirror_moments(planes: Floats, image: Floats, hole: Floats) -> tuple[Floats, Floats, Floats]:
     """Give the weighted products that `symmetry_correction` averages, zero where nothing is.
 
     planes : (rows, columns, 5), of the field; image : (5, rows, columns), of `mirror_image`
@@ -50,7 +48,7 @@ def mirror_moments(planes: Image, image: Image, hole: Image) -> tuple[Image, Ima
 
 
 @compiled
-def peak_differences(differences: Image, blurred: Image, scale: float) -> Image:
+def peak_differences(differences: Floats, blurred: Floats, scale: float) -> Floats:
     """Give the largest squared mean difference of each four pixels, times a factor.
 
     differences : (rows, columns, 2), of `mirror_moments`: pixels without weight do not count
@@ -68,7 +66,7 @@ def peak_differences(differences: Image, blurred: Image, scale: float) -> Image:
 
 
 @compiled
-def shrinkage_factors(moments: Image, alike: Image, noise: float) -> Image:
+def shrinkage_factors(moments: Floats, alike: Floats, noise: float) -> Floats:
     """Give c1, c2 of `symmetry_correction` times `alike`, and `alike`: (rows, columns, 3).
 
     moments : (rows, columns, 3), of `mirror_moments`, blurred
@@ -94,9 +92,9 @@ def shrinkage_factors(moments: Image, alike: Image, noise: float) -> Image:
 
 @compiled
 def correction(
-    planes: Image, image: Image, kept: Image, hole: Image, factors: Image, gap_energy: Image,
+    planes: Floats, image: Floats, kept: Floats, hole: Floats, factors: Floats, gap_energy: Floats,
     fit_variance: float,
-) -> Image:
+) -> Floats:
     """Give what the mirror image adds, (rows, columns), mm along z: see `symmetry_correction`.
 
     factors : (rows, columns, 3), of `shrinkage_factors`

@@ -6,8 +6,8 @@ hair, pupils. Their place in the colour image says more than the hole's border.
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes
 from denseface.recon.face import DenseCloud, Seeds
 from denseface.recon.intermediate import ColorSampler, SurfaceGrid
 from denseface.recon.numerics.push_pull import interpolate_colors
@@ -89,9 +89,8 @@ def _without_bridges(surface: SurfaceGrid, spacing: float) -> Support:
 
 
 def _colors(
-    seeds: Seeds, origin: tuple[float, float], step: float, spacing: float,
-    wanted: NDArray[np.bool_],
-) -> NDArray[np.uint8]:
+    seeds: Seeds, origin: tuple[float, float], step: float, spacing: float, wanted: Bools
+) -> Bytes:
     """The seeds' mean colour on a grid of its own, (rows, columns, 3)."""
     # Bilinear weights blur, once when colours are scattered and once when they are read.
     radius = np.sqrt(max((_COLOR_RADIUS * spacing / step) ** 2 - 2 * BILINEAR_VARIANCE,
@@ -100,7 +99,7 @@ def _colors(
                              float(radius), spacing / step)
 
 
-def _coarser(inside: NDArray[np.bool_], every: int) -> NDArray[np.bool_]:
+def _coarser(inside: Bools, every: int) -> Bools:
     """Which of every so many points each way are next to a supported one."""
     rows, columns = (-(-side // every) for side in inside.shape)
     whole = cv2.copyMakeBorder(

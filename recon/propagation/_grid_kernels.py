@@ -5,14 +5,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Bytes, Doubles, Floats, Ints, Sizes
 from denseface.recon.numerics.bilinear import column_positions
 from denseface.recon.numerics.jit import compiled
 
 # Unsigned indices spare the compiled code a test whether one counts from the end.
 _0, _1, _3 = (np.uint64(k) for k in (0, 1, 3))
-
-Floats = NDArray[np.float32]
-Indices = NDArray[np.uint64]
 
 
 class Resampling(NamedTuple):
@@ -43,9 +41,9 @@ class _Reader(NamedTuple):
 
 @compiled
 def gather_points(
-    support: NDArray[np.bool_], xs: NDArray[np.float64], ys: NDArray[np.float64],
-    surface: Resampling, colors: Resampling, sigma: Resampling,
-) -> tuple[Floats, Floats, NDArray[np.uint8], Floats, NDArray[np.int32]]:
+    support: Bools, xs: Doubles, ys: Doubles, surface: Resampling, colors: Resampling,
+    sigma: Resampling,
+) -> tuple[Floats, Floats, Bytes, Floats, Ints]:
     """Gather the grid's supported points, row by row: points, normals, colours, sigma, cells.
 
     support : (m, k); xs, ys : (k,), (m,), mm
@@ -105,7 +103,7 @@ def _reader(source: Resampling) -> _Reader:
 
 
 @compiled
-def _read_between(reader: _Reader, row: int, known: int, firsts: Indices, ends: Indices) -> int:
+def _read_between(reader: _Reader, row: int, known: int, firsts: Sizes, ends: Sizes) -> int:
     """Read the planes at a row of the other grid; give the upper one of their rows at hand.
 
     known : what was given for the row before, -2 before any
@@ -132,7 +130,7 @@ def _read_between(reader: _Reader, row: int, known: int, firsts: Indices, ends: 
 
 
 @compiled
-def _extents(support: NDArray[np.bool_]) -> tuple[Indices, Indices]:
+def _extents(support: Bools) -> tuple[Sizes, Sizes]:
     """Give each row's first supported column, and the first behind all of them.
 
     Where a row has none these are the number of columns and 0.
@@ -151,9 +149,7 @@ def _extents(support: NDArray[np.bool_]) -> tuple[Indices, Indices]:
 
 
 @compiled
-def indices_of_zeros(
-    image: NDArray[np.uint8], rows: Floats, columns: Floats, cells: NDArray[np.int32]
-) -> NDArray[np.int64]:
+def indices_of_zeros(image: Bytes, rows: Floats, columns: Floats, cells: Ints) -> NDArray[np.int64]:
     """Give the indices of the cells at whose places an image, to the nearest pixel, is zero.
 
     rows, columns : (m,), (k,), where in the image the cells' rows and columns are, inside it

@@ -21,16 +21,14 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from denseface.recon.arrays import Bools, Floats
 from denseface.recon.numerics.filters import filtered, gaussian_taps
 from denseface.recon.numerics.jit import compiled
 from denseface.recon.settings import Settings
 
 __all__ = ["VarianceComponents", "averaging_cutoff", "fit_cutoff", "noise_fraction",
            "standard_error", "variance_components"]
-
-Floats = NDArray[np.float32]
 
 _HOLE = 0.4
 """H, for each spacing into a hole. This and the next five: `bench/calibration.py --fit`."""
@@ -94,8 +92,8 @@ def averaging_cutoff(detail_factor: float) -> float:
 
 
 def variance_components(
-    points: Floats, support: NDArray[np.bool_], surface: Floats, origin: tuple[float, float],
-    step: float, spacing: float,
+    points: Floats, support: Bools, surface: Floats, origin: tuple[float, float], step: float,
+    spacing: float,
 ) -> VarianceComponents:
     """Find the components of the variance, place by place.
 
@@ -128,8 +126,8 @@ def variance_components(
 
 @compiled
 def node_statistics(
-    points: Floats, support: NDArray[np.bool_], surface: Floats, origin: tuple[float, float],
-    step: float, every: int,
+    points: Floats, support: Bools, surface: Floats, origin: tuple[float, float], step: float,
+    every: int,
 ) -> Floats:
     """Gather what the standard error is made of on every so many grid points, the nodes.
 
