@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from denseface.recon.arrays import Bools, Floats
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["add_resampled", "column_positions", "exceeds", "read_row"]
+__all__ = ["add_resampled", "column_positions", "exceeds"]
 
-_0, _1 = np.uint64(0), np.uint64(1)
+_1 = np.uint64(1)
 """Unsigned: an index that might be negative costs a check at each access."""
 
 
@@ -48,10 +48,11 @@ def _read_rows(
     known : the row that was read before, with its next
     lines : (2, k), the even row, then the odd one
     """
-    flat, wide, count = image.ravel(), np.uint64(image.shape[1]), np.uint64(len(left))
-    if first != known + 1:
-        read_row(flat, np.uint64(first) * wide, left, part, _1, _0, count, lines[first & 1])
-    read_row(flat, np.uint64(first + 1) * wide, left, part, _1, _0, count, lines[1 - (first & 1)])
+    for row in range(first if first != known + 1 else first + 1, first + 2):
+        line, into = image[row], lines[row & 1]
+        for j in range(np.uint64(len(left))):
+            here = line[left[j]]
+            into[j] = here + part[j] * (line[left[j] + _1] - here)
 
 
 @compiled
@@ -62,18 +63,3 @@ def column_positions(columns: Floats, width: int) -> tuple[NDArray[np.uint32], F
         left[j] = min(int(columns[j]), width - 2)
         part[j] = columns[j] - np.float32(left[j])
     return left, part
-
-
-@compiled
-def read_row(
-    image: Floats, begin: np.uint64, left: NDArray[np.uint32], part: Floats, channels: np.uint64,
-    first: np.uint64, end: np.uint64, out: Floats,
-) -> None:
-    """Read a row of a flat image, which starts at `begin`, at `column_positions`.
-
-    first, end : range of the wanted values
-    """
-    for j in range(first, end):
-        at = begin + left[j]
-        here = image[at]
-        out[j] = here + part[j] * (image[at + channels] - here)
