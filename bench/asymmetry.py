@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.calibration_samples import CHOOSING, REPORTING
+from bench.heads import CHOOSING, REPORTING
 from bench.machine import describe
 from denseface.recon import Preset, ReconstructionError, Settings, reconstruct
 from tests.simulator import (

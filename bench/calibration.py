@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.calibration_samples import CHOOSING, REPORTING, Floats, Samples, frames, sample
+from bench.calibration_samples import Floats, Samples, frames, sample
+from bench.heads import CHOOSING, REPORTING
 from bench.machine import describe
 from bench.sigma_fit import fitted
 from denseface.recon import Preset

@@ -18,12 +18,8 @@ from denseface.recon.face import Face
 from denseface.recon.propagation.uncertainty import VarianceComponents, variance_components
 from tests.simulator import KINECT_CALIBRATED, Person, Scene, Truth, head_names, simulate
 
-__all__ = ["CHOOSING", "REPORTING", "Samples", "frames", "sample"]
+__all__ = ["Samples", "frames", "sample"]
 
-CHOOSING = ("ict_id1", "ict_id2", "mh_asian_f")
-"""Heads that settings are chosen and coefficients fitted on."""
-REPORTING = ("lps", "ict_neutral", "mh_afr_f", "mh_cauc_m")
-"""Heads that figures are of."""
 
 _DISTANCES_MM = (600.0, 1100.0)
 _YAW = 20.0

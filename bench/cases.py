@@ -10,19 +10,17 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from bench.accuracy import RECORDINGS
+from bench.heads import REPORTING, at_hand
 from denseface.capture import RgbdFrame, open_source
 from denseface.recon import Neighbors, Preset, ReconstructionError, Settings, reconstruct
 from denseface.recon.face import Face
-from tests.simulator import KINECT_CALIBRATED, Person, Scene, Truth, head_names, simulate
+from tests.simulator import KINECT_CALIBRATED, Person, Scene, Truth, simulate
 
-__all__ = ["HOLE_SPACINGS", "Case", "posed", "recorded", "reporting_heads", "simulated",
-           "with_preset"]
+__all__ = ["HOLE_SPACINGS", "Case", "posed", "recorded", "simulated", "with_preset"]
 
 HOLE_SPACINGS = 2.0
 """A point farther than this many mean spacings from every seed, over (X, Y), is inside a hole."""
 
-_HEADS = ("lps", "ict_neutral", "mh_afr_f", "mh_cauc_m")
-"""Heads that no setting was chosen on."""
 _DISTANCES_MM = (600.0, 1100.0)
 _YAW = 20.0
 """Largest turn to either side, degrees."""
@@ -37,7 +35,7 @@ class Case:
     name : the recording, or the simulated scene
     frame : the frame
     truth : its true surface
-    face : our face, `best` preset
+    face : our face, `best` preset unless another was asked for
     """
 
     name: str
@@ -109,7 +107,7 @@ def recorded(frames: int) -> Iterator[Case]:
 
 def simulated(count: int) -> Iterator[Case]:
     """Give frames of heads at random distances and turns, all with many holes."""
-    heads = reporting_heads()
+    heads = at_hand(REPORTING)
     for index in range(count):
         rng = np.random.default_rng([7, index])
         head = heads[index % len(heads)]
@@ -119,12 +117,10 @@ def simulated(count: int) -> Iterator[Case]:
             yield case
 
 
-def reporting_heads() -> list[str]:
-    """List the heads at hand that no setting was chosen on; the procedural one where none is."""
-    return [name for name in _HEADS if name in head_names()] or ["procedural"]
-
-
-def posed(head: str, distance: float, yaw: float, holes: float, seed: int) -> Case | None:
+def posed(
+    head: str, distance: float, yaw: float, holes: float, seed: int,
+    preset: Preset = Preset.BEST,
+) -> Case | None:
     """Simulate one head at a distance, mm, turned by degrees; None, and a line, where it fails.
 
     holes : `Scene.holes`; seed : of noise, holes and the wall's pattern, at least 100
@@ -133,11 +129,11 @@ def posed(head: str, distance: float, yaw: float, holes: float, seed: int) -> Ca
     shot, = simulate(scene, KINECT_CALIBRATED, seed=seed)
     name = f"{head} {distance:.0f} mm {yaw:+.0f} deg"
     try:
-        return _case(name, shot.frame, shot.truth)
+        return _case(name, shot.frame, shot.truth, preset)
     except ReconstructionError as error:
         print(f"{name} is left out: {error}", file=sys.stderr)
         return None
 
 
-def _case(name: str, frame: RgbdFrame, truth: Truth) -> Case:
-    return Case(name, frame, truth, reconstruct(frame, with_preset(Preset.BEST)))
+def _case(name: str, frame: RgbdFrame, truth: Truth, preset: Preset = Preset.BEST) -> Case:
+    return Case(name, frame, truth, reconstruct(frame, with_preset(preset)))

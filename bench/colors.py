@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from bench.cases import HOLE_SPACINGS, reporting_heads
+from bench.cases import HOLE_SPACINGS
+from bench.heads import REPORTING, at_hand
 from bench.machine import describe
 from denseface.recon import ReconstructionError, reconstruct
 from denseface.recon.face import Face
@@ -158,7 +159,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="script/bench colors", description=__doc__)
     parser.add_argument("--simulated", type=int, default=24, metavar="N",
                         help="frames of heads before a room (24)")
-    parser.add_argument("--heads", nargs="+", default=reporting_heads(), choices=head_names(),
+    parser.add_argument("--heads", nargs="+", default=at_hand(REPORTING), choices=head_names(),
                         help="default: the reported ones")
     args = parser.parse_args()
     print(describe(f"script/bench colors --simulated {args.simulated}"))

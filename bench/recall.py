@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from bench.accuracy import RECORDINGS
-from bench.recall_scenes import CHOOSING, REPORTING, View, empty_views, face_views, taken
+from bench.heads import CHOOSING, REPORTING
+from bench.recall_scenes import View, empty_views, face_views, taken
 from denseface.capture import RgbdFrame, open_source
 from denseface.recon import Settings
 from denseface.recon.detection import Detection, detect_face

