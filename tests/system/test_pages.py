@@ -52,8 +52,11 @@ def test_a_how_to_does_what_it_says(page, sensor, tmp_path):
         assert any(block.language == "diff" for block in blocks), "ends in one row of a table"
         done = run_all(blocks, copy, variables | {"PYTHONPATH": str(copy)}, _TIMEOUT_S)
         assert done.returncode == 0, f"{page}: {done.stderr}{done.stdout}"
-        checks = [Snippet("sh", "ruff check --no-cache capture recon service\n"
-                          "lint-imports --no-cache\npython -m pytest -q -p no:cacheprovider tests/unit/test_rooms.py\n", 0)]
+        checks = [Snippet("sh", """
+            ruff check --no-cache capture recon service
+            lint-imports --no-cache
+            python -m pytest -q -p no:cacheprovider tests/unit/test_rooms.py
+            """, 0)]
         done = run_all(checks, copy, variables | {"PYTHONPATH": str(copy)}, _TIMEOUT_S)
         assert done.returncode == 0, f"{page} leaves: {done.stderr}{done.stdout}"
 
