@@ -86,7 +86,7 @@ def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> Rgb
     try:
         with zipfile.ZipFile(path) as archive:
             optional = ("registered",) if chosen is None else ("registered", "calibration")
-            arrays = _read_arrays(path, archive, optional)
+            arrays = _read_arrays(Path(path), archive, optional)
     except CaptureError:
         raise
     except (OSError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError,
@@ -135,7 +135,7 @@ def _own_calibration(path: str | Path, array: NDArray[Any]) -> Calibration:
 
 
 def _read_arrays(
-    path: str | Path, archive: zipfile.ZipFile, optional: tuple[str, ...]
+    path: Path, archive: zipfile.ZipFile, optional: tuple[str, ...]
 ) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {}
     for member in archive.infolist():

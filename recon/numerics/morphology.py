@@ -47,7 +47,7 @@ def opened(image: Bytes, radius: float) -> Bytes:
 
 def large_components(image: Bools, least: float) -> Bools:
     """Keep the components, connected at sides or corners, of at least so many pixels."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(image.view(np.uint8), connectivity=8)
-    large = stats[:, cv2.CC_STAT_AREA] >= least
+    _, labels = cv2.connectedComponents(image.view(np.uint8), connectivity=8)
+    large: Bools = np.bincount(labels.ravel()) >= least
     large[0] = False  # the background
-    return np.asarray(large[labels], np.bool_)
+    return large.take(np.asarray(labels, np.int32))
