@@ -93,9 +93,9 @@ def mirror_costs(
                 row = (y - twice * ny - origin[1]) / step
                 cost = missing
                 if 0 <= row < rows and 0 <= column < columns:
-                    near = planes[int(row + 0.5), int(column + 0.5)]
-                    if near[2] > 0:
-                        away = (near[0] + origin[2] - (z - twice * nz)) * near[1]
+                    r, c = np.uint64(row + 0.5), np.uint64(column + 0.5)
+                    if planes[r, c, 2] > 0:
+                        away = (planes[r, c, 0] + origin[2] - (z - twice * nz)) * planes[r, c, 1]
                         cost = min(away * away, limit)
                 total += cost
             costs[a, b] = total / len(points)
