@@ -1,5 +1,6 @@
 """Frame to face: pure functions on arrays."""
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from denseface.recon.errors import (
@@ -17,34 +18,19 @@ if TYPE_CHECKING:
     from denseface.recon.warmup import warm
 
 __all__ = [
-    "DenseCloud",
-    "Face",
-    "FaceWithoutDepthError",
-    "Neighbors",
-    "NoDepthError",
-    "NoFaceError",
-    "PointCloud",
-    "Preset",
-    "ReconstructionError",
-    "Report",
-    "Settings",
-    "TooLittleDepthError",
-    "reconstruct",
-    "warm",
+    "DenseCloud", "Face", "FaceWithoutDepthError", "Neighbors", "NoDepthError", "NoFaceError",
+    "PointCloud", "Preset", "ReconstructionError", "Report", "Settings", "TooLittleDepthError",
+    "reconstruct", "warm",
 ]
+
+_MODULES = {"reconstruct": "denseface.recon.pipeline", "warm": "denseface.recon.warmup"}
+"""Loading OpenCV and SciPy takes most of a second, and who only handles faces needs neither."""
 
 
 def __getattr__(name: str) -> object:
-    # Loading OpenCV and SciPy takes most of a second, and who only handles faces needs neither.
-    if name == "reconstruct":
-        from denseface.recon.pipeline import reconstruct
-
-        return reconstruct
-    if name == "warm":
-        from denseface.recon.warmup import warm
-
-        return warm
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_MODULES[name]), name)
 
 
 def __dir__() -> list[str]:

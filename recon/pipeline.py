@@ -71,24 +71,16 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     sampler = partial(sample_colors, frame, registered)
     surface = surface_of(seeds.points, spacing, settings, sampler)
     clock.lap("rbf")
-    dense = densify(seeds, surface, spacing, settings.ratio, noise_fraction(settings),
-                    sampler)
+    dense = densify(seeds, surface, spacing, settings.ratio, noise_fraction(settings), sampler)
     clock.lap("propagation")
     initial = PointCloud(seeds.points, seeds.colors)
     report = Report(
-        face_box=found.box,
-        candidates=found.candidates,
-        initial_points=len(initial),
-        dense_points=len(dense),
-        mean_spacing_mm=spacing,
-        r0_mm=settings.r0_factor * spacing,
-        noise_mm=surface.noise,
-        timings_ms=clock.timings_ms(),
-        settings=settings,
-        calibration=frame.calibration_origin,
-        skew_us=frame.skew_us,
-        version=_version(),
-        warnings=_warnings(frame, len(initial)),
+        face_box=found.box, candidates=found.candidates,
+        initial_points=len(initial), dense_points=len(dense),
+        mean_spacing_mm=spacing, r0_mm=settings.r0_factor * spacing, noise_mm=surface.noise,
+        timings_ms=clock.timings_ms(), settings=settings,
+        calibration=frame.calibration_origin, skew_us=frame.skew_us,
+        version=_version(), warnings=_warnings(frame, len(initial)),
     )
     return Face(initial, dense, report)
 

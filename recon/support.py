@@ -55,13 +55,7 @@ class Support:
 
     @classmethod
     def of(cls, points: Floats, spacing: float) -> Self:
-        """Find where seeds support a surface.
-
-        Parameters
-        ----------
-        points : (n, 3) float32, mm
-        spacing : mean spacing of the seeds, mm
-        """
+        """Find where seeds, (n, 3) float32, mm, of a mean spacing, mm, support a surface."""
         step = spacing / _FINENESS
         reach = (_CLOSING + _GROWTH) * spacing
         left, right, top, bottom = xy_bounds(points)
@@ -105,16 +99,9 @@ class Support:
         return columns, rows
 
     def on_grid(self, step: float) -> tuple[Doubles, Doubles, Bools]:
-        """Sample on another grid over the same region.
+        """Sample on a grid of another step, mm, over the same region.
 
-        Parameters
-        ----------
-        step : distance of grid points, mm
-
-        Returns
-        -------
-        xs, ys : (columns,), (rows,) float64, mm
-        support : (rows, columns) bool
+        Returns xs, ys, (columns,), (rows,) float64, mm, and the support, (rows, columns) bool.
         """
         xs, ys = (_axis(own[0], own[-1], step) for own in (self.xs, self.ys))
         columns, rows = self.coordinates(xs, ys)

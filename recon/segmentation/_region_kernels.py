@@ -92,22 +92,8 @@ def row_medians(z: Floats, mask: Bools, every: int) -> tuple[NDArray[np.int64], 
 
     Returns their indices, and the median of their masked z.
     """
-    rows, columns = mask.shape
-    at, medians = np.empty(rows, np.int64), np.empty(rows, np.float64)
-    held = np.empty(columns, np.float32)
-    seen = taken = 0
-    for row in range(rows):
-        count = 0
-        for column in range(columns):
-            if mask[row, column]:
-                held[count] = z[row, column]
-                count += 1
-        if count:
-            if seen % every == 0:
-                at[taken], medians[taken] = row, np.median(held[:count])
-                taken += 1
-            seen += 1
-    return at[:taken], medians[:taken]
+    rows = np.array([row for row in range(len(mask)) if mask[row].any()])[::every]
+    return rows, np.array([np.float64(np.median(z[row][mask[row]])) for row in rows])
 
 
 @compiled

@@ -19,17 +19,13 @@ _FAR = np.float32(1e12)
 
 
 def mean_spacing(points: Floats, pixels: Ints, how: Neighbors) -> float:
-    """Measure the mean distance, over (X, Y), of a seed to its nearest neighbour.
+    """Measure the mean distance, mm, over (X, Y), of a seed to its nearest neighbour.
 
     Parameters
     ----------
     points : (n, 3) float32, mm, depth camera frame, n >= 2
     pixels : (n, 2) int32, (row, column) of each seed in the depth image
     how : how the neighbours are found
-
-    Returns
-    -------
-    float, mm
     """
     if len(points) < 2:
         raise ValueError(f"points must be at least 2 to have a spacing, got {len(points)}")
@@ -45,16 +41,9 @@ def randomized_neighbors(xy: Floats, k: int, checks: int = _CHECKS) -> tuple[Int
     Silpa-Anan and Hartley, 2008, doi:10.1109/CVPR.2008.4587638, as implemented in FLANN.
     Approximate, and built anew with other random cuts each time.
 
-    Parameters
-    ----------
-    xy : (n, 2) float32, mm
-    k : neighbours for each point
-    checks : leaves visited for each query
+    xy : (n, 2) float32, mm; checks : leaves visited for each query
 
-    Returns
-    -------
-    indices : (n, k) int32
-    distances : (n, k) float32, mm
+    Returns indices, (n, k) int32, and distances, (n, k) float32, mm.
     """
     index = cv2.flann.Index(xy, {"algorithm": _FLANN_INDEX_KDTREE, "trees": _TREES})
     indices, squared = index.knnSearch(xy, k, params={"checks": checks})
@@ -71,8 +60,7 @@ def randomized_spacing(xy: Floats) -> float:
 
 def exact_spacing(xy: Floats) -> float:
     """Mean nearest-neighbour distance of (n, 2) points, mm, by an exact kd-tree."""
-    distances = np.asarray(cKDTree(xy).query(xy, k=2)[0])
-    return float(distances[:, 1].mean())
+    return float(np.asarray(cKDTree(xy).query(xy, k=2)[0])[:, 1].mean())
 
 
 def lattice_spacing(points: Floats, pixels: Ints) -> float:
@@ -90,16 +78,12 @@ def lattice_spacing(points: Floats, pixels: Ints) -> float:
 @compiled
 def _nearest_around(points: Floats, pixels: Ints) -> tuple[float, int]:
     """Sum the seeds' distances to the nearest among the 24 pixels around, and count them."""
-    top, left = pixels[0]
-    bottom, right = top, left
-    for i in range(len(pixels)):
-        top, bottom = min(top, pixels[i, 0]), max(bottom, pixels[i, 0])
-        left, right = min(left, pixels[i, 1]), max(right, pixels[i, 1])
     # Two pixels without a seed all around, so that no step leaves the image.
-    rows, columns = bottom - top + 5, right - left + 5
+    top, left = pixels[:, 0].min() - 2, pixels[:, 1].min() - 2
+    rows, columns = pixels[:, 0].max() - top + 3, pixels[:, 1].max() - left + 3
     x, y = np.full((rows, columns), _NOWHERE), np.full((rows, columns), _NOWHERE)
     for i in range(len(pixels)):
-        row, column = pixels[i, 0] - top + 2, pixels[i, 1] - left + 2
+        row, column = pixels[i, 0] - top, pixels[i, 1] - left
         x[row, column], y[row, column] = points[i, 0], points[i, 1]
     nearest = np.full((rows, columns), _FAR)
     for row in range(2, rows - 2):
@@ -116,7 +100,7 @@ def _nearest_around(points: Floats, pixels: Ints) -> tuple[float, int]:
                     other[k] = min(other[k], gap)
     total, count = 0.0, 0
     for i in range(len(pixels)):
-        gap = nearest[pixels[i, 0] - top + 2, pixels[i, 1] - left + 2]
+        gap = nearest[pixels[i, 0] - top, pixels[i, 1] - left]
         if gap < _FAR:
             total += np.sqrt(gap)
             count += 1
