@@ -12,7 +12,7 @@ from denseface.service.protocol.roles import Role
 from denseface.service.security import revoke
 from tests.system.guarded import guarded_hub, press_through
 from tests.unit.service.faces import small_face
-from tests.waiting import LIMIT_S
+from tests.waiting import LIMIT_S, PATIENCE
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,7 @@ def _client(hub, name):
 
 
 def _run(main):
-    return asyncio.run(asyncio.wait_for(main, 100))
+    return asyncio.run(asyncio.wait_for(main, 100 * PATIENCE))
 
 
 def test_a_subscriber_follows_what_is_published(hub):

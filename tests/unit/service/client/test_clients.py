@@ -34,7 +34,7 @@ def run(main):
 
     async def watched():
         asyncio.get_running_loop().set_exception_handler(lambda _, what: complaints.append(what))
-        return await asyncio.wait_for(main, 60)
+        return await asyncio.wait_for(main, LIMIT_S)
 
     result = asyncio.run(watched())
     assert complaints == []
