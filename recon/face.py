@@ -1,11 +1,12 @@
 """Seeds, and the result: initial cloud, dense cloud, report."""
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, FailFast
+from pydantic import BaseModel, ConfigDict, FailFast, field_validator
 
 from denseface.recon.arrays import Bytes, Floats, Ints
 from denseface.recon.settings import Settings
@@ -109,6 +110,11 @@ class FaceCandidate(_Model):
     """`chosen`, `farther`, or why it is no face."""
 
 
+STAGES = ("overview", "detection", "registration", "segmentation", "neighbors", "rbf",
+          "propagation")
+"""The stages of a reconstruction, in order: names in `Report.timings_ms`, beside `total`."""
+
+
 class Report(_Model):
     """What was done to the frame, as written by `--report`."""
 
@@ -133,6 +139,16 @@ class Report(_Model):
     """Depth time stamp less colour time stamp, microseconds."""
     version: str
     warnings: Annotated[tuple[str, ...], FailFast()] = ()
+
+    @field_validator("timings_ms")
+    @classmethod
+    def _known_stages(cls, given: dict[str, float]) -> dict[str, float]:
+        unknown = next((name for name in given if name not in (*STAGES, "total")), None)
+        if unknown is not None:
+            raise ValueError(f"{unknown[:40]!r} is no stage")
+        if not all(0 <= ms < math.inf for ms in given.values()):
+            raise ValueError("a time is negative or not finite")
+        return given
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterator, Sequence
 from importlib.metadata import version
 
 import structlog
+from pydantic import ValidationError
 
 from denseface.recon.settings import Settings
 from denseface.service import errors, storage
@@ -61,7 +62,8 @@ class Hub:
         common = Common(store, Captures(store), self._writer, self._peers, settings)
         self._outcomes = Outcomes(store, self._requeue_damaged)
         self._jobs = Jobs(common, self._outcomes.publish, self._rejections)
-        self._presses = Presses(common, recon, self._jobs.add, opened + settings.silence_s)
+        self._presses = Presses(
+            common, recon, self._jobs.add, opened + settings.silence_s, self._rejections)
         self._maintenance = Maintenance(
             common, self._presses, self._jobs, self._outcomes, self._figures.counters)
         self._previews = Previews(self._peers, settings.heartbeat_s)
@@ -216,7 +218,7 @@ class Hub:
             case messages.PreviewFrame() as message:
                 yield from self._previews.receive(peer, message, packet)
             case messages.FrameFailed() as message:
-                yield from self._presses.frame_failed(message)
+                yield from self._presses.frame_failed(peer, message)
             case messages.Result() as message:
                 self._jobs.result(peer, message, packet)
             case messages.JobFailed() as message:
@@ -249,6 +251,13 @@ class Hub:
             self._jobs.worker_lost(worker)
 
     def _status(self, request: int = 0) -> messages.Status:
+        try:
+            return self._make_status(request)
+        except ValidationError as error:  # a name or count that no status may have
+            field, reason = errors.first_error(error)
+            raise errors.LocalProtocolError(f"status: {field}: {reason}") from error
+
+    def _make_status(self, request: int) -> messages.Status:
         counts, counters = self._store.counts(), self._figures.counters
         return messages.Status(
             request=request, epoch=self._store.epoch, sequence=self._store.last_sequence(),

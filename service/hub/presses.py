@@ -9,6 +9,7 @@ import structlog
 from denseface.recon.settings import Settings
 from denseface.service.errors import ServiceError, StoreError
 from denseface.service.hub._common import Common
+from denseface.service.monitoring import Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState
@@ -48,7 +49,8 @@ class Presses:
     """Captures whose frame is awaited or being written."""
 
     def __init__(
-        self, common: Common, recon: Settings, accepted: Callable[[str], None], sensors_due: float
+        self, common: Common, recon: Settings, accepted: Callable[[str], None], sensors_due: float,
+        rejections: Rejections,
     ) -> None:
         """Take presses.
 
@@ -61,6 +63,7 @@ class Presses:
         self._store, self._captures, self._writer, self._peers, self._settings = common
         self._accepted = accepted
         self._sensors_due = sensors_due
+        self._rejections = rejections
         self._recon = recon
         self._recon_hash = settings_hash(recon)
         self._presses: dict[str, _Press] = {}
@@ -128,6 +131,11 @@ class Presses:
                        messages.FrameRefused(capture_id=capture_id, message="nobody waits for it"))
             return
         press = self._presses[capture_id]
+        if peer != press.sensor:
+            self._not_asked(capture_id)
+            yield send(peer, messages.FrameRefused(
+                capture_id=capture_id, message="another sensor was asked"))
+            return
         press.frame_sender = peer
         self._captures.advance(capture_id, CaptureEvent.FRAME_RECEIVED)
         try:
@@ -162,10 +170,18 @@ class Presses:
             yield send(sender, messages.FrameRefused(capture_id=capture_id, message=str(error)))
         yield from self._refuse(capture_id, "disk", str(error))
 
-    def frame_failed(self, message: messages.FrameFailed) -> Iterator[Output]:
-        """Refuse a press for which the sensor has no frame."""
-        if self._captures.state(message.capture_id) is CaptureState.PRESSED:
-            yield from self._refuse(message.capture_id, "sensor", message.message)
+    def frame_failed(self, peer: bytes, message: messages.FrameFailed) -> Iterator[Output]:
+        """Refuse a press for which the sensor that was asked has no frame."""
+        if self._captures.state(message.capture_id) is not CaptureState.PRESSED:
+            return
+        if peer != self._presses[message.capture_id].sensor:
+            self._not_asked(message.capture_id)
+            return
+        yield from self._refuse(message.capture_id, "sensor", message.message)
+
+    def _not_asked(self, capture_id: str) -> None:
+        self._rejections.note(
+            "not asked", capture_id=capture_id, detail="a sensor answered for another one")
 
     def _refuse(
         self, capture_id: str, reason: messages.PressReason, why: str,

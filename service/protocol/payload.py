@@ -176,6 +176,11 @@ class FaceHeader(_PayloadHeader):
         return Face(initial, unpack(dense), self.report)
 
     def _clouds(self, arrays: Arrays) -> tuple[PointCloud, PackedCloud]:
+        said = self.report.initial_points, self.report.dense_points
+        if said != (self.initial_points, self.dense_points):
+            raise RemoteProtocolError(
+                f"face: the report has {said[0]} and {said[1]} points, the face has "
+                f"{self.initial_points} and {self.dense_points}")
         try:
             return PointCloud(arrays["initial_points"], arrays["initial_colors"]), PackedCloud(
                 arrays["dense_support"], arrays["dense_x"], arrays["dense_y"], arrays["dense_z"],

@@ -55,6 +55,7 @@ class AllowList:
     def __init__(self, keys: Path) -> None:
         self._folder = keys / "allowed"
         self._files: dict[str, tuple[int, ...]] | None = None
+        self._folder_stat: tuple[int, ...] | None = None
         self._by_public: Mapping[str, AllowedKey] = {}
         self._tokens: frozenset[bytes] = frozenset()
         self.changes = 0
@@ -77,8 +78,16 @@ class AllowList:
         """Whether a key is still allowed with the same roles."""
         return token in self._tokens
 
+    def refresh_if_touched(self) -> bool:
+        """Refresh where a file came, went or was replaced: one look at the folder, not at each.
+
+        A file that is written in place is seen by the next `refresh`.
+        """
+        return self._stat_folder() != self._folder_stat and self.refresh()
+
     def refresh(self) -> bool:
         """Read the folder again where its files changed; True where the list did."""
+        self._folder_stat = self._stat_folder()  # before its files, so that no change is missed
         files = self._stat_files()
         if files == self._files:
             return False
@@ -101,6 +110,14 @@ class AllowList:
         self._by_public = found
         self._tokens = frozenset(one.token for one in found.values())
         return changed
+
+    def _stat_folder(self) -> tuple[int, ...] | None:
+        """Give what changes when a name in the folder does; None where it cannot be read."""
+        try:
+            found = self._folder.stat()
+        except OSError:
+            return None
+        return found.st_dev, found.st_ino, found.st_mtime_ns, found.st_ctime_ns
 
     def _stat_files(self) -> dict[str, tuple[int, ...]]:
         """Give the name of each file and what changes when the file does."""

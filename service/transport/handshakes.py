@@ -5,6 +5,7 @@ libzmq closes such connections by itself and reports it on the socket's monitor.
 
 import errno
 import os
+import secrets
 import socket
 from contextlib import suppress
 
@@ -12,10 +13,9 @@ import zmq
 from zmq.utils.monitor import recv_monitor_message
 
 from denseface.service.monitoring import Rejections
+from denseface.service.transport._routing_ids import RoutingIds
 from denseface.service.transport.sockets import Socket
 
-_BURST = 64
-"""Events read at a time."""
 _E = zmq.Event
 _EVENTS = (_E.ACCEPTED | _E.DISCONNECTED | _E.HANDSHAKE_SUCCEEDED | _E.HANDSHAKE_FAILED_AUTH
            | _E.HANDSHAKE_FAILED_PROTOCOL | _E.HANDSHAKE_FAILED_NO_DETAIL)
@@ -28,12 +28,19 @@ _DETAILS = {
 
 
 class HandshakeMonitor:
-    """Counts the failed handshakes of one bound socket."""
+    """Counts the failed handshakes of one bound socket, and tells `routing_ids` who is there."""
 
     def __init__(self, listening: Socket, rejections: Rejections) -> None:
         self._rejections = rejections
         self._listening = listening
-        self.socket = listening.get_monitor_socket(int(_EVENTS))
+        self.routing_ids = RoutingIds()
+        address = f"inproc://monitor-{secrets.token_hex(8)}"
+        listening.monitor(address, int(_EVENTS))
+        self.socket = listening.context.socket(zmq.PAIR)
+        # No limit: where the queue is full, libzmq's own thread waits with the lock that bind,
+        # unbind and the end of the monitor need, so a flood of connections would stop the hub.
+        self.socket.set(zmq.RCVHWM, 0)
+        self.socket.connect(address)
         self._open: dict[int, str] = {}
         """Descriptor -> address of connections whose handshake is not over."""
         self._failed: str | None = None
@@ -43,7 +50,7 @@ class HandshakeMonitor:
 
     def read(self) -> None:
         """Read and count what happened."""
-        for _ in range(_BURST):
+        while True:
             try:
                 event = recv_monitor_message(self.socket, zmq.DONTWAIT)
             except zmq.Again:
@@ -54,6 +61,7 @@ class HandshakeMonitor:
         """Forget the open handshakes: all connections were cut, which libzmq does not report."""
         self.read()
         self._open.clear()
+        self.routing_ids.all_closed()
 
     def close(self) -> None:
         """Stop reading."""
@@ -62,6 +70,7 @@ class HandshakeMonitor:
 
     def _note(self, event: zmq.Event, value: int) -> None:
         if event is _E.ACCEPTED:
+            self.routing_ids.opened(value)
             self._open[value] = address_of(value)
         elif event is _E.HANDSHAKE_SUCCEEDED:
             # Of several at once it does not say which: another address may be named later.
@@ -70,6 +79,7 @@ class HandshakeMonitor:
         elif event is _E.HANDSHAKE_FAILED_AUTH:
             self._refused += 1
         elif event is _E.DISCONNECTED:
+            self.routing_ids.closed(value)
             self._ended(self._open.pop(value, None))
         elif value == errno.EFAULT:  # libzmq refuses the connection
             self._rejections.note("handshake", detail="no authenticator")

@@ -105,6 +105,9 @@ class Listener:
 
     def receive(self) -> Iterator[Incoming]:
         """Give the messages that have come, a burst of them at most."""
+        if monitor := self._router.monitor:
+            # First, so that a descriptor used again is not taken for the one that closed.
+            monitor.read()
         for _ in range(_BURST):
             try:
                 first, parts = sockets.receive_parts(
@@ -118,8 +121,9 @@ class Listener:
                 continue
             if user := self._allowed_user(first):
                 token, key = (user.token, user.fingerprint) if self._credentials else (_LOCAL, "")
-                yield Incoming(token + first.bytes, [part.buffer for part in parts], user, key,
-                               _address(first))
+                if self._is_its_own(first, token, key):
+                    yield Incoming(token + first.bytes, [part.buffer for part in parts], user, key,
+                                   _address(first))
 
     def read_events(self) -> None:
         """Take note of subscriptions, of their ends and of failed handshakes."""
@@ -139,7 +143,7 @@ class Listener:
 
     def send(self, peer: bytes, parts: Sequence[Buffer]) -> bool:
         """Send to a peer; False where it cannot be reached, or its key was revoked."""
-        if not self.is_allowed(peer):
+        if not self.is_allowed(peer) or not self._is_connected(peer):
             return False
         try:
             return sockets.send_parts(self._router.socket, [peer[_TOKEN_BYTES:], *parts])
@@ -188,6 +192,27 @@ class Listener:
     def _cut_publisher(self) -> None:
         self._publisher.cut()
         self._subscribed.clear()
+
+    def _is_its_own(self, first: zmq.Frame, token: bytes, key: str) -> bool:
+        """Say whether a message's routing id is its sender's; note where it came from."""
+        monitor = self._router.monitor
+        descriptor = _property(first, "__fd")
+        if monitor is None or not descriptor:
+            return monitor is None
+        if monitor.routing_ids.claim(first.bytes, key, token, int(descriptor)):
+            return True
+        self._rejections.note(
+            "identity", key=_property(first, "User-Id"), address=_address(first),
+            detail="calls itself as another key's connection does")
+        return False
+
+    def _is_connected(self, peer: bytes) -> bool:
+        """Say whether a peer's own connection is still open: its id may be another's by now."""
+        monitor = self._router.monitor
+        if monitor is None:
+            return True
+        monitor.read()
+        return monitor.routing_ids.is_open(peer[_TOKEN_BYTES:], peer[:_TOKEN_BYTES])
 
     def _user(self, first: zmq.Frame) -> AllowedKey | None:
         if self._credentials is None:

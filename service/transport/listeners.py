@@ -116,7 +116,7 @@ class Listeners:
                 "the authenticator has stopped: nobody can connect any more")
         ready = dict(self._poller.poll(timeout_ms))
         if self._allow_list and ready:
-            self._allow_list.refresh()  # so that a key revoked a moment ago is refused
+            self._allow_list.refresh_if_touched()  # so that a key revoked a moment ago is refused
         if self._authenticator and self._authenticator.socket in ready:
             self._authenticator.answer()
         for number, listener in enumerate(self._listeners):

@@ -1,5 +1,7 @@
 """ZeroMQ sockets with every limit set."""
 
+import ctypes
+import os
 from collections.abc import Sequence
 
 import zmq
@@ -31,6 +33,10 @@ class TooLongError(RemoteProtocolError):
 
 def open_socket(context: Context, kind: int, address: str) -> Socket:
     """Make a socket for an address, with high-water marks, linger and size limit set."""
+    if kind == zmq.ROUTER:
+        # libzmq numbers its peers from `rand()`, which it never seeds, and aborts where a peer has
+        # taken the number that comes next for its name.
+        ctypes.CDLL(None).srand(int.from_bytes(os.urandom(4), "little"))
     socket = context.socket(kind)
     if address.startswith("tcp://["):
         socket.set(zmq.IPV6, 1)

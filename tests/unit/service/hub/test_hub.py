@@ -11,7 +11,10 @@ from denseface.service.protocol.states import CaptureState
 from denseface.service.storage import FolderStore
 from tests.unit.service.hub.bench import (
     CLIENT,
+    FACE,
     FACE_ARRAYS,
+    FRAME,
+    FRAME_ARRAYS,
     HASH,
     OTHER,
     SENSOR,
@@ -331,3 +334,40 @@ def test_an_answer_to_another_job_does_not_lose_the_capture(bench):
     bench.worker()
     bench.result(hashed="00")
     assert kinds(bench.worker(credit=1)) == [(WORKER, "job")]
+
+
+def test_only_the_sensor_that_was_asked_answers_a_take(bench):
+    bench.sensor()
+    bench.press()
+    bench.say(OTHER, messages.SensorReady(name="other", source="y.oni"))
+    answers = bench.say(OTHER, messages.Frame(capture_id="a", frame=FRAME), FRAME_ARRAYS)
+    assert [(peer, message.kind) for peer, message in answers] == [(OTHER, "frame_refused")]
+    assert bench.say(OTHER, messages.FrameFailed(capture_id="a", message="none")) == []
+    assert bench.store.find("a") is None
+    assert bench.hub.tick(bench.now)[-1].packet.message.refused == {"not asked": 2}
+    assert (CLIENT, "press_accepted") in [
+        (peer, message.kind) for peer, message in bench.frame()]
+
+
+def test_a_report_that_contradicts_its_face_is_a_failed_attempt(bench):
+    bench.worker()
+    bench.accepted("a")
+    lying = FACE.model_copy(update={"report": FACE.report.model_copy(
+        update={"dense_points": FACE.dense_points + 1})})
+    for credit in (1, 2):
+        bench.say(WORKER, messages.Result(
+            capture_id="a", settings_hash=HASH, face=lying,
+            frame_sha256=bench.checksum("a")), FACE_ARRAYS)
+        bench.worker(credit=credit)
+    assert [message.kind for message in bench.published] == ["capture_failed"]
+    assert bench.published[0].dead
+    assert "the report has" in bench.published[0].message
+
+
+def test_a_status_that_cannot_be_made_does_not_end_the_hub(bench):
+    for number in range(65):  # a status holds 64
+        bench.hub._rejections.note(f"reason {number}")
+    assert bench.wait(5) == []
+    (answer,) = bench.say(CLIENT, messages.GetStatus(request=3))
+    assert answer[1].kind == "request_failed"
+    assert "refused" in answer[1].message

@@ -305,3 +305,12 @@ def test_every_kind_stands_in_the_documentation():
     text = (Path(__file__).parents[4] / "docs" / "wire.md").read_text()
     for kind in (*messages.TO_HUB, *messages.FROM_HUB):
         assert f"`{kind.model_fields['kind'].default}`" in text
+
+
+@pytest.mark.parametrize("timings", [
+    {"x" * 195: 1.0}, {"total": -1.0}, {"rbf\n": 1.0}, {"total": 1e400}])
+def test_a_face_has_times_of_known_stages_only(timings):
+    tree = json.loads(WIRES[2][0])
+    tree["face"]["report"]["timings_ms"] = timings
+    with pytest.raises(RemoteProtocolError, match="timings_ms"):
+        decode_to_hub([json.dumps(tree).encode(), *WIRES[2][1:]])

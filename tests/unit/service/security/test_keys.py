@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+from pathlib import Path
 
 import pytest
 
@@ -183,3 +184,20 @@ def test_the_commands(keys, capsys):
     assert (status, len(error.splitlines())) == (2, 1)
     status, _, error = run("allow", "x", keys / "none.public", "worker")
     assert (status, len(error.splitlines())) == (2, 1)
+
+
+def test_a_message_costs_one_look_however_many_keys_are_allowed(keys, monkeypatch):
+    for number in range(20):
+        allow(keys, f"key-{number}", KeyPair.generate().public, frozenset({Role.WORKER}))
+    found = AllowList(keys)
+    looks = []
+    stat = Path.stat
+    monkeypatch.setattr(Path, "stat", lambda path, **how: looks.append(path) or stat(path, **how))
+    assert not found.refresh_if_touched()
+    assert len(looks) == 1
+    revoke(keys, "key-7")
+    assert found.refresh_if_touched()
+    allow(keys, "key-8", next(one.public for one in found if one.name == "key-8"),
+          frozenset({Role.SENSOR}))
+    assert found.refresh_if_touched()
+    assert (len(found), found.changes) == (19, 2)

@@ -1,9 +1,15 @@
 """The address of a connection, by a descriptor that may be closed already."""
 
 import socket
+import threading
 from pathlib import Path
 
-from denseface.service.transport.handshakes import address_of
+import zmq
+
+from denseface.service.monitoring import Rejections
+from denseface.service.monitoring.figures import Counters
+from denseface.service.transport.handshakes import HandshakeMonitor, address_of
+from tests.waiting import LIMIT_S
 
 
 def test_a_connection_is_named_by_its_other_end():
@@ -21,3 +27,18 @@ def test_a_number_that_is_something_else_by_now_has_no_address(tmp_path):
         for number in (one.fileno(), file.fileno(), unconnected.fileno(), 999_999):
             assert address_of(number) == "gone"
         assert len(list(Path("/proc/self/fd").iterdir())) == before
+
+
+def test_a_flood_that_nobody_reads_does_not_hold_up_a_bind():
+    with zmq.Context() as context, context.socket(zmq.ROUTER) as router:
+        monitor = HandshakeMonitor(router, Rejections(Counters()))
+        port = router.bind_to_random_port("tcp://127.0.0.1")
+        for _ in range(1_500):  # three events each; a queue of libzmq holds 2,000
+            socket.create_connection(("127.0.0.1", port)).close()
+        address = router.get_string(zmq.LAST_ENDPOINT).rstrip("\0")
+        bound = threading.Thread(
+            target=lambda: (router.unbind(address), router.bind("tcp://127.0.0.1:*")), daemon=True)
+        bound.start()
+        bound.join(LIMIT_S)
+        assert not bound.is_alive()
+        monitor.close()
