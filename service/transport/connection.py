@@ -13,7 +13,7 @@ from denseface.service.errors import KeyFileError, KeyRefusedError
 from denseface.service.protocol.wire import Packet, decode_from_hub
 from denseface.service.security import KeyPair, read_pair, read_public
 from denseface.service.settings import ServiceSettings
-from denseface.service.transport.sockets import Context, Socket, open_socket
+from denseface.service.transport.sockets import Context, Socket, open_monitor, open_socket
 
 _MIN_BROKEN_OFF = 3
 """Handshakes that break off in a row until the keys are blamed: a hub may have ended in one."""
@@ -60,7 +60,7 @@ class ConnectionMonitor:
         self._socket = socket
         self._address = address
         self._keys = keys
-        self._monitor = socket.get_monitor_socket(int(_EVENTS))
+        self._monitor = open_monitor(socket, int(_EVENTS))
         self._broken_off = 0
         self._reconnect_at: float | None = None
         self.refused: KeyRefusedError | None = None

@@ -5,7 +5,6 @@ libzmq closes such connections by itself and reports it on the socket's monitor.
 
 import errno
 import os
-import secrets
 import socket
 from contextlib import suppress
 
@@ -14,7 +13,7 @@ from zmq.utils.monitor import recv_monitor_message
 
 from denseface.service.monitoring import Rejections
 from denseface.service.transport._routing_ids import RoutingIds
-from denseface.service.transport.sockets import Socket
+from denseface.service.transport.sockets import Socket, open_monitor
 
 _E = zmq.Event
 _EVENTS = (_E.ACCEPTED | _E.DISCONNECTED | _E.HANDSHAKE_SUCCEEDED | _E.HANDSHAKE_FAILED_AUTH
@@ -34,13 +33,7 @@ class HandshakeMonitor:
         self._rejections = rejections
         self._listening = listening
         self.routing_ids = RoutingIds()
-        address = f"inproc://monitor-{secrets.token_hex(8)}"
-        listening.monitor(address, int(_EVENTS))
-        self.socket = listening.context.socket(zmq.PAIR)
-        # No limit: where the queue is full, libzmq's own thread waits with the lock that bind,
-        # unbind and the end of the monitor need, so a flood of connections would stop the hub.
-        self.socket.set(zmq.RCVHWM, 0)
-        self.socket.connect(address)
+        self.socket = open_monitor(listening, int(_EVENTS))
         self._open: dict[int, str] = {}
         """Descriptor -> address of connections whose handshake is not over."""
         self._failed: str | None = None

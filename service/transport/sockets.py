@@ -1,7 +1,7 @@
 """ZeroMQ sockets with every limit set."""
 
 import ctypes
-import os
+import secrets
 from collections.abc import Sequence
 
 import zmq
@@ -36,7 +36,7 @@ def open_socket(context: Context, kind: int, address: str) -> Socket:
     if kind == zmq.ROUTER:
         # libzmq numbers its peers from `rand()`, which it never seeds, and aborts where a peer has
         # taken the number that comes next for its name.
-        ctypes.CDLL(None).srand(int.from_bytes(os.urandom(4), "little"))
+        ctypes.CDLL(None).srand(secrets.randbits(32))
     socket = context.socket(kind)
     if address.startswith("tcp://["):
         socket.set(zmq.IPV6, 1)
@@ -47,6 +47,20 @@ def open_socket(context: Context, kind: int, address: str) -> Socket:
     socket.set(zmq.RECONNECT_IVL, _RECONNECT_MS)
     socket.set(zmq.RECONNECT_IVL_MAX, _RECONNECT_MAX_MS)
     return socket
+
+
+def open_monitor(socket: Socket, events: int) -> Socket:
+    """Open a monitor of a socket, whose queue has no limit.
+
+    Where it had one, libzmq's own thread would wait at a full queue with the lock that `bind`,
+    `unbind` and `disable_monitor` need: whoever calls those does not read meanwhile.
+    """
+    address = f"inproc://monitor-{secrets.token_hex(8)}"
+    socket.monitor(address, events)
+    monitor = socket.context.socket(zmq.PAIR)
+    monitor.set(zmq.RCVHWM, 0)
+    monitor.connect(address)
+    return monitor
 
 
 def send_parts(socket: Socket, parts: Sequence[Buffer]) -> bool:

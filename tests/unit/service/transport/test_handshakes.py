@@ -1,4 +1,4 @@
-"""The address of a connection, by a descriptor that may be closed already."""
+"""Monitors: the address of a connection that may be closed already, and floods of events."""
 
 import socket
 import threading
@@ -8,6 +8,7 @@ import zmq
 
 from denseface.service.monitoring import Rejections
 from denseface.service.monitoring.figures import Counters
+from denseface.service.transport.connection import ConnectionMonitor
 from denseface.service.transport.handshakes import HandshakeMonitor, address_of
 from tests.waiting import LIMIT_S
 
@@ -42,3 +43,19 @@ def test_a_flood_that_nobody_reads_does_not_hold_up_a_bind():
         bound.join(LIMIT_S)
         assert not bound.is_alive()
         monitor.close()
+
+
+def test_a_client_that_did_not_look_for_long_can_be_closed():
+    with zmq.Context() as context, socket.create_server(("127.0.0.1", 0)) as server:
+        dealer = context.socket(zmq.DEALER)
+        dealer.set(zmq.RECONNECT_IVL, 1)
+        address = "tcp://{}:{}".format(*server.getsockname())
+        monitor = ConnectionMonitor(dealer, address, None)
+        dealer.connect(address)
+        for _ in range(2_300):  # each a handshake that breaks off; a queue holds 2,000
+            server.accept()[0].close()
+        closed = threading.Thread(target=monitor.close, daemon=True)
+        closed.start()
+        closed.join(LIMIT_S)
+        assert not closed.is_alive()
+        dealer.close(linger=0)
