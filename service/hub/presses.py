@@ -59,6 +59,7 @@ class Presses:
         recon : settings of their jobs
         accepted : called with each capture whose frame is safe
         sensors_due : until then a missing sensor may just not have connected yet, seconds
+        rejections : counts answers of sensors that were not asked
         """
         self._store, self._captures, self._writer, self._peers, self._settings = common
         self._accepted = accepted

@@ -81,7 +81,8 @@ class AllowList:
     def refresh_if_touched(self) -> bool:
         """Refresh where a file came, went or was replaced: one look at the folder, not at each.
 
-        A file that is written in place is seen by the next `refresh`.
+        A file that is written in place, or in the same tick of the file system's clock as the last
+        change, is seen by the next `refresh`.
         """
         return self._stat_folder() != self._folder_stat and self.refresh()
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from denseface.service.runtime.bounded_dict import BoundedDict
 
 _MAX_GONE = 65_536
-"""Ids of closed connections whose key is remembered; about 10 MB."""
+"""Ids of closed connections whose key is remembered: 8 MB, 25 MB of the longest."""
 
 
 @dataclass(frozen=True)
@@ -27,27 +27,29 @@ class RoutingIds:
     """
 
     def __init__(self) -> None:
-        self._descriptors: set[int] = set()
+        self._ids: dict[int, bytes | None] = {}
+        """Descriptor -> id of each open connection; None before its first message."""
         self._connections: dict[bytes, _Connection] = {}
-        self._by_descriptor: dict[int, bytes] = {}
         self._gone: BoundedDict[bytes, str] = BoundedDict(_MAX_GONE)
         """Id -> key of connections that closed."""
 
     def opened(self, descriptor: int) -> None:
         """Note a new connection."""
-        self._descriptors.add(descriptor)
+        self._ids[descriptor] = None
 
     def closed(self, descriptor: int) -> None:
         """Note that a connection closed."""
-        self._descriptors.discard(descriptor)
-        if (routing_id := self._by_descriptor.pop(descriptor, None)) is not None:
-            self._gone[routing_id] = self._connections.pop(routing_id).key
+        self._forget(self._ids.pop(descriptor, None))
 
     def all_closed(self) -> None:
         """Note that all connections were closed."""
-        for descriptor in list(self._by_descriptor):
+        for descriptor in list(self._ids):
             self.closed(descriptor)
-        self._descriptors.clear()
+
+    def _forget(self, routing_id: bytes | None) -> None:
+        """Remember of an id only whose it was."""
+        if routing_id is not None:
+            self._gone[routing_id] = self._connections.pop(routing_id).key
 
     def claim(self, routing_id: bytes, key: str, token: bytes, descriptor: int) -> bool:
         """Note a message of a connection; False where its id is another key's.
@@ -62,15 +64,14 @@ class RoutingIds:
         if owner is not None and owner != key:
             return False
         if connection and connection.descriptor != descriptor:
-            self._by_descriptor.pop(connection.descriptor, None)
-        if descriptor not in self._descriptors:  # it closed before its message was read
-            self._connections.pop(routing_id, None)
+            self._ids[connection.descriptor] = None
+            self._forget(routing_id)
+        if descriptor not in self._ids:  # it closed before its message was read
             self._gone[routing_id] = key
             return True
-        before = self._by_descriptor.get(descriptor)
-        if before is not None and before != routing_id:
-            self._gone[before] = self._connections.pop(before).key
-        self._by_descriptor[descriptor] = routing_id
+        if (before := self._ids[descriptor]) != routing_id:
+            self._forget(before)
+        self._ids[descriptor] = routing_id
         self._connections[routing_id] = _Connection(key, token, descriptor)
         return True
 

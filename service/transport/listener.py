@@ -121,9 +121,10 @@ class Listener:
                 continue
             if user := self._allowed_user(first):
                 token, key = (user.token, user.fingerprint) if self._credentials else (_LOCAL, "")
-                if self._is_its_own(first, token, key):
-                    yield Incoming(token + first.bytes, [part.buffer for part in parts], user, key,
-                                   _address(first))
+                incoming = Incoming(token + first.bytes, [part.buffer for part in parts], user, key,
+                                    _address(first))
+                if self._has_its_own_id(incoming, first):
+                    yield incoming
 
     def read_events(self) -> None:
         """Take note of subscriptions, of their ends and of failed handshakes."""
@@ -193,16 +194,16 @@ class Listener:
         self._publisher.cut()
         self._subscribed.clear()
 
-    def _is_its_own(self, first: zmq.Frame, token: bytes, key: str) -> bool:
+    def _has_its_own_id(self, incoming: Incoming, first: zmq.Frame) -> bool:
         """Say whether a message's routing id is its sender's; note where it came from."""
-        monitor = self._router.monitor
-        descriptor = _property(first, "__fd")
-        if monitor is None or not descriptor:
-            return monitor is None
-        if monitor.routing_ids.claim(first.bytes, key, token, int(descriptor)):
+        if (monitor := self._router.monitor) is None:
+            return True
+        # libzmq knows no descriptor where the other end had gone before it looked.
+        token, descriptor = incoming.peer[:_TOKEN_BYTES], int(_property(first, "__fd") or -1)
+        if monitor.routing_ids.claim(first.bytes, incoming.key, token, descriptor):
             return True
         self._rejections.note(
-            "identity", key=_property(first, "User-Id"), address=_address(first),
+            "identity", key=incoming.sender.name, address=incoming.address,
             detail="calls itself as another key's connection does")
         return False
 

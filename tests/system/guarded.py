@@ -36,7 +36,7 @@ class Peer:
 
     def __init__(
         self, address: str, pair: KeyPair | None = None, hub: str | None = None,
-        kind: int = zmq.DEALER, *, password: str | None = None,
+        kind: int = zmq.DEALER, *, password: str | None = None, routing_id: bytes | None = None,
     ) -> None:
         self.context = zmq.Context()
         self.socket = self.context.socket(kind)
@@ -45,6 +45,8 @@ class Peer:
             self.socket.curve_serverkey = hub.encode()
             self.socket.curve_publickey = pair.public.encode()
             self.socket.curve_secretkey = pair.secret.encode()
+        if routing_id:
+            self.socket.set(zmq.ROUTING_ID, routing_id)
         if password:
             self.socket.plain_username, self.socket.plain_password = b"root", password.encode()
         if kind == zmq.SUB:
@@ -118,8 +120,11 @@ class GuardedHub:
             allow(self.keys, name, read_public(public), frozenset(roles))
         return read_pair(secret)
 
-    def peer(self, name: str, kind: int = zmq.DEALER) -> Peer:
-        return Peer(self.address, read_pair(self.secret(name)), read_public(self.hub_key), kind)
+    def peer(
+        self, name: str, kind: int = zmq.DEALER, routing_id: bytes | None = None
+    ) -> Peer:
+        return Peer(self.address, read_pair(self.secret(name)), read_public(self.hub_key), kind,
+                    routing_id=routing_id)
 
     def client(self, name: str) -> Client:
         return Client(self.address, key=self.secret(name), hub_key=self.hub_key)

@@ -3,17 +3,15 @@
 import signal
 import subprocess
 import sys
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing
 
 import pytest
 import zmq
 
 from denseface.service.protocol import messages
-from denseface.service.protocol.wire import Packet, decode_from_hub, encode
-from denseface.service.security import read_pair, read_public
-from tests.system.guarded import FRAME, FRAME_ARRAYS, guarded_hub, press_through
+from tests.system.guarded import FRAME, FRAME_ARRAYS, Peer, guarded_hub, happened, press_through
 from tests.system.running import REPOSITORY
-from tests.waiting import LIMIT_MS, LIMIT_S, until
+from tests.waiting import LIMIT_S, until
 
 _FIRST_IDS = [start + further for start in (0x6b8b4567, 0xf4b0dc51) for further in range(12)]
 """Routing ids that an unseeded libzmq gives first to a process's first two ROUTERs."""
@@ -37,32 +35,11 @@ def hub(tmp_path):
         yield running
 
 
-@contextmanager
-def raw(hub, key, routing_id=None):
-    """Open a connection of a key that calls itself something."""
-    with zmq.Context() as context, context.socket(zmq.DEALER) as socket:
-        socket.linger = 0
-        socket.immediate = 1
-        if routing_id:
-            socket.set(zmq.ROUTING_ID, routing_id)
-        pair = read_pair(hub.secret(key))
-        socket.curve_serverkey = read_public(hub.hub_key).encode()
-        socket.curve_publickey, socket.curve_secretkey = pair.public.encode(), pair.secret.encode()
-        socket.connect(hub.address)
-        assert socket.poll(LIMIT_MS, zmq.POLLOUT)  # connected, as it sends nothing before
-        yield socket
-
-
-def say(socket, message, arrays=None):
-    socket.send_multipart(encode(Packet(message, arrays or {})))
-
-
-def hear(socket, kind):
-    while socket.poll(LIMIT_MS):
-        packet = decode_from_hub(socket.recv_multipart())
-        if packet.message.kind == kind:
-            return packet.message
-    raise AssertionError(f"no {kind} came")
+def open_peer(stack, hub, key, routing_id=None):
+    """Open a connection of a key that calls itself something, and wait until it stands."""
+    peer = stack.enter_context(closing(hub.peer(key, routing_id=routing_id)))
+    assert happened(peer, zmq.Event.HANDSHAKE_SUCCEEDED)
+    return peer
 
 
 def test_libzmq_still_aborts_where_an_id_is_guessed(tmp_path):
@@ -82,50 +59,47 @@ def test_the_ids_that_libzmq_gives_cannot_be_known_beforehand():
 
 def test_guessed_ids_do_not_end_the_hub(hub):
     with ExitStack() as stack:
-        context = stack.enter_context(zmq.Context())
         for number in _FIRST_IDS:
             routing_id = b"\0" + number.to_bytes(4, "big")
-            local = stack.enter_context(context.socket(zmq.DEALER))
-            local.linger = 0
-            local.set(zmq.ROUTING_ID, routing_id)
-            local.connect(hub.local)
-            for guesser in (local, stack.enter_context(raw(hub, "presser", routing_id))):
-                say(guesser, messages.GetStatus(request=1))
-                hear(guesser, "status")
+            local = stack.enter_context(closing(Peer(hub.local, routing_id=routing_id)))
+            for guesser in (local, open_peer(stack, hub, "presser", routing_id)):
+                guesser.status()
         press_through(hub, "after")
         assert hub.process.poll() is None
 
 
 def test_a_gone_worker_s_id_brings_nobody_its_frames(hub):
-    with raw(hub, "worker", b"worker-1") as worker:
-        say(worker, messages.WorkerReady(name="w", credit=0))
+    with closing(hub.peer("worker", routing_id=b"worker-1")) as worker:
+        worker.send(messages.WorkerReady(name="w", credit=0))
         until(lambda: hub.status().workers)
     # It is gone without goodbye, and counts as alive still.
-    with raw(hub, "presser", b"worker-1") as thief, raw(hub, "sensor") as sensor, \
-            raw(hub, "presser") as presser:
+    with ExitStack() as stack:
+        thief = open_peer(stack, hub, "presser", b"worker-1")
+        sensor, presser = (open_peer(stack, hub, key) for key in ("sensor", "presser"))
         assert hub.status().workers
-        say(sensor, messages.SensorReady(name="s", source="x"))
+        sensor.send(messages.SensorReady(name="s", source="x"))
         until(lambda: hub.status().sensors)
-        say(presser, messages.Press(request=1, capture_id="mine"))
-        hear(sensor, "take")
-        say(sensor, messages.Frame(capture_id="mine", frame=FRAME), FRAME_ARRAYS)
-        hear(presser, "press_accepted")
-        with raw(hub, "worker") as other:
-            say(other, messages.WorkerReady(name="o", credit=0))
-            assert hear(other, "job").capture_id == "mine"
-        assert not thief.poll(0)
+        presser.send(messages.Press(request=1, capture_id="mine"))
+        sensor.receive("take")
+        sensor.send(messages.Frame(capture_id="mine", frame=FRAME), FRAME_ARRAYS)
+        presser.receive("press_accepted")
+        other = open_peer(stack, hub, "worker")
+        other.send(messages.WorkerReady(name="o", credit=0))
+        assert other.receive("job").message.capture_id == "mine"
+        assert thief.silent()
 
 
 def test_an_id_stays_with_the_key_that_brought_it(hub):
-    with raw(hub, "worker", b"worker-1") as worker:
-        say(worker, messages.WorkerReady(name="w", credit=0))
+    with closing(hub.peer("worker", routing_id=b"worker-1")) as worker:
+        worker.send(messages.WorkerReady(name="w", credit=0))
         until(lambda: hub.status().workers)
-    with raw(hub, "presser", b"worker-1") as thief:
-        say(thief, messages.Press(request=1, capture_id="a"))
+    with closing(hub.peer("presser", routing_id=b"worker-1")) as thief:
+        thief.send(messages.Press(request=1, capture_id="a"))
         until(lambda: hub.refused("identity"))
-        assert not thief.poll(0)
-    with raw(hub, "worker", b"worker-1") as again:  # its own key may have it again
-        say(again, messages.WorkerReady(name="again", credit=1))
-        say(again, messages.Goodbye())
+        assert thief.silent()
+    # Its own key may have it again.
+    with closing(hub.peer("worker", routing_id=b"worker-1")) as again:
+        again.send(messages.WorkerReady(name="again", credit=1))
+        again.send(messages.Goodbye())
         until(lambda: not hub.status().workers)
         assert hub.refused("identity") == 1
