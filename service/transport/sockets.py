@@ -57,7 +57,7 @@ def open_monitor(socket: Socket, events: int) -> Socket:
     """
     address = f"inproc://monitor-{secrets.token_hex(8)}"
     socket.monitor(address, events)
-    monitor = socket.context.socket(zmq.PAIR)
+    monitor: Socket = socket.context.socket(zmq.PAIR)
     monitor.set(zmq.RCVHWM, 0)
     monitor.connect(address)
     return monitor
