@@ -139,8 +139,9 @@ class CaptureRows:
 
     def sequence_before_time(self, since: datetime) -> int:
         """Give the number after which the outcomes come that are as old as `since`, or newer."""
+        # By +sequence, SQLite looks up the time instead of reading all outcomes from the oldest on.
         row = self._database.select_one(
-            "SELECT coalesce(min(sequence) - 1, ?) AS number FROM outcomes WHERE finished_at >= ?",
+            "SELECT coalesce(min(+sequence) - 1, ?) AS number FROM outcomes WHERE finished_at >= ?",
             self.last_sequence(), format_timestamp(since))
         return int(row["number"]) if row else 0
 

@@ -47,6 +47,13 @@ CREATE TABLE outcomes (
 PRAGMA user_version = {_VERSION};
 """
 """By the CHECK clauses, `integrity_check` finds flipped bits in what the hub acts on."""
+_INDEXES = """
+CREATE INDEX IF NOT EXISTS captures_by_state ON captures (state);
+CREATE INDEX IF NOT EXISTS dead_letters ON outcomes (sequence) WHERE dead;
+CREATE INDEX IF NOT EXISTS outcomes_by_time ON outcomes (finished_at);
+CREATE INDEX IF NOT EXISTS outcomes_by_age ON outcomes (finished_age_s);
+"""
+"""Added to an older database too; they are no part of `_VERSION`, as a rebuild loses outcomes."""
 
 
 class Database:
@@ -95,6 +102,7 @@ class Database:
             " coalesce((SELECT max(sequence) FROM outcomes), 0)").fetchone()
         if not highest <= last < _MAX_SEQUENCE:
             raise DamagedDatabaseError(f"{self.path}: the last number is {last}, found {highest}")
+        connection.executescript(_INDEXES)
         connection.execute(
             "INSERT OR IGNORE INTO meta VALUES ('epoch', ?)", (secrets.token_hex(8),))
 

@@ -46,7 +46,7 @@ class Retention:
         return self._database.select_ids(
             "SELECT capture_id FROM outcomes WHERE finished_age_s <= ?"
             " AND (julianday(?) - julianday(finished_at) >= ? OR finished_at > ?)"
-            " ORDER BY sequence LIMIT ?",
+            " ORDER BY finished_age_s, sequence LIMIT ?",
             self._clock.now() - retention_s, now, retention_s / 86400, now, limit)
 
     def accepted_before(self, moment: datetime | None, limit: int) -> list[str]:

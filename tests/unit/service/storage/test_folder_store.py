@@ -2,6 +2,7 @@
 
 import os
 import stat
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -196,3 +197,39 @@ def test_frames_are_held_in_memory_as_far_as_there_is_room(store, monkeypatch):
     assert cache.pop("a") is None
     cache.add([records["c"]])
     assert [cache.pop(name) for name in "bc"] == [records["b"], records["c"]]
+
+
+def test_no_question_reads_all_rows(store):
+    """But which captures were accepted before a time: an operator asks it, and removes them."""
+    asked = []
+    select = store._database.select
+    store._database.select = lambda *one: asked.append(one) or select(*one)
+    one = store._database.select_one
+    store._database.select_one = lambda *what: asked.append(what) or one(*what)
+    store.dead_letters(after=0, limit=50)
+    store.unfinished()
+    store.counts()
+    store.find("a")
+    store.outcome("a")
+    store.outcome_after(0)
+    store.sequence_before_time(datetime(2026, 1, 31, tzinfo=UTC))
+    store.retention.expired(1.0, 50)
+    assert len(asked) >= 8
+    for statement, *values in asked:
+        plan = [row["detail"] for row in select(f"EXPLAIN QUERY PLAN {statement}", *values)]
+        scans = [line for line in plan if line.startswith("SCAN") and "COVERING" not in line]
+        assert scans in ([], ["SCAN sqlite_sequence"]), statement
+
+
+def test_an_older_database_gets_its_indexes(tmp_path):
+    with FolderStore(tmp_path / "data") as store:
+        accept(store, frame("a"), Settings(), "0f")
+        epoch = store.epoch
+        names = store._database.select("SELECT name FROM sqlite_master WHERE sql LIKE '% INDEX %'")
+        for row in names:
+            store._database.execute(f"DROP INDEX {row['name']}")
+    with FolderStore(tmp_path / "data") as store:
+        assert store.epoch == epoch
+        assert names
+        assert store._database.select(
+            "SELECT name FROM sqlite_master WHERE sql LIKE '% INDEX %'") == names

@@ -322,8 +322,8 @@ def test_damage_while_serving_ends_the_hub(data):
         store._database.truncate_log()
         path = data / "captures.sqlite3"
         path.write_bytes(path.read_bytes()[:4096] + b"\xff" * 40960)
-        store._database.execute("PRAGMA shrink_memory")
-        with pytest.raises(DamagedDatabaseError):
+        with pytest.raises(DamagedDatabaseError):  # noqa: PT012
+            store._database.execute("PRAGMA shrink_memory")
             store.counts()
 
 
