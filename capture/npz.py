@@ -6,7 +6,6 @@ more than that header announces is read.
 
 import os
 import struct
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -22,6 +21,7 @@ from denseface.capture.calibration import MAX_SIDE, Calibration, ChosenCalibrati
 from denseface.capture.errors import CaptureError, FrameError, UnreadableSourceError
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.source import Source
+from denseface.files import replacing
 
 __all__ = ["NpzSource", "load_frame", "save_frame"]
 
@@ -105,25 +105,17 @@ def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> Rgb
 
 
 def save_frame(path: str | Path, frame: RgbdFrame) -> None:
-    """Write a frame file: under a temporary name, then renamed, so that it is always whole."""
-    path = Path(path)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez_compressed(
-                file, allow_pickle=False, depth=frame.depth, color=frame.color,
-                depth_timestamp_us=np.int64(frame.depth_timestamp_us),
-                color_timestamp_us=np.int64(frame.color_timestamp_us),
-                calibration=np.array(frame.calibration.to_json()),
-                registered=np.bool_(frame.registered),
-            )
-            file.flush()
-            os.fsync(file.fileno())
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    """Write a frame file: whole, or not at all; OSError as from the system."""
+    with replacing(Path(path)) as file:
+        np.savez_compressed(
+            file, allow_pickle=False, depth=frame.depth, color=frame.color,
+            depth_timestamp_us=np.int64(frame.depth_timestamp_us),
+            color_timestamp_us=np.int64(frame.color_timestamp_us),
+            calibration=np.array(frame.calibration.to_json()),
+            registered=np.bool_(frame.registered),
+        )
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def _own_calibration(path: str | Path, array: NDArray[Any]) -> Calibration:

@@ -25,7 +25,7 @@ def _split(given: object) -> object:
 def runtime_folder() -> Path:
     """Give this user's socket folder: `$XDG_RUNTIME_DIR/denseface`, else a temporary one.
 
-    It is created by `private_folder` when the hub binds or someone connects, not here.
+    It is created by `socket_folder` when the hub binds or someone connects, not here.
     """
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     if runtime and Path(runtime).is_dir():
@@ -56,7 +56,7 @@ class ServiceSettings(BaseModel):
     memory_mb: Annotated[int, Field(ge=64, le=2**20)] = 2048
     """Memory of the hub, MiB, beyond which it disconnects all other machines."""
     data: Path = Field(default_factory=lambda: platformdirs.user_data_path("denseface"))
-    """Folder of frames, faces and their database; created with mode 0700."""
+    """Folder of frames, faces and their database, with mode 700."""
     heartbeat_s: _Seconds = 1.0
     """Time between two heartbeats, seconds."""
     liveness: Annotated[int, Field(ge=2, le=100)] = 3

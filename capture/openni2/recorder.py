@@ -13,6 +13,7 @@ from denseface.capture.openni2._library import binding_errors
 from denseface.capture.openni2._oni_file import check_oni, written_frames
 from denseface.capture.openni2._path import ascii_name
 from denseface.capture.openni2._streams import COLOR, DEPTH
+from denseface.files import replacing_by_name
 
 __all__ = ["record"]
 
@@ -49,8 +50,7 @@ def record(device_uri: str | None, path: str | Path, frames: int) -> int:
     if frames < 1:
         raise ValueError(f"frames must be at least 1, got {frames}")
     path = Path(path)
-    part = path.with_name(f".{os.getpid()}.part.oni")
-    try:
+    with replacing_by_name(path) as part:
         _record(device_uri, part, frames)
         _, end = check_oni(part)
         found = written_frames(part)
@@ -59,9 +59,6 @@ def record(device_uri: str | None, path: str | Path, frames: int) -> int:
                 f"{path}: the sensor fell silent after {found} of {frames} frames")
         # The recorder reserves space in steps and leaves the rest behind.
         os.truncate(part, end)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
     return found
 
 

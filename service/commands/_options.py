@@ -3,6 +3,7 @@
 import argparse
 import math
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime
@@ -85,6 +86,20 @@ def add_outputs(parser: argparse.ArgumentParser, *flags: str) -> None:
     parser.add_argument("--report", type=Path, metavar="R.json", help="write the report")
     parser.add_argument("--preview", type=Path, metavar="P.png", dest="rendering",
                         help="write a picture")
+
+
+def add_mode(parser: argparse.ArgumentParser) -> None:
+    """Add `--mode`, of the files that `--save` writes: pictures of people, whatever the umask."""
+    parser.add_argument("--mode", type=_file_mode, default=0o600, metavar="OCTAL",
+                        help="mode of the files that are written, such as 640 (default: 600, for "
+                             "this user alone)")
+
+
+def _file_mode(text: str) -> int:
+    if not re.fullmatch("0?[0-7]{3}", text) or (mode := int(text, 8)) & 0o600 != 0o600:
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: expected three octal digits such as 640, the first a 6 or 7")
+    return mode
 
 
 def add_recon(parser: argparse.ArgumentParser) -> None:

@@ -12,12 +12,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--timeout", type=_options.seconds, default=60.0, metavar="S",
                         help="longest wait for the face, seconds (default: 60)")
     _options.add_outputs(parser, "--save")
+    _options.add_mode(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     from denseface.service.export import FaceFiles
 
-    files = FaceFiles(args.output, args.report, args.rendering)
+    files = FaceFiles(args.output, args.report, args.rendering, args.mode)
     with _options.client(args) as client:
         capture_id = client.press(args.capture_id, timeout=args.timeout)
         print(capture_id, flush=True)

@@ -11,6 +11,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _options.add_client(parser)
     parser.add_argument("--save", type=Path, metavar="DIR",
                         help="write each face as DIR/ID.ply with its report, DIR/ID.json")
+    _options.add_mode(parser)
     parser.add_argument("--count", type=int, metavar="N", help="end after N captures")
     start = parser.add_mutually_exclusive_group()
     start.add_argument("--after", type=int, metavar="SEQUENCE",
@@ -35,6 +36,6 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(f"--save {args.save}: no such folder")
     with _options.client(args) as client:
         published = client.published(after=args.after, last=args.last, since=args.since)
-        for line in islice(follow(published, args.save), args.count):
+        for line in islice(follow(published, args.save, args.mode), args.count):
             print(line, flush=True)
     return 0

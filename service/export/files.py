@@ -1,5 +1,7 @@
 """All that may be written of one face: cloud or mesh, report, rendering."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -31,6 +33,8 @@ class FaceFiles:
     """`.json`"""
     rendering: Path | None = None
     """`.png`"""
+    mode: int | None = None
+    """Of each file; None for 666 less the umask."""
 
     def __post_init__(self) -> None:
         if self.output:
@@ -52,15 +56,24 @@ class FaceFiles:
         """
         from denseface.service.runtime.files import write_atomically
 
-        try:
-            if self.output:
-                save_face(face, self.output)
-            if self.report:
-                text = face.report.model_dump_json(indent=2) + "\n"
-                write_atomically(self.report, [text.encode()], durable=False)
-            if self.rendering:
-                from denseface.service.export.render import render
+        if self.output:
+            with _naming(self.output):
+                save_face(face, self.output, mode=self.mode)
+        if self.report:
+            text = face.report.model_dump_json(indent=2) + "\n"
+            with _naming(self.report):
+                write_atomically(self.report, [text.encode()], sync_name=False, mode=self.mode)
+        if self.rendering:
+            from denseface.service.export.render import render
 
-                write_atomically(self.rendering, [render(face)], durable=False)
-        except OSError as error:
-            raise StoreError(f"{error.filename or ''}: {reason_of(error)}") from error
+            with _naming(self.rendering):
+                write_atomically(self.rendering, [render(face)], sync_name=False, mode=self.mode)
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Raise what the system says as a StoreError that names the file asked for."""
+    try:
+        yield
+    except OSError as error:
+        raise StoreError(f"{path}: {reason_of(error)}") from error

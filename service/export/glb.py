@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.face import DenseCloud
+from denseface.recon.face import Face
 from denseface.service.export.mesh import triangulate
 
 __all__ = ["to_glb"]
@@ -26,8 +26,9 @@ _FLIP = np.array([1, -1, -1], np.float32)
 """Camera frame (y down, z forward) to glTF's (y up, z toward the viewer)."""
 
 
-def to_glb(cloud: DenseCloud) -> bytes:
-    """Give the mesh of a cloud as the bytes of a `.glb` file: metres, y up."""
+def to_glb(face: Face) -> bytes:
+    """Give the bytes of a `.glb` file with the mesh of a face: metres, y up."""
+    cloud = face.dense
     triangles = triangulate(cloud)
     positions = cloud.points * (_FLIP / np.float32(_MM_PER_M))
     # 16 bits a channel: 8 are too coarse for linear light in the shadows.

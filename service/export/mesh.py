@@ -1,11 +1,13 @@
-"""Triangles between neighbouring points of a dense cloud's grid."""
+"""Triangles between neighbouring points of a dense cloud, and files of them."""
+
+import struct
 
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.face import DenseCloud
+from denseface.recon.face import DenseCloud, Face
 
-__all__ = ["triangulate"]
+__all__ = ["to_obj", "to_stl", "triangulate"]
 
 _MAX_STEP = 10.0
 """Largest step in depth between neighbours, in grid steps: more is a gap between two surfaces."""
@@ -41,3 +43,34 @@ def triangulate(cloud: DenseCloud) -> NDArray[np.int32]:
     limit = _MAX_STEP * cloud.grid_step_mm
     kept: NDArray[np.int32] = triangles[z.max(axis=1) - z.min(axis=1) <= limit]
     return kept
+
+
+def to_obj(face: Face) -> bytes:
+    """Give the bytes of an `.obj` file: mm, camera frame, with vertex colours and normals."""
+    cloud = face.dense
+    vertices = np.hstack([cloud.points, cloud.colors / 255])
+    # Numbers of vertices, from 1; a vertex's normal has the same.
+    faces = np.repeat(triangulate(cloud) + 1, 2, axis=1)
+    return "".join([
+        f"# by denseface, mm: {len(cloud)} vertices\n",
+        _lines("v %.4f %.4f %.4f %.6g %.6g %.6g\n", vertices),
+        _lines("vn %.6g %.6g %.6g\n", cloud.normals),
+        _lines("f %d//%d %d//%d %d//%d\n", faces)]).encode()
+
+
+def to_stl(face: Face) -> bytes:
+    """Give the bytes of a binary `.stl` file: mm, camera frame, with the triangles' normals."""
+    cloud = face.dense
+    corners = cloud.points[triangulate(cloud)]
+    table = np.zeros(len(corners), [
+        ("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    table["normal"] = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
+    table["corners"] = corners
+    return b"by denseface, mm".ljust(80, b"\0") + struct.pack("<I", len(table)) + table.tobytes()
+
+
+def _lines(line: str, rows: NDArray[np.floating | np.integer]) -> str:
+    """Format a row to a line."""
+    return line * len(rows) % tuple(rows.ravel().tolist())

@@ -3,22 +3,27 @@
 import os
 import stat
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 
+from denseface.files import open_regular, replacing
 from denseface.service.errors import KeyFileError, SettingsError, reason_of
 from denseface.service.runtime._direct_io import write_direct
 from denseface.service.runtime.failpoints import failpoint
 
-__all__ = ["private_folder", "read_private_text", "sync_folder", "write_atomically"]
+__all__ = ["check_unwritable", "private_folder", "read_private_text", "socket_folder",
+           "sync_folder", "write_atomically"]
 
 _MAX_TEXT_BYTES = 4096
 """Of a private text; longer than any key file."""
+_OTHERS = 0o077
+"""Mode bits that a folder for this user alone may not have."""
+_WRITABLE = 0o022
+"""Mode bits that let others put something into a folder."""
 
 
 def write_atomically(
     path: Path, chunks: Sequence[bytes | memoryview], *, durable: bool = True,
-    sync_name: bool = True, direct: bool = False, mode: int = 0o666, failpoints: str = "",
+    sync_name: bool = True, direct: bool = False, mode: int | None = None, failpoints: str = "",
 ) -> None:
     """Write a file so that `path` always has either its old contents or all of the new.
 
@@ -27,7 +32,7 @@ def write_atomically(
     durable : sync the file before it gets its name
     sync_name : sync the folder too, if `durable`; else `sync_folder` is left to the caller
     direct : write past the page cache, where the file system can
-    mode : of the file, less the umask
+    mode : of the file, exactly; None for 666 less the umask
     failpoints : prefix of the names of this write's failpoints
 
     Raises
@@ -35,24 +40,16 @@ def write_atomically(
     OSError
         As from the system. The old contents, or all of the new, are left.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
-        with os.fdopen(os.open(temporary, flags, mode), "wb") as file:
-            if not (direct and write_direct(file.fileno(), chunks)):
-                for chunk in chunks:
-                    file.write(chunk)
-                file.flush()
-            failpoint(f"{failpoints}.written")
-            if durable:
-                os.fsync(file.fileno())
-                failpoint(f"{failpoints}.synced")
-        temporary.replace(path)
-        failpoint(f"{failpoints}.renamed")
-    except BaseException:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
-        raise
+    with replacing(path, mode) as file:
+        if not (direct and write_direct(file.fileno(), chunks)):
+            for chunk in chunks:
+                file.write(chunk)
+            file.flush()
+        failpoint(f"{failpoints}.written")
+        if durable:
+            os.fsync(file.fileno())
+            failpoint(f"{failpoints}.synced")
+    failpoint(f"{failpoints}.renamed")
     if durable and sync_name:
         sync_folder(path.parent)
 
@@ -67,23 +64,78 @@ def sync_folder(folder: Path) -> None:
 
 
 def private_folder(path: Path) -> Path:
-    """Create a folder that only this user can enter, or make it one, and give it.
+    """Create a folder that only this user can enter, or check that one is, and give it.
+
+    The mode of a folder that exists is its owner's affair and stays as it is.
 
     Raises
     ------
     SettingsError
-        Where it is no folder, belongs to another user or cannot be created.
+        Where it is no folder, belongs to another user, is open to others or can be exchanged by
+        them, or cannot be created.
     """
+    mode = _own_folder(path)
+    if mode & _OTHERS:
+        raise SettingsError(f"{path}: others may use this folder (mode {mode:o}), and private data "
+                            f"is to be kept in it: name another one, or chmod 700 {path}")
+    _check_parents(path)
+    return path
+
+
+def socket_folder(path: Path) -> Path:
+    """Create a folder as `private_folder` does, or check that nobody else can put a socket there.
+
+    Others may look into it: a socket's own mode says who may connect.
+
+    Raises
+    ------
+    SettingsError
+        Where it is no folder, belongs to another user, others may write there, or it cannot be
+        created.
+    """
+    _own_folder(path)
+    check_unwritable(path)
+    return path
+
+
+def check_unwritable(path: Path, forbidden: int = _WRITABLE) -> None:
+    """Check that nobody else may put something into a folder, or exchange it.
+
+    SettingsError where its mode has one of the bits in `forbidden`, or it cannot be read.
+    """
+    mode = _mode_of(path)
+    if mode & forbidden:
+        raise SettingsError(f"{path}: others may write there (mode {mode:o}): name a folder of "
+                            "your own, with mode 700")
+    _check_parents(path)
+
+
+def _check_parents(path: Path) -> None:
+    """Check that nobody may rename a folder or one above it: the sticky bit forbids that."""
+    for parent in path.resolve().parents:
+        mode = _mode_of(parent)
+        if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+            raise SettingsError(f"{path}: {parent}: others may exchange what is in it "
+                                f"(mode {mode:o}): choose another place, or chmod o-w {parent}")
+
+
+def _own_folder(path: Path) -> int:
+    """Create a folder with mode 700, or check that it is this user's; give its mode."""
     try:
         path.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = path.lstat()
-        if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
-            raise SettingsError(f"{path}: must be a folder of user {os.getuid()}")
-        if found.st_mode & 0o077:
-            path.chmod(0o700)
     except OSError as error:
         raise SettingsError(f"{path}: {reason_of(error)}") from error
-    return path
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
+        raise SettingsError(f"{path}: must be a folder of user {os.getuid()}")
+    return stat.S_IMODE(found.st_mode)
+
+
+def _mode_of(path: Path) -> int:
+    try:
+        return stat.S_IMODE(path.stat().st_mode)
+    except OSError as error:
+        raise SettingsError(f"{path}: {reason_of(error)}") from error
 
 
 def read_private_text(path: Path, forbidden: int) -> bytes:
@@ -95,12 +147,12 @@ def read_private_text(path: Path, forbidden: int) -> bytes:
         Where it is no regular file, too long, another user's or open to others.
     """
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             found = os.fstat(file.fileno())
-            text = file.read(_MAX_TEXT_BYTES + 1) if stat.S_ISREG(found.st_mode) else b""
+            text = file.read(_MAX_TEXT_BYTES + 1)
     except OSError as error:
         raise KeyFileError(f"{path}: {reason_of(error)}") from error
-    if not stat.S_ISREG(found.st_mode) or len(text) > _MAX_TEXT_BYTES:
+    if len(text) > _MAX_TEXT_BYTES:
         raise KeyFileError(f"{path}: expected a key file of at most {_MAX_TEXT_BYTES} bytes")
     if forbidden and found.st_uid != os.getuid():
         raise KeyFileError(f"{path}: belongs to user {found.st_uid}, expected {os.getuid()}")

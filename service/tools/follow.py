@@ -9,10 +9,11 @@ from denseface.service.export import FaceFiles
 __all__ = ["follow"]
 
 
-def follow(outcomes: Iterable[Published], folder: Path | None) -> Iterator[str]:
+def follow(outcomes: Iterable[Published], folder: Path | None, mode: int) -> Iterator[str]:
     """Give a line for each outcome; save each face as `ID.ply` with its report, `ID.json`.
 
-    Nothing is saved where `folder` is None. Raises as `FaceFiles.write`.
+    The files have this `mode`; nothing is saved where `folder` is None. Raises as
+    `FaceFiles.write`.
     """
     for outcome in outcomes:
         name = f"{outcome.sequence} {outcome.capture_id}"
@@ -21,5 +22,5 @@ def follow(outcomes: Iterable[Published], folder: Path | None) -> Iterator[str]:
             continue
         if folder:
             path = folder / f"{outcome.capture_id}.ply"
-            FaceFiles(path, path.with_suffix(".json")).write(outcome.face)
+            FaceFiles(path, path.with_suffix(".json"), mode=mode).write(outcome.face)
         yield f"{name} {len(outcome.face.dense)} points"

@@ -5,12 +5,13 @@ or port is impossible.
 """
 
 import socket
+import stat
 from ipaddress import ip_address
 from pathlib import Path
 from urllib.parse import urlsplit
 
 from denseface.service.errors import AddressError, HubRunningError
-from denseface.service.runtime.files import private_folder
+from denseface.service.runtime.files import check_unwritable, socket_folder
 from denseface.service.settings import runtime_folder
 
 _PUBLICATIONS = ".publications"
@@ -51,14 +52,15 @@ def is_local(address: str) -> bool:
 
 
 def check_bindable(address: str) -> None:
-    """Make the folder of an `ipc` address.
+    """Make the folder of an `ipc` address, or check that nobody else may put a socket there.
 
-    HubRunningError where another hub answers there: binding would silently take its place.
+    SettingsError where somebody may; HubRunningError where another hub answers there: binding would
+    silently take its place.
     """
     path = socket_file(address)
     if path is None:
         return
-    private_folder(path.parent)
+    socket_folder(path.parent)
     with socket.socket(socket.AF_UNIX) as probe:
         try:
             probe.connect(str(path))
@@ -68,14 +70,16 @@ def check_bindable(address: str) -> None:
 
 
 def check_connectable(address: str) -> None:
-    """Refuse a malformed address, and a default one where somebody else might be the hub.
+    """Refuse a malformed address, and one where anybody else might be the hub, and receive faces.
 
     The folder of the default address is made if it is missing: in a shared temporary folder anyone
-    else could make it, and receive faces. SettingsError where it is not this user's.
+    else could make it. SettingsError where it is not this user's, or anybody may write there.
     """
     path = socket_file(address)
     if path and path.parent == runtime_folder():
-        private_folder(path.parent)
+        socket_folder(path.parent)
+    elif path and path.parent.exists():
+        check_unwritable(path.parent, stat.S_IWOTH)
 
 
 def _host_and_port(address: str) -> tuple[str, int]:

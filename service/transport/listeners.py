@@ -10,6 +10,7 @@ from denseface.service.errors import AddressError, AuthenticatorStoppedError
 from denseface.service.monitoring import Rejections
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Buffer
+from denseface.service.runtime.files import check_unwritable
 from denseface.service.runtime.limits import DescriptorWatch, MemoryWatch
 from denseface.service.security import HUB_NAME, AllowedKey, AllowList, read_pair
 from denseface.service.security.permissions import ROLES_BY_TOPIC
@@ -159,7 +160,7 @@ def server_credentials(settings: ServiceSettings) -> ServerCredentials:
     """Read the hub's key pair and its allow-list.
 
     AddressError where there is no hub key or no key is allowed, KeyFileError where the hub's key
-    cannot be used.
+    cannot be used, SettingsError where others may change who is allowed.
     """
     address = _guarded_addresses(settings)[0]
     path = settings.key or settings.keys / f"{HUB_NAME}.secret"
@@ -173,6 +174,8 @@ def server_credentials(settings: ServiceSettings) -> ServerCredentials:
         raise AddressError(
             f"{address}: refused, no key is allowed in {settings.keys / 'allowed'}; "
             "`denseface keys allow NAME KEY ROLE` allows one")
+    for folder in (settings.keys, settings.keys / "allowed"):
+        check_unwritable(folder)
     return ServerCredentials(read_pair(path), allow_list)
 
 

@@ -69,8 +69,8 @@ def outcome(capsys, *arguments):
     (["keys", "allow", "a", "b"], "required: ROLE"),
     (["keys", "allow", "a", "b", "king"], "invalid choice: 'king'"),
     (["press", "--timeout", "never"], "expected seconds"),
-    (["press", "--id", "../x", "--address", "ipc:///tmp/none"], "capture id '../x'"),
-    (["press", "--id", "", "--address", "ipc:///tmp/none"], "capture id ''"),
+    (["press", "--id", "../x", "--address", "ipc:///tmp/none/hub"], "capture id '../x'"),
+    (["press", "--id", "", "--address", "ipc:///tmp/none/hub"], "capture id ''"),
     (["press", "--address", "nowhere"], "expected ipc://PATH or tcp://HOST:PORT"),
     (["press", "--save", "face"], "ending missing"),
     (["subscribe", "--save", "{tmp}/none"], "no such folder"),
@@ -148,7 +148,7 @@ def test_a_reader_that_leaves_is_no_error():
 def test_a_sigterm_while_the_interpreter_ends_leaves_no_traceback():
     code = ("import atexit, os, signal, sys\nfrom denseface.service.cli import main\n"
             "atexit.register(os.kill, os.getpid(), signal.SIGTERM)\n"
-            "sys.exit(main(['status', '--address', 'ipc:///tmp/none', '--wait', '0.01']))\n")
+            "sys.exit(main(['status', '--address', 'ipc:///tmp/none/hub', '--wait', '0.01']))\n")
     ended = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=LIMIT_S, check=False,
         env=os.environ | {"PYTHONPATH": ":".join(sys.path)})

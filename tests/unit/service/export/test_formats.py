@@ -1,8 +1,11 @@
 """Faces to files and back."""
 
 import json
+import os
 import re
 import struct
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +14,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from denseface.service.errors import FormatError
-from denseface.service.export import load_face, save_face
+from denseface.service.export import FORMATS, load_face, save_face
 from denseface.service.export.mesh import triangulate
 from tests.unit.service.faces import small_face
 
@@ -151,3 +154,39 @@ def test_a_folder_in_the_file_s_place_leaves_nothing_behind(tmp_path):
     with pytest.raises(OSError, match="directory"):
         save_face(small_face(), tmp_path / "face.ply")
     assert [path.name for path in tmp_path.iterdir()] == ["face.ply"]
+
+
+def test_a_file_for_which_there_is_no_room_is_not_left_half_written(tmp_path):
+    """No file may have more than 2 KiB here: what the system says is as on a full disk."""
+    code = """
+import resource, sys
+from pathlib import Path
+from denseface.service.export import FORMATS, save_face
+from tests.unit.service.faces import small_face
+resource.setrlimit(resource.RLIMIT_FSIZE, (2048, 2048))
+for ending in FORMATS:
+    path = Path(sys.argv[1], "face" + ending)
+    path.write_text("the good one")
+    try:
+        save_face(small_face(), path)
+    except OSError as error:
+        print(ending, error.strerror)
+    assert path.read_text() == "the good one"
+"""
+    done = subprocess.run([sys.executable, "-c", code, tmp_path], check=True, text=True,
+                          capture_output=True)
+    assert done.stdout.splitlines() == [f"{ending} File too large" for ending in FORMATS]
+    assert len(list(tmp_path.iterdir())) == len(FORMATS)
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_what_others_put_in_the_way_is_not_followed(tmp_path, ending):
+    """In a folder of others, a name that can be guessed may be a link to a file of ours."""
+    victim = tmp_path / "victim"
+    victim.write_text("precious")
+    for name in (f".face.{os.getpid()}.tmp{ending}", f".face{ending}.{os.getpid()}.tmp",
+                 f"face{ending}"):
+        (tmp_path / name).symlink_to(victim)
+    save_face(small_face(), tmp_path / f"face{ending}")
+    assert victim.read_text() == "precious"
+    assert not (tmp_path / f"face{ending}").is_symlink()

@@ -133,7 +133,8 @@ def test_two_hubs_cannot_have_one_folder(store, tmp_path):
 
 
 def test_the_folder_is_private_and_swept(tmp_path):
-    (tmp_path / "data" / "frames").mkdir(parents=True)
+    for folder in ("data", "data/frames"):
+        (tmp_path / folder).mkdir(mode=0o700)
     left = tmp_path / "data" / "frames" / ".a.frame.77.tmp"
     left.write_bytes(b"half")
     with FolderStore(tmp_path / "data"):

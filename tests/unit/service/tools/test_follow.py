@@ -11,13 +11,14 @@ OUTCOMES = [PublishedFace("e", 1, "a", FACE),
 
 
 def test_a_face_is_saved_with_its_report_and_a_failure_is_told(tmp_path):
-    a, b = follow(OUTCOMES, tmp_path)
+    a, b = follow(OUTCOMES, tmp_path, 0o600)
     assert a == f"1 a {len(FACE.dense)} points"
     assert b.startswith("2 b failed: ")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "a.ply"]
+    assert {path.name: path.stat().st_mode & 0o777 for path in tmp_path.iterdir()} == {
+        "a.json": 0o600, "a.ply": 0o600}  # whatever the umask
 
 
 def test_without_a_folder_nothing_is_saved(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert len(list(follow(OUTCOMES, None))) == 2
+    assert len(list(follow(OUTCOMES, None, 0o600))) == 2
     assert list(tmp_path.iterdir()) == []
