@@ -7,7 +7,7 @@ import zmq
 from denseface.service.errors import AddressError
 from denseface.service.monitoring import Rejections
 from denseface.service.security import AllowList, KeyPair
-from denseface.service.transport.handshakes import HandshakeMonitor
+from denseface.service.transport.handshakes import Connections, HandshakeMonitor
 from denseface.service.transport.sockets import Socket
 
 _HANDSHAKE_MS = 10_000
@@ -30,11 +30,11 @@ class BoundSocket:
 
     def __init__(
         self, socket: Socket, address: str, domain: bytes, credentials: ServerCredentials | None,
-        rejections: Rejections,
+        rejections: Rejections, connections: Connections | None,
     ) -> None:
         self.socket = socket
         self.monitor: HandshakeMonitor | None = None
-        """Counts failed handshakes; None where there are no credentials."""
+        """Tells `connections`, and with credentials counts failed handshakes."""
         self.bound = False
         self._address = address
         if credentials:
@@ -43,7 +43,9 @@ class BoundSocket:
             socket.set(zmq.ZAP_ENFORCE_DOMAIN, 1)
             socket.set(zmq.ZAP_DOMAIN, domain)
             socket.set(zmq.HANDSHAKE_IVL, _HANDSHAKE_MS)
-            self.monitor = HandshakeMonitor(socket, rejections)
+        if connections:
+            self.monitor = HandshakeMonitor(
+                socket, rejections if credentials else None, connections)
 
     def bind(self) -> None:
         """Bind, also after `cut`; AddressError where the address cannot be had."""

@@ -6,13 +6,14 @@ libzmq closes such connections by itself and reports it on the socket's monitor.
 import errno
 import os
 import socket
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Protocol
 
 import zmq
 from zmq.utils.monitor import recv_monitor_message
 
 from denseface.service.monitoring import Rejections
-from denseface.service.transport._routing_ids import RoutingIds
 from denseface.service.transport.sockets import Socket, open_monitor
 
 _E = zmq.Event
@@ -26,13 +27,31 @@ _DETAILS = {
 }
 
 
-class HandshakeMonitor:
-    """Counts the failed handshakes of one bound socket, and tells `routing_ids` who is there."""
+class Connections(Protocol):
+    """Is told of the connections of one bound socket, by their descriptors."""
 
-    def __init__(self, listening: Socket, rejections: Rejections) -> None:
+    def opened(self, descriptor: int) -> None:
+        """Note a new connection."""
+
+    def closed(self, descriptor: int) -> None:
+        """Note that a connection closed."""
+
+    def all_closed(self) -> None:
+        """Note that all connections were closed."""
+
+
+class HandshakeMonitor:
+    """Counts the failed handshakes of one bound socket, and tells `connections` who is there.
+
+    Where `rejections` is None, it counts nothing: nobody needs a handshake there.
+    """
+
+    def __init__(
+        self, listening: Socket, rejections: Rejections | None, connections: Connections
+    ) -> None:
         self._rejections = rejections
         self._listening = listening
-        self.routing_ids = RoutingIds()
+        self._connections = connections
         self.socket = open_monitor(listening, int(_EVENTS))
         self._open: dict[int, str] = {}
         """Descriptor -> address of connections whose handshake is not over."""
@@ -54,7 +73,7 @@ class HandshakeMonitor:
         """Forget the open handshakes: all connections were cut, which libzmq does not report."""
         self.read()
         self._open.clear()
-        self.routing_ids.all_closed()
+        self._connections.all_closed()
 
     def close(self) -> None:
         """Stop reading."""
@@ -63,7 +82,7 @@ class HandshakeMonitor:
 
     def _note(self, event: zmq.Event, value: int) -> None:
         if event is _E.ACCEPTED:
-            self.routing_ids.opened(value)
+            self._connections.opened(value)
             self._open[value] = address_of(value)
         elif event is _E.HANDSHAKE_SUCCEEDED:
             # Of several at once it does not say which: another address may be named later.
@@ -72,21 +91,25 @@ class HandshakeMonitor:
         elif event is _E.HANDSHAKE_FAILED_AUTH:
             self._refused += 1
         elif event is _E.DISCONNECTED:
-            self.routing_ids.closed(value)
+            self._connections.closed(value)
             self._ended(self._open.pop(value, None))
         elif value == errno.EFAULT:  # libzmq refuses the connection
-            self._rejections.note("handshake", detail="no authenticator")
+            self._reject(None, "no authenticator")
         else:
             self._failed = _DETAILS.get(value, f"{value:#x}")
 
     def _ended(self, address: str | None) -> None:
         failed, self._failed = self._failed, None
         if failed:
-            self._rejections.note("handshake", address=address, detail=failed)
+            self._reject(address, failed)
         elif address and self._refused:
             self._refused -= 1
         elif address:
-            self._rejections.note("handshake", address=address, detail="not ZeroMQ, or broken off")
+            self._reject(address, "not ZeroMQ, or broken off")
+
+    def _reject(self, address: str | None, detail: str) -> None:
+        if self._rejections:
+            self._rejections.note("handshake", address=address, detail=detail)
 
 
 def address_of(descriptor: int) -> str:
@@ -94,15 +117,30 @@ def address_of(descriptor: int) -> str:
 
     The descriptor may be another file's by now, or that of a socket of another kind.
     """
-    with suppress(OSError):
-        copy = os.dup(descriptor)
-        try:
-            connection = socket.socket(fileno=copy)
-        except OSError:
-            os.close(copy)
-            raise
-        with connection:
-            if connection.family in (socket.AF_INET, socket.AF_INET6):
-                host, port, *_ = connection.getpeername()
-                return f"{host}:{port}"
+    with suppress(OSError), connection_of(descriptor) as connection:
+        if connection.family in (socket.AF_INET, socket.AF_INET6):
+            host, port, *_ = connection.getpeername()
+            return f"{host}:{port}"
     return "gone"
+
+
+def end_connection(descriptor: int) -> None:
+    """End one connection of libzmq's, which itself can only end all of a socket.
+
+    libzmq finds that the other end has gone.
+    """
+    with suppress(OSError), connection_of(descriptor) as connection:
+        connection.shutdown(socket.SHUT_RDWR)
+
+
+@contextmanager
+def connection_of(descriptor: int) -> Iterator[socket.socket]:
+    """Give a connection of libzmq's as a socket; OSError where there is none."""
+    copy = os.dup(descriptor)
+    try:
+        connection = socket.socket(fileno=copy)
+    except OSError:
+        os.close(copy)
+        raise
+    with connection:
+        yield connection

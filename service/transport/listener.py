@@ -21,7 +21,11 @@ from denseface.service.security.permissions import ALL_ROLES, ROLES_BY_TOPIC
 from denseface.service.security.zap import MESSAGES_DOMAIN, PUBLICATIONS_DOMAIN
 from denseface.service.transport import sockets
 from denseface.service.transport._bound_socket import BoundSocket, ServerCredentials
+from denseface.service.transport._input_limit import InputLimit
+from denseface.service.transport._routing_ids import RoutingIds
+from denseface.service.transport._subscribers import Subscribers
 from denseface.service.transport.addresses import publications_of, socket_file
+from denseface.service.transport.handshakes import end_connection
 
 _TOKEN_BYTES = 8
 """Length of what names a key with its roles, at the start of a peer's name."""
@@ -29,6 +33,8 @@ _LOCAL = bytes(_TOKEN_BYTES)
 """Stands for the token where there are no keys."""
 _MAX_SUBSCRIPTION_BYTES = 1024
 """MAXMSGSIZE of an XPUB; a handshake is as long."""
+_PUBLISHER_RCVBUF = 4096
+"""RCVBUF of a guarded XPUB: what a connection that is ended may still have to be read."""
 _FLOOD = 100
 """Messages of revoked keys between two ticks from which on all connections are cut."""
 _BURST = 32
@@ -66,12 +72,14 @@ class Listener:
         self.address = address
         self._credentials = credentials
         self._rejections = rejections
-        self._subscribed: set[bytes] = set()
-        """Tokens of the keys that subscribed since the publisher was bound."""
         self._revoked = 0
         """Messages with keys that are no longer allowed, since the last tick."""
-        self.subscriptions: dict[Topic, int] = dict.fromkeys(Topic, 0)
-        """Number of subscriptions to each topic."""
+        self._routing_ids = RoutingIds()
+        # Without credentials whoever connects is this machine's user.
+        self._input_limit = InputLimit() if credentials else None
+        self._subscribers = Subscribers(self._input_limit.watch if self._input_limit else None)
+        self._mixed_up = False
+        """libzmq may take what is read next for another connection's."""
         router = sockets.open_socket(context, zmq.ROUTER, address)
         router.set(zmq.ROUTER_MANDATORY, 1)
         publisher = sockets.open_socket(context, zmq.XPUB, address)
@@ -79,9 +87,12 @@ class Listener:
         publisher.set(zmq.MAXMSGSIZE, _MAX_SUBSCRIPTION_BYTES)
         if credentials:
             publisher.set(zmq.LINGER, 0)  # nothing more for a key that is cut off
-        self._router = BoundSocket(router, address, MESSAGES_DOMAIN, credentials, rejections)
+            publisher.set(zmq.RCVBUF, _PUBLISHER_RCVBUF)
+        self._router = BoundSocket(router, address, MESSAGES_DOMAIN, credentials, rejections,
+                                   self._routing_ids if credentials else None)
         self._publisher = BoundSocket(
-            publisher, publications_of(address), PUBLICATIONS_DOMAIN, credentials, rejections)
+            publisher, publications_of(address), PUBLICATIONS_DOMAIN, credentials, rejections,
+            self._subscribers)
         try:
             self._router.bind()
             self._publisher.bind()
@@ -99,6 +110,8 @@ class Listener:
         """Unbind and leave no file behind."""
         self._router.close()
         self._publisher.close()
+        if self._input_limit:
+            self._input_limit.close()
         for address in (self.address, publications_of(self.address)):
             if path := socket_file(address):
                 path.unlink(missing_ok=True)
@@ -128,19 +141,26 @@ class Listener:
 
     def read_events(self) -> None:
         """Take note of subscriptions, of their ends and of failed handshakes."""
+        self.read_monitors()
+        for _ in range(_BURST):
+            try:
+                # By frames: libzmq queues those of several connections one behind the other, and
+                # who sends half a message would swallow what another says next.
+                frame = self._publisher.socket.recv(zmq.DONTWAIT, copy=False, track=False)
+            except zmq.Again:
+                self._mixed_up = False
+                return
+            self._read_subscription(frame)
+
+    def read_monitors(self) -> None:
+        """Take note of who has connected and who has gone."""
         for one in (self._router, self._publisher):
             if one.monitor:
                 one.monitor.read()
-        for _ in range(_BURST):
-            try:
-                first, _ = sockets.receive_parts(self._publisher.socket, 0, 0)
-            except zmq.Again:
-                return
-            except sockets.TooLongError as error:
-                self._rejections.note("malformed", address=_address(error.first),
-                                      detail="sent to the publications")
-                continue
-            self._read_subscription(first)
+
+    def subscriptions(self, topic: Topic) -> int:
+        """Give the number of connections that are subscribed to a topic."""
+        return self._subscribers.count(topic)
 
     def send(self, peer: bytes, parts: Sequence[Buffer]) -> bool:
         """Send to a peer; False where it cannot be reached, or its key was revoked."""
@@ -164,14 +184,17 @@ class Listener:
             return token == _LOCAL
         return self._credentials.allow_list.has_token(token)
 
-    def disconnect_revoked(self) -> None:
+    def tick(self) -> None:
         """Cut off keys that are no longer allowed, if they subscribed or go on sending."""
         if self._revoked > _FLOOD:
             self._router.cut()
         self._revoked = 0
         if self._credentials and not all(
-                map(self._credentials.allow_list.has_token, self._subscribed)):
-            self._cut_publisher()
+                map(self._credentials.allow_list.has_token, self._subscribers.tokens())):
+            self._publisher.cut()
+        while self._input_limit and self._input_limit.ended:
+            self._rejections.note("subscriptions", address=self._input_limit.ended.popleft(),
+                                  detail="sends too much to the publications")
 
     def rebind(self) -> None:
         """Listen again where connections were cut."""
@@ -187,20 +210,15 @@ class Listener:
         if not self._credentials or not (self._router.bound or self._publisher.bound):
             return False
         self._router.cut()
-        self._cut_publisher()
-        return True
-
-    def _cut_publisher(self) -> None:
         self._publisher.cut()
-        self._subscribed.clear()
+        return True
 
     def _has_its_own_id(self, incoming: Incoming, first: zmq.Frame) -> bool:
         """Say whether a message's routing id is its sender's; note where it came from."""
-        if (monitor := self._router.monitor) is None:
+        if self._credentials is None:
             return True
-        # libzmq knows no descriptor where the other end had gone before it looked.
-        token, descriptor = incoming.peer[:_TOKEN_BYTES], int(_property(first, "__fd") or -1)
-        if monitor.routing_ids.claim(first.bytes, incoming.key, token, descriptor):
+        token = incoming.peer[:_TOKEN_BYTES]
+        if self._routing_ids.claim(first.bytes, incoming.key, token, _descriptor(first)):
             return True
         self._rejections.note(
             "identity", key=incoming.sender.name, address=incoming.address,
@@ -213,7 +231,7 @@ class Listener:
         if monitor is None:
             return True
         monitor.read()
-        return monitor.routing_ids.is_open(peer[_TOKEN_BYTES:], peer[:_TOKEN_BYTES])
+        return self._routing_ids.is_open(peer[_TOKEN_BYTES:], peer[:_TOKEN_BYTES])
 
     def _user(self, first: zmq.Frame) -> AllowedKey | None:
         if self._credentials is None:
@@ -228,29 +246,53 @@ class Listener:
                                   key=_property(first, "User-Id"))
         return user
 
-    def _read_subscription(self, first: zmq.Frame) -> None:
-        action, name = first.bytes[:1], first.bytes[1:].decode("utf-8", "replace")
+    def _read_subscription(self, frame: zmq.Frame) -> None:
+        action, name = frame.bytes[:1], frame.bytes[1:].decode("utf-8", "replace")
+        # For each frame that is no subscription libzmq passes over a connection that sent one.
+        nonsense = action not in (_SUBSCRIBES, _UNSUBSCRIBES)
+        self._mixed_up = self._mixed_up or nonsense
+        descriptor = _descriptor(frame)
+        if not self._subscribers.is_open(descriptor):
+            return  # libzmq says what ends with a connection, or the connection has ended
         topic = Topic(name) if name in set(Topic) else None
-        if topic and action in (_SUBSCRIBES, _UNSUBSCRIBES):
-            # Refused ones are counted too: libzmq tells of their end as of any other.
-            change = 1 if action == _SUBSCRIBES else -1
-            self.subscriptions[topic] = max(0, self.subscriptions[topic] + change)
-        if action == _UNSUBSCRIBES:
+        if nonsense:
+            self._end(descriptor, frame, "malformed", "sent to the publications")
+        elif self._mixed_up:
+            # It would be another's. Who connects again is taken for who it is.
+            self._subscribers.closed(descriptor)
+            end_connection(descriptor)
+        elif action == _UNSUBSCRIBES:
             if topic:
+                self._subscribers.unsubscribe(descriptor, topic)
                 self._publisher.socket.set(zmq.UNSUBSCRIBE, topic.encode())
-            return
-        user = self._allowed_user(first)
-        if user is None:
-            return
-        if action != _SUBSCRIBES or topic is None:
-            self._rejections.note("malformed", key=user.name, address=_address(first),
-                                  detail=f"no topic {name[:32]!r}")
+        elif user := self._allowed_user(frame):
+            self._subscribe(user, topic, descriptor, frame)
+
+    def _subscribe(
+        self, user: AllowedKey, topic: Topic | None, descriptor: int, frame: zmq.Frame
+    ) -> None:
+        if topic is None:
+            if self._subscribers.name_unknown(descriptor):
+                self._rejections.note("malformed", key=user.name, address=_address(frame),
+                                      detail=f"no topic {frame.bytes[1:33]!r}")
+            else:
+                self._end(descriptor, frame, "subscriptions", "too many topics that do not exist")
         elif not user.roles & ROLES_BY_TOPIC[topic]:
-            self._rejections.note("role", key=user.name, address=_address(first),
+            self._rejections.note("role", key=user.name, address=_address(frame),
                                   detail=f"topic {topic}")
-        else:
-            self._subscribed.add(user.token)
+        elif self._subscribers.subscribe(
+                descriptor, user.token if self._credentials else b"", topic):
             self._publisher.socket.set(zmq.SUBSCRIBE, topic.encode())
+        else:
+            self._end(descriptor, frame, "subscriptions", "too many connections of one key")
+
+    def _end(self, descriptor: int, frame: zmq.Frame, reason: str, detail: str) -> None:
+        """End a subscriber's connection and say why."""
+        self._subscribers.closed(descriptor)
+        end_connection(descriptor)
+        user = self._user(frame)
+        self._rejections.note(reason, key=user.name if user else None, address=_address(frame),
+                              detail=detail)
 
 
 def _property(frame: zmq.Frame, name: str) -> str:
@@ -262,3 +304,11 @@ def _property(frame: zmq.Frame, name: str) -> str:
 
 def _address(frame: zmq.Frame) -> str:
     return _property(frame, "Peer-Address") or "local"
+
+
+def _descriptor(frame: zmq.Frame) -> int:
+    """Give the connection by which a frame came, -1 where libzmq does not know it.
+
+    It does not where the other end had gone before it looked, or where it made the frame itself.
+    """
+    return int(_property(frame, "__fd") or -1)

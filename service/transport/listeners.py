@@ -56,7 +56,7 @@ class Listeners:
                 keys = server_credentials(settings)
                 self._allow_list = keys.allow_list
                 self._authenticator = Authenticator(
-                    context, keys.allow_list, rejections, _is_permitted)
+                    context, keys.allow_list, rejections, self._is_permitted)
                 self._poller.register(self._authenticator.socket, zmq.POLLIN)
                 self._listeners += [
                     Listener(context, address, keys, rejections) for address in guarded]
@@ -91,7 +91,7 @@ class Listeners:
         changed = self._allow_list.changes != self._changes
         self._changes = self._allow_list.changes
         for listener in self._listeners:
-            listener.disconnect_revoked()
+            listener.tick()
         if used := self._memory.over_limit():
             self._disconnect_all("memory", f"{used >> 20} MB in use")
         if used := self._descriptors.over_limit():
@@ -138,13 +138,21 @@ class Listeners:
         return all(taken)
 
     def subscriptions(self) -> dict[str, int]:
-        """Give the number of subscriptions to each topic."""
-        return {topic: sum(listener.subscriptions[topic] for listener in self._listeners)
+        """Give the number of connections that are subscribed to each topic."""
+        return {topic: sum(listener.subscriptions(topic) for listener in self._listeners)
                 for topic in Topic}
 
     def is_allowed(self, peer: bytes) -> bool:
         """Say whether a peer's key is allowed still, with the roles that it had."""
         return self._listeners[peer[0]].is_allowed(peer[1:])
+
+    def _is_permitted(self, user: AllowedKey, domain: bytes) -> bool:
+        if domain != PUBLICATIONS_DOMAIN:
+            return True
+        for listener in self._listeners:
+            # Before the answer, so that a connection is watched before it may say anything.
+            listener.read_monitors()
+        return any(user.roles & needed for needed in ROLES_BY_TOPIC.values())
 
 
 def _guarded_addresses(settings: ServiceSettings) -> list[str]:
@@ -177,8 +185,3 @@ def server_credentials(settings: ServiceSettings) -> ServerCredentials:
     for folder in (settings.keys, settings.keys / "allowed"):
         check_unwritable(folder)
     return ServerCredentials(read_pair(path), allow_list)
-
-
-def _is_permitted(user: AllowedKey, domain: bytes) -> bool:
-    return domain != PUBLICATIONS_DOMAIN or any(
-        user.roles & needed for needed in ROLES_BY_TOPIC.values())

@@ -82,8 +82,9 @@ def publish_parts(publisher: Socket, parts: Sequence[Buffer]) -> bool:
     read, so False says that a subscriber fell behind, not how much it missed.
     """
     # Makes libzmq process what subscribers have read meanwhile, which it does not at every sending:
-    # it would take those that keep up, or have caught up, for slow ones.
-    publisher.get(zmq.EVENTS)
+    # it would take those that keep up, or have caught up, for slow ones. By poll, as only that lets
+    # other threads run: it processes what subscribers say too, and some may not stop.
+    publisher.poll(0)
     publisher.set(zmq.XPUB_NODROP, 1)
     try:
         publisher.send_multipart(parts, flags=zmq.DONTWAIT, copy=False)

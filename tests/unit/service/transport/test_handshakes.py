@@ -30,7 +30,7 @@ def test_a_number_that_is_something_else_by_now_has_no_address(tmp_path):
 
 _FLOODED_HUB = """
 with zmq.Context() as context, context.socket(zmq.ROUTER) as router:
-    monitor = HandshakeMonitor(router, Rejections(Counters()))
+    monitor = HandshakeMonitor(router, Rejections(Counters()), RoutingIds())
     port = router.bind_to_random_port("tcp://127.0.0.1")
     for _ in range(1_500):  # three events each; a queue of libzmq holds 2,000
         socket.create_connection(("127.0.0.1", port)).close()
@@ -61,6 +61,7 @@ import zmq
 from denseface.service.monitoring import Rejections
 from denseface.service.monitoring.figures import Counters
 from denseface.service.transport.connection import ConnectionMonitor
+from denseface.service.transport._routing_ids import RoutingIds
 from denseface.service.transport.handshakes import HandshakeMonitor
 """
     subprocess.run([sys.executable, "-c", imports + code], check=True, timeout=LIMIT_S)
