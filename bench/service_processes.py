@@ -90,7 +90,8 @@ def running(source: Path, workers: int) -> Iterator[Running]:
             process = subprocess.Popen(
                 [sys.executable, "-m", "denseface", "up", "--source", str(source), "--address",
                  address, "--data", str(folder / "data"), "--workers", str(workers)],
-                stdin=subprocess.DEVNULL, stderr=log)
+                stdin=subprocess.DEVNULL, stderr=log,
+                env=os.environ | {"DENSEFACE_CORE_DUMPS": "1"})  # or nobody may measure its memory
         stack.callback(_stop, process)
         client = stack.enter_context(Client(address))
         until = time.monotonic() + _START_S

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from denseface.service.commands import COMMANDS, load
+from denseface.service.runtime.process import forbid_core_dumps
 
 __all__ = ["main"]
 
@@ -25,6 +26,7 @@ class _Parser(argparse.ArgumentParser):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and give its exit status."""
+    forbid_core_dumps()
     args = _parser().parse_args(arguments)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))
     try:

@@ -1,12 +1,11 @@
 """What a process of the service does before anything else."""
 
 import os
-from contextlib import suppress
-from pathlib import Path
 from typing import Literal
 
 from denseface.service.runtime import failpoints
 from denseface.service.runtime.logging import configure
+from denseface.service.runtime.process import name_process
 from denseface.service.runtime.signals import die_with_parent
 
 __all__ = ["ONE_THREAD", "start_process", "use_one_thread"]
@@ -20,8 +19,7 @@ def start_process(name: str, log_format: Literal["text", "json"]) -> None:
 
     Each line of the log bears the `name`.
     """
-    with suppress(OSError):
-        Path("/proc/self/comm").write_text("denseface")  # what `ps` and `top` show
+    name_process(b"denseface")
     die_with_parent()
     configure(log_format, name)
     failpoints.arm(os.environ)

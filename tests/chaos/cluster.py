@@ -21,6 +21,8 @@ from denseface.service.runtime.failpoints import (
     FAILPOINTS_VARIABLE,
     TOKENS_VARIABLE,
 )
+from tests.chaos.log_pipe import LogPipe
+from tests.chaos.thief import Thief
 from tests.waiting import LIMIT_S, PATIENCE
 
 __all__ = ["PACE", "Cluster", "Nursery", "Part", "until"]
@@ -84,7 +86,7 @@ class Part:
 
     def __init__(
         self, nursery: Nursery, name: str, arguments: Sequence[str], log: Path,
-        environment: dict[str, str],
+        environment: dict[str, str], *, writes_to: Path | None = None,
     ) -> None:
         self.name = name
         self.log = log
@@ -93,7 +95,8 @@ class Part:
         self.wanted = True
         """False: is not started again."""
         self._nursery = nursery
-        self._spec = {"arguments": [*arguments], "log": str(log), "environment": environment}
+        self._spec = {"arguments": [*arguments], "log": str(writes_to or log),
+                      "environment": environment}
         self._handle = -1
         self._lock = threading.Lock()
 
@@ -146,6 +149,7 @@ class Cluster:
     source : what the capture process opens
     recon : further arguments of the hub
     daemons_at : where daemons connect, given the hub's address; by default there
+    thief : takes ids at a listener with keys, where the first worker then connects
     """
 
     def __init__(
@@ -153,6 +157,7 @@ class Cluster:
         recon: Sequence[str] = (), environment: dict[str, str] | None = None,
         actions: dict[str, str] | None = None,
         daemons_at: Callable[[str], str] = lambda address: address,
+        thief: Thief | None = None,
     ) -> None:
         self.data = folder / "data"
         self.logs = folder
@@ -170,17 +175,26 @@ class Cluster:
             return Part(nursery, name, [command, "--address", address, *arguments],
                         folder / f"{name}.log", settings)
 
+        self.hub_log = LogPipe(folder / "hub.pipe", folder / "hub.log")
+
         self._part = part
         elsewhere = daemons_at(self.address)
-        self.hub = part("hub", "hub", self.address, "--data", str(self.data), *recon)
+        listen = thief.hub_arguments() if thief else []
+        self.hub = Part(nursery, "hub", ["hub", "--address", self.address, "--data",
+                                         str(self.data), *listen, *recon],
+                        self.hub_log.log, settings, writes_to=self.hub_log.path)
         self.capture = part("capture", "capture", elsewhere, "--source", str(source))
         self.workers = [part(f"worker-{number}", "worker", elsewhere)
                         for number in range(1, workers + 1)]
+        if thief:
+            self.workers[0] = Part(nursery, "worker-1", ["worker", *thief.worker_arguments()],
+                                   folder / "worker-1.log", settings)
         self.parts = [self.hub, self.capture, *self.workers]
         self._ended = threading.Event()
         self._watcher = threading.Thread(target=self._watch, daemon=True)
 
     def __enter__(self) -> Self:
+        self.hub_log.open()
         self._watcher.start()
         self.ready()
         return self
@@ -198,8 +212,10 @@ class Cluster:
         """End all, the hub last; harmless when repeated."""
         self._ended.set()
         self._watcher.join()
+        self.hub_log.flow()
         for part in reversed(self.parts):
             part.end(number)
+        self.hub_log.close()
 
     def ready(self) -> None:
         """Wait until sensor and workers are there."""

@@ -18,11 +18,14 @@ from tests.chaos.proxy import Proxy
 from tests.chaos.scene import Scene
 from tests.chaos.source import CHEAP
 from tests.chaos.storm import Storm, random_actions
+from tests.chaos.thief import Thief
 from tests.waiting import PATIENCE
 
 __all__ = ["Outcome", "play"]
 
 _PRESSERS, _AHEAD = 4, 2
+_THEFT = 0.5
+"""Chance of a round with a thief."""
 _PRESSES_S, _SETTLE_S = 1800.0 * PATIENCE, 180.0 * PATIENCE
 """Longest time for all presses in the storm, and for the rest after it; seconds."""
 
@@ -70,8 +73,10 @@ def play(nursery: Nursery, folder: Path, frame: Path, presses: int, seed: int) -
             proxies.append(stack.enter_context(proxy))
             return proxy.address
 
+        thief = stack.enter_context(Thief(folder, seed)) if source.random() < _THEFT else None
         scene = stack.enter_context(Scene(
-            nursery, folder, frame, workers=source.choice((1, 2)), recon=CHEAP, actions=actions,
+            nursery, folder, frame, thief=thief, workers=source.choice((1, 2)), recon=CHEAP,
+            actions=actions,
             environment={"DENSEFACE_ATTEMPTS": str(source.choice((2, 3, 5)))},
             daemons_at=between))
         context = stack.enter_context(zmq.Context())
@@ -93,6 +98,9 @@ def play(nursery: Nursery, folder: Path, frame: Path, presses: int, seed: int) -
             outcome.violations.append(str(error))
         if storm.is_alive():
             storm.calm()
+        if thief:
+            outcome.violations += thief.stolen
+            storm.counts["an id taken by another key"] += thief.tried
         history = scene.finish()
         outcome.violations += violations(history)
         outcome.violations += scene.cluster.tracebacks()

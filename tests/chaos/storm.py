@@ -17,6 +17,7 @@ __all__ = ["Storm", "random_actions"]
 _MEAN_PAUSE_S = 0.4
 _LONGEST_STOP_S = 1.5
 """Beyond the liveness of `tests.chaos.cluster.PACE`."""
+_LONGEST_STALL_S = 3.0
 _DISK = ("written", "synced", "renamed")
 
 
@@ -55,7 +56,7 @@ class Storm(threading.Thread):
         self._over = threading.Event()
         self._harms: list[Callable[[], None]] = [
             self._kill, self._kill, self._terminate, self._stop, self._failpoint, self._failpoint,
-            self._failpoint, self._new_subscriber]
+            self._failpoint, self._new_subscriber, self._stall_log]
         if spoil:
             self._harms.append(self._spoil)
 
@@ -106,6 +107,13 @@ class Storm(threading.Thread):
         if name not in self._asked:
             self._asked.add(name)
             self._scene.cluster.let_fail(name)
+
+    def _stall_log(self) -> None:
+        """Stop reading what the hub logs, longer than its few lines last in the pipe."""
+        self._scene.cluster.hub_log.stall()
+        self._over.wait(self._random.uniform(0.5, _LONGEST_STALL_S))
+        self._scene.cluster.hub_log.flow()
+        self.counts["the hub's log stalled"] += 1
 
     def _new_subscriber(self) -> None:
         self._scene.follower.restart()

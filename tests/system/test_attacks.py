@@ -189,8 +189,8 @@ def test_a_slow_drip_is_hung_up_on(hub, refused):
 
 def test_more_connections_than_the_hub_may_have_are_cut(tmp_path):
     """Whoever has no key at all can neither end the hub nor shut its own users out for long."""
-    with (guarded_hub(tmp_path) as hub, zmq.Context() as context, ExitStack() as flood,
-          context.socket(zmq.SUB) as beats):
+    with (guarded_hub(tmp_path, DENSEFACE_CORE_DUMPS="1") as hub, zmq.Context() as context,
+          ExitStack() as flood, context.socket(zmq.SUB) as beats):
         beats.subscribe("status")
         beats.connect(publications_of(hub.local))
         process = psutil.Process(hub.process.pid)

@@ -1,0 +1,41 @@
+"""What a process asks of the kernel about itself."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+CRASH = """
+import os, resource, sys
+resource.setrlimit(resource.RLIMIT_CORE, (resource.RLIM_INFINITY,) * 2)
+from denseface.service.cli import main
+try:
+    main(sys.argv[1:])
+except SystemExit:
+    pass
+os.abort()
+"""
+
+
+def crash(folder, **environment):
+    """Run a command that is about to print its help, and say whether its crash left a core."""
+    process = subprocess.Popen([sys.executable, "-c", CRASH, "worker", "--help"], cwd=folder,
+                               stdout=subprocess.DEVNULL, env=os.environ | environment)
+    _, status = os.waitpid(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    assert process.returncode == -signal.SIGABRT
+    return os.WCOREDUMP(status)
+
+
+def test_a_crash_leaves_no_pictures_in_a_core_file(tmp_path):
+    assert not crash(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_core_dumps_can_be_had_to_find_a_fault(tmp_path):
+    if not crash(tmp_path, DENSEFACE_CORE_DUMPS="1"):
+        pytest.skip("this system makes no core dumps")
+    for core in tmp_path.iterdir():
+        core.unlink()
