@@ -1,10 +1,10 @@
 """The command `denseface`: an error is one line on stderr and an exit status.
 
-0 done; 1 the job failed; 2 wrong usage or unreadable input; 130 after Ctrl-C.
+0 done; 1 the job failed; 2 wrong usage or unreadable input; 130 after Ctrl-C; 141 where the reader
+of stdout left. The status is the same where stderr cannot be written.
 """
 
 import argparse
-import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -12,6 +12,13 @@ from typing import NoReturn
 
 from denseface.service.commands import COMMANDS, load
 from denseface.service.runtime.process import forbid_core_dumps
+from denseface.service.runtime.terminal import (
+    complain,
+    discard_unless_flushed,
+    fill_standard_descriptors,
+    reader_left,
+    say,
+)
 
 __all__ = ["main"]
 
@@ -21,24 +28,25 @@ _FAILED, _USAGE, _CTRL_C, _BROKEN_PIPE, _TERMINATED = 1, 2, 130, 141, 143
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        self.exit(_USAGE, f"{self.prog}: {message} (see {self.prog} --help)\n")
+        complain(f"{self.prog}: {message} (see {self.prog} --help)")
+        self.exit(_USAGE)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and give its exit status."""
+    fill_standard_descriptors()
     forbid_core_dumps()
     args = _parser().parse_args(arguments)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))
     try:
         status: int = load(args.command).run(args)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # The reader closed the pipe; without a place to flush to, Python reports it at exit again.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return _BROKEN_PIPE
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except KeyboardInterrupt:
         return _CTRL_C
     except Exception as error:
+        if isinstance(error, BrokenPipeError) and reader_left(sys.stdout):
+            return _BROKEN_PIPE
         if args.debug:
             raise
         line = " ".join(str(error).split()) or type(error).__name__
@@ -47,11 +55,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
             structlog.get_logger(args.command).critical("ended", reason=line)
         else:
-            print(f"denseface {args.command}: {line}", file=sys.stderr)
+            complain(f"denseface {args.command}: {line}")
         return _exit_status(error)
     finally:
         # An exception while libraries unload, which takes OpenNI2 a while, would be a traceback.
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        discard_unless_flushed(sys.stdout)
     return status
 
 
@@ -77,7 +86,7 @@ class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
         from importlib.metadata import version
 
-        print(version("denseface"))
+        say(version("denseface"))
         parser.exit()
 
 

@@ -3,6 +3,7 @@
 import argparse
 
 from denseface.service.commands import _options
+from denseface.service.runtime.terminal import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,12 +26,12 @@ def run(args: argparse.Namespace) -> int:
         if args.action == "list":
             for letter in operator.dead():
                 reason = " ".join(letter.message.split())
-                print(f"{letter.sequence} {letter.capture_id} {letter.finished_at} "
-                      f"{letter.attempts} attempts: {reason} ({letter.error})")
+                say(f"{letter.sequence} {letter.capture_id} {letter.finished_at} "
+                    f"{letter.attempts} attempts: {reason} ({letter.error})")
             return 0
         act = operator.retry if args.action == "retry" else operator.drop
         ids = args.ids or [letter.capture_id for letter in operator.dead()]
         for capture_id in ids:
             act(capture_id)
-            print(capture_id, flush=True)
+            say(capture_id, flush=True)
     return 0

@@ -4,6 +4,7 @@ import argparse
 import os
 
 from denseface.service.commands import _options
+from denseface.service.runtime.terminal import say
 
 _ROLES = ("sensor", "worker", "presser", "subscriber", "operator")
 
@@ -36,16 +37,16 @@ def run(args: argparse.Namespace) -> int:
     match args.action:
         case "new":
             secret, public = security.new_pair(folder, args.name)
-            print(f"{secret}  stays where it is used\n{public}  goes to the other side: "
-                  f"{security.read_public(public)}")
+            say(f"{secret}  stays where it is used",
+                f"{public}  goes to the other side: {security.read_public(public)}")
         case "allow":
             one = security.allow(folder, args.name, security.read_public(args.public),
                                  frozenset(map(Role, args.roles)))
-            print(f"{one.name} ({one.fingerprint}) may connect as {', '.join(sorted(one.roles))}")
+            say(f"{one.name} ({one.fingerprint}) may connect as {', '.join(sorted(one.roles))}")
         case "revoke":
             security.revoke(folder, args.name)
-            print(f"{args.name} may connect no more")
+            say(f"{args.name} may connect no more")
         case "list":
             for one in sorted(security.AllowList(folder), key=lambda one: one.name):
-                print(f"{one.name:20} {one.fingerprint}  {', '.join(sorted(one.roles))}")
+                say(f"{one.name:20} {one.fingerprint}  {', '.join(sorted(one.roles))}")
     return 0

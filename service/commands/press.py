@@ -3,6 +3,7 @@
 import argparse
 
 from denseface.service.commands import _options
+from denseface.service.runtime.terminal import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,7 +22,7 @@ def run(args: argparse.Namespace) -> int:
     files = FaceFiles(args.output, args.report, args.rendering, args.mode)
     with _options.client(args) as client:
         capture_id = client.press(args.capture_id, timeout=args.timeout)
-        print(capture_id, flush=True)
+        say(capture_id, flush=True)
         face = client.get(capture_id, timeout=args.timeout)
     files.write(face)
     return 0

@@ -4,6 +4,7 @@ import argparse
 import sys
 
 from denseface.service.commands import _options
+from denseface.service.runtime.terminal import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,10 +30,10 @@ def run(args: argparse.Namespace) -> int:
         if not sys.stdin.isatty():
             raise UsageError("--yes: expected, as there is nobody to ask")
         if input(f"Remove {chosen}, with frame, face and report? [y/N] ").strip().lower() != "y":
-            print("nothing removed")
+            say("nothing removed")
             return 1
     with _options.operator(args) as operator:
         removed = operator.purge(
             capture_id=args.capture_id, before=args.before, everything=args.all)
-    print(f"{removed} {'capture' if removed == 1 else 'captures'} removed")
+    say(f"{removed} {'capture' if removed == 1 else 'captures'} removed")
     return 0

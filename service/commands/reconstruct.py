@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from denseface.service.commands import _options
+from denseface.service.runtime.terminal import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,6 +30,6 @@ def run(args: argparse.Namespace) -> int:
     face = reconstruct(frame, settings)
     files.write(face)
     report = face.report
-    print(f"{report.initial_points} measured points, {report.dense_points} dense points, "
-          f"{report.timings_ms['total']:.0f} ms")
+    say(f"{report.initial_points} measured points, {report.dense_points} dense points, "
+        f"{report.timings_ms['total']:.0f} ms")
     return 0

@@ -3,6 +3,7 @@
 import argparse
 
 from denseface.service.commands import _options
+from denseface.service.runtime.terminal import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,5 +19,5 @@ def run(args: argparse.Namespace) -> int:
 
     with _options.client(args) as client:
         status = ready_status(client, args.wait) if args.wait else client.status()
-        print((as_json if args.json else as_text)(client.address, status))
+        say(*(as_json if args.json else as_text)(client.address, status).split("\n"))
     return 0

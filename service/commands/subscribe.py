@@ -5,6 +5,7 @@ from itertools import islice
 from pathlib import Path
 
 from denseface.service.commands import _options
+from denseface.service.runtime.terminal import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,5 +38,5 @@ def run(args: argparse.Namespace) -> int:
     with _options.client(args) as client:
         published = client.published(after=args.after, last=args.last, since=args.since)
         for line in islice(follow(published, args.save, args.mode), args.count):
-            print(line, flush=True)
+            say(line, flush=True)
     return 0

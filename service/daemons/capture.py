@@ -25,6 +25,7 @@ from denseface.service.protocol.payload import MAX_PREVIEW_SIDE, FrameHeader, Pr
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.failpoints import failpoint
+from denseface.service.runtime.log_output import exit_now
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.hub_connection import HubConnection
@@ -63,7 +64,7 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None) ->
 def _close(driver: Background[RgbdFrame | None], sensor: SensorReader) -> None:
     if not driver.wait(_CLOSING_S):
         _log.error("the driver hangs", source=sensor.uri)
-        os._exit(1)
+        exit_now(1)
     with suppress(CaptureError):
         if driver:
             driver.result()
@@ -107,7 +108,7 @@ class _Capture:
             elif self.driver.elapsed_s > self.settings.take_timeout_s:
                 _log.error("the driver hangs", source=self.sensor.uri,
                            seconds=self.driver.elapsed_s)
-                os._exit(1)
+                exit_now(1)
             if self.presses and not self.driver:
                 self.driver.start(self.sensor.take)
             elif self.preview_due and not self.driver and not self.unacknowledged:

@@ -19,6 +19,7 @@ from denseface.service.protocol.payload import Arrays, FaceHeader
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.failpoints import failpoint
+from denseface.service.runtime.log_output import exit_now
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable
@@ -57,7 +58,7 @@ def run(settings: ServiceSettings) -> int:
                 worker.serve(stop)
                 worker.finish()
             if compute:
-                os._exit(stop.exit_status)  # the job is handed back, its thread cannot be stopped
+                exit_now(stop.exit_status)  # the job is handed back, its thread cannot be stopped
         return stop.exit_status
 
 
@@ -91,7 +92,7 @@ class _Worker:
                     self.compute.elapsed_s > self.settings.job_timeout_s):
                 _log.error("job takes too long", capture_id=self._holding(),
                            seconds=self.compute.elapsed_s)
-                os._exit(1)
+                exit_now(1)
 
     def _deliver(self) -> None:
         if self.send_answer and self.send_answer():  # else it is tried again

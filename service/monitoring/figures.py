@@ -92,3 +92,5 @@ class Figures:
         self.latencies = Latencies()
         self.kept_bytes: int | None = None
         """Size of the data folder's files when last measured; None before."""
+        self.log_lines_lost = 0
+        """Lines of this process's log that could not be written."""

@@ -13,6 +13,7 @@ from denseface.service.protocol.messages import Status
 from denseface.service.protocol.outgoing import Output, Publish
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.closing import Closing
+from denseface.service.runtime.log_output import process_log
 
 __all__ = ["Observer", "Snapshot", "folder_bytes"]
 
@@ -58,6 +59,7 @@ class Observer(Closing):
     ) -> None:
         """Take a snapshot at each status that a tick publishes."""
         self._measure_folder(now)
+        self.figures.log_lines_lost = process_log.lost
         for output in outputs:
             message = output.packet.message
             if isinstance(output, Publish) and isinstance(message, Status):

@@ -58,6 +58,9 @@ def _counters(snapshot: Snapshot) -> Iterator[core.Metric]:
         for one, count in found.items() if label else ():
             family.add_metric([one], count)
         yield family
+    yield core.CounterMetricFamily(
+        _PREFIX + "log_lines_lost", "Lines of the hub's log that could not be written.",
+        value=snapshot.status.log_lines_lost)
 
 
 def _gauges(snapshot: Snapshot) -> Iterator[core.Metric]:

@@ -55,6 +55,8 @@ class Status(BaseAnswer):
     """Room left on the disk."""
     kept_bytes: Number | None = None
     """Size of the files kept."""
+    log_lines_lost: Number = 0
+    """Lines of the hub's log that could not be written, since it started."""
 
     @property
     def ready(self) -> bool:

@@ -17,6 +17,7 @@ from denseface.service.errors import LocalProtocolError, RemoteProtocolError, fi
 from denseface.service.protocol.message_base import BaseMessage, FromHub, ToHub
 from denseface.service.protocol.messages import FROM_HUB, TO_HUB
 from denseface.service.protocol.payload import Arrays
+from denseface.service.runtime.terminal import printable
 
 MAX_HEADER_BYTES = 256 * 1024
 """Longest header, from the hub or stored, bytes."""
@@ -127,12 +128,7 @@ def _header(header: bytes, reader: TypeAdapter[_MessageT]) -> _MessageT:
         field, complaint = first_error(error)
         reason = "version" if field.rpartition(".")[2] == "version" else "malformed"
         raise RemoteProtocolError(
-            _printable(f"{field or 'header'}: {complaint}"[:500]), reason) from error
+            printable(f"{field or 'header'}: {complaint}"[:500]), reason) from error
     if "version" not in message.model_fields_set:
         raise RemoteProtocolError(f"{message.kind}: no version given", "version")
     return message
-
-
-def _printable(text: str) -> str:
-    """Escape line breaks and control characters, for logs and terminals."""
-    return "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)

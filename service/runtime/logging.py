@@ -1,14 +1,19 @@
-"""Logging: one line for each event, on stderr, never with image data."""
+"""Logging: one line for each event, on stderr, never with image data, never in the way."""
 
+import io
 import logging
 import math
+import os
 import sys
 import threading
 import warnings
 from typing import Any, Literal, TextIO
 
 import structlog
-from structlog.typing import EventDict, Processor
+from structlog.typing import EventDict, ExcInfo, Processor
+
+from denseface.service.runtime.log_output import LogStream, process_log
+from denseface.service.runtime.terminal import printable
 
 __all__ = ["LogFormat", "configure"]
 
@@ -18,15 +23,17 @@ LogFormat = Literal["text", "json"]
 def configure(log_format: LogFormat, process: str) -> None:
     """Send every event of this process to stderr, with the process's name.
 
-    In JSON, what Python and the libraries report becomes events too: warnings, records of the
-    standard library's logging, exceptions that nobody catches.
+    So goes what is printed on `sys.stderr`. Nothing of it waits or raises: what cannot be written
+    is lost and counted (`log_output`). In text, what came from outside is escaped. In JSON, what
+    Python and the libraries report becomes events too: warnings, records of the standard library's
+    logging, exceptions that nobody catches.
     """
     renderers: list[Processor]
     if log_format == "json":
         renderers = [structlog.processors.format_exc_info, structlog.processors.JSONRenderer()]
     else:
-        renderers = [structlog.dev.ConsoleRenderer(
-            colors=sys.stderr.isatty(), exception_formatter=structlog.dev.plain_traceback)]
+        renderers = [_escape, structlog.dev.ConsoleRenderer(
+            colors=os.isatty(2), exception_formatter=_write_traceback)]
 
     def add_process(_: Any, __: str, event: EventDict) -> EventDict:
         event["process"] = process
@@ -41,11 +48,51 @@ def configure(log_format: LogFormat, process: str) -> None:
             *renderers,
         ],
         wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
-        logger_factory=structlog.WriteLoggerFactory(file=sys.stderr),
+        logger_factory=_Lines,
         cache_logger_on_first_use=True,
     )
+    process_log.on_recovery = _log_lost
     if log_format == "json":
+        sys.stderr = LogStream(lambda line: structlog.get_logger("stderr").warning(line))
         _forward_others()
+    else:
+        sys.stderr = LogStream(lambda line: process_log.put(printable(line)))
+
+
+class _Lines:
+    """What structlog writes rendered events to."""
+
+    def __init__(self, *_: object) -> None:
+        pass
+
+    def msg(self, line: str) -> None:
+        process_log.put(line)
+
+    debug = info = warning = error = critical = exception = log = msg
+
+
+def _log_lost(lines: int, since_start: int) -> None:
+    structlog.get_logger("log").warning("lines lost", lines=lines, since_start=since_start)
+
+
+class _Escaped(str):
+    """A text that is escaped already; what quotes it does not escape it once more."""
+
+    def __repr__(self) -> str:
+        return f"'{self}'"
+
+
+def _escape(_: Any, __: str, event: EventDict) -> EventDict:
+    return {key: _Escaped(printable(value))
+            if isinstance(value, str) and not value.isprintable() else value
+            for key, value in event.items()}
+
+
+def _write_traceback(stream: TextIO, error: ExcInfo) -> None:
+    """Write it indented, so that no line of an error's text passes for one of the log."""
+    text = io.StringIO()
+    structlog.dev.plain_traceback(text, error)
+    stream.writelines(f"\n  {printable(line)}" for line in text.getvalue().strip("\n").split("\n"))
 
 
 def _without_data(_: Any, __: str, event: EventDict) -> EventDict:

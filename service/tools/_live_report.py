@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import Self
 
 from denseface.recon import Face, Settings
+from denseface.service.runtime.terminal import printable
 from denseface.service.tools._live_statistics import LiveFrame, LiveStatistics
 
 _REFRESH_S = 0.1
@@ -42,7 +43,7 @@ class StatusLine:
 
     def _write(self, text: str) -> None:
         width = shutil.get_terminal_size().columns - 1
-        print(f"\r{text[:width]}\x1b[K", end="", file=sys.stderr, flush=True)
+        print(f"\r{printable(text)[:width]}\x1b[K", end="", file=sys.stderr, flush=True)
 
 
 def text_summary(warm_ms: float, statistics: LiveStatistics) -> str:

@@ -6,6 +6,7 @@ import time
 from denseface.service.client import Client
 from denseface.service.errors import ClientTimeoutError
 from denseface.service.protocol.messages import Status
+from denseface.service.runtime.terminal import printable
 
 __all__ = ["as_json", "as_text", "ready_status"]
 
@@ -40,7 +41,7 @@ def as_json(address: str, status: Status) -> str:
 
 
 def as_text(address: str, status: Status) -> str:
-    """Give the status as lines of a name and what it says."""
+    """Give the status as lines of a name and what it says, escaped."""
     rows = {
         "hub": f"{status.hub_version} at {address}",
         "sensors": ", ".join(status.sensors) or "none",
@@ -61,4 +62,6 @@ def as_text(address: str, status: Status) -> str:
             ("refused", "", status.refused)):
         if counts:
             rows[name] = prefix + ", ".join(f"{one} {count}" for one, count in counts.items())
-    return "\n".join(f"{name:8} {value}" for name, value in rows.items())
+    if status.log_lines_lost:
+        rows["log"] = f"{status.log_lines_lost} lines of the hub's lost"
+    return "\n".join(f"{name:8} {printable(value)}" for name, value in rows.items())

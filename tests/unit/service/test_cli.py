@@ -4,12 +4,15 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+import structlog
 
 from denseface.capture.npz import save_frame
 from denseface.service.cli import main
+from denseface.service.runtime.log_output import process_log
 from tests.unit.frames import calibration, frame
 from tests.waiting import LIMIT_S
 
@@ -23,12 +26,21 @@ def room(tmp_path):
     return path
 
 
-def outcome(capsys, *arguments):
+@pytest.fixture(autouse=True)
+def _stderr(monkeypatch):
+    """Undo what a daemon's log does to this process."""
+    monkeypatch.setattr(sys, "stderr", sys.stderr)
+    yield
+    structlog.reset_defaults()
+
+
+def outcome(capfd, *arguments):
     try:
         status = main([str(one) for one in arguments])
     except SystemExit as exit_:
         status = exit_.code
-    return status, capsys.readouterr().err
+    process_log.flush(LIMIT_S)
+    return status, capfd.readouterr().err
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
@@ -93,16 +105,16 @@ def outcome(capsys, *arguments):
     (["purge", "--id", "../x", "--yes"], "capture id '../x'"),
     (["purge", "--all"], "--yes: expected"),
 ])
-def test_wrong_usage_is_one_line_and_status_2(room, capsys, arguments, message):
+def test_wrong_usage_is_one_line_and_status_2(room, capfd, arguments, message):
     for name in ("garbage.npz", "garbage.oni", "garbage.xyz"):
         (room.parent / name).write_bytes(b"garbage" * 100)
-    status, text = outcome(capsys, *[one.replace("{tmp}", str(room.parent)) for one in arguments])
+    status, text = outcome(capfd, *[one.replace("{tmp}", str(room.parent)) for one in arguments])
     assert (status, len(text.splitlines())) == (2, 1)
     assert message in text
 
 
-def test_a_frame_without_a_face_is_one_line_and_status_1(room, tmp_path, capsys):
-    status, text = outcome(capsys, "reconstruct", room, "-o", tmp_path / "face.ply")
+def test_a_frame_without_a_face_is_one_line_and_status_1(room, tmp_path, capfd):
+    status, text = outcome(capfd, "reconstruct", room, "-o", tmp_path / "face.ply")
     assert (status, len(text.splitlines())) == (1, 1)
     assert "face" in text
     assert not (tmp_path / "face.ply").exists()
@@ -113,12 +125,12 @@ def test_debug_shows_the_traceback(tmp_path):
         main(["reconstruct", str(tmp_path / "no.npz"), "--debug"])
 
 
-def test_ctrl_c_is_status_130(room, monkeypatch, capsys):
+def test_ctrl_c_is_status_130(room, monkeypatch, capfd):
     def interrupted(*_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("denseface.recon.reconstruct", interrupted)
-    assert outcome(capsys, "reconstruct", room) == (130, "")
+    assert outcome(capfd, "reconstruct", room) == (130, "")
 
 
 def test_help_imports_nothing_heavy():
@@ -143,6 +155,42 @@ def test_a_reader_that_leaves_is_no_error():
         stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writing)
     assert (done.returncode, done.stderr) == (141, "")
+
+
+@pytest.mark.parametrize(("stderr", "prefix"), [("/dev/full", ""), (os.devnull, " 2>&-")])
+@pytest.mark.parametrize(("command", "status"), [
+    ("status --address tcp://127.0.0.1:1 --wait 0.01", 1), ("status --wait never", 2)])
+def test_an_error_that_cannot_be_said_has_its_status(stderr, prefix, command, status):
+    with Path(stderr).open("w") as unwritable:
+        done = subprocess.run(
+            ["sh", "-c", f'exec "$0" -m denseface {command}{prefix}', sys.executable],
+            stdout=subprocess.PIPE, stderr=unwritable, text=True, check=False, timeout=LIMIT_S)
+    assert (done.returncode, done.stdout) == (status, "")
+
+
+def test_a_pipe_that_broke_elsewhere_is_an_error(monkeypatch, capfd):
+    def broken(_):
+        raise BrokenPipeError("somebody left")
+
+    monkeypatch.setattr("denseface.service.commands.status.run", broken)
+    assert outcome(capfd, "status") == (1, "denseface status: somebody left\n")
+
+
+def test_stdout_on_a_full_disk_is_one_line_and_status_1():
+    code = ("import sys\nfrom denseface.service import cli\n"
+            "from denseface.service.commands import status\n"
+            "status.run = lambda args: print('x') or 0\nsys.exit(cli.main(['status']))")
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([sys.executable, "-c", code], stdout=full, stderr=subprocess.PIPE,
+                              text=True, check=False, timeout=LIMIT_S)
+    assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
+
+
+def test_a_file_name_in_an_error_obeys_no_terminal(tmp_path, capfd):
+    status, text = outcome(capfd, "reconstruct", tmp_path / "\x1b[31m\u202e.npz")
+    assert (status, len(text.splitlines())) == (2, 1)
+    assert text.rstrip("\n").isprintable()
+    assert r"\x1b[31m\u202e.npz" in text
 
 
 def test_a_sigterm_while_the_interpreter_ends_leaves_no_traceback():

@@ -18,7 +18,7 @@ def status(**changed):
     return Status(**{
         "epoch": "0f", "sequence": 3, "hub_version": "1.2", "sensors": ("s",),
         "workers": ("a", "b"), "pressed": 1, "queued": 2, "working": 3, "done": 4, "failed": 5,
-        "dead": 6, "free_bytes": 2**30, "kept_bytes": 999} | changed)
+        "dead": 6, "free_bytes": 2**30, "kept_bytes": 999, "log_lines_lost": 8} | changed)
 
 
 @pytest.fixture
@@ -51,6 +51,7 @@ def test_all_that_the_snapshot_holds_is_rendered(snapshot):
     assert (found["denseface_sensors",], found["denseface_workers",]) == (1, 2)
     assert found["denseface_disk_free_bytes",] == 2**30
     assert found["denseface_kept_bytes",] == 999
+    assert found["denseface_log_lines_lost_total",] == 8
     assert found["denseface_subscriptions", "faces"] == 1
     assert found["denseface_build", "1.2"] == 1
     bucket, stage = "denseface_latency_seconds_bucket", "press_to_published"

@@ -92,7 +92,7 @@ from_hub = st.one_of(
           latencies=st.dictionaries(texts, st.builds(
               messages.Latency, count=numbers, median_s=st.floats(0, 1e6),
               p99_s=st.floats(0, 1e6)), max_size=3),
-          free_bytes=st.none() | numbers, kept_bytes=st.none() | numbers),
+          free_bytes=st.none() | numbers, kept_bytes=st.none() | numbers, log_lines_lost=numbers),
     numbers.map(lambda number: Packet(messages.Preview(
         epoch="0f", sequence=number, preview=PREVIEW), PREVIEW_ARRAYS)),
     st.just(Packet(messages.TakePreview())),

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import structlog
 
+from denseface.service.runtime.log_output import process_log
 from denseface.service.runtime.logging import configure
 from tests.waiting import LIMIT_S
 
@@ -26,39 +27,76 @@ def lines(text):
 
 @pytest.fixture(autouse=True)
 def _as_before(monkeypatch):
-    for module, name in ((sys, "excepthook"), (sys, "unraisablehook"), (threading, "excepthook")):
+    for module, name in ((sys, "excepthook"), (sys, "unraisablehook"), (threading, "excepthook"),
+                         (sys, "stderr")):
         monkeypatch.setattr(module, name, getattr(module, name))
     before = logging.root.handlers[:]
     yield
     logging.root.handlers[:] = before
+    structlog.reset_defaults()
+
+
+@pytest.fixture
+def logged(capfd):
+    """Gives what was logged since it was asked last."""
+    def read():
+        process_log.flush(LIMIT_S)
+        return capfd.readouterr().err
+
+    return read
 
 
 @pytest.mark.parametrize("how", ["json", "text"])
-def test_arrays_and_bytes_are_never_written(how, capsys):
+def test_arrays_and_bytes_are_never_written(how, logged):
     configure(how, "test")
     image = np.full((4, 5, 3), 123, np.uint8)
     structlog.get_logger("x").info(
         "taken", image=image, raw=image.tobytes(), view=memoryview(image), both=[image, b"secret"],
         inside={"color": image, "n": 3}, scalar=np.uint8(7))
-    text = capsys.readouterr().err
+    text = logged()
     assert "123" not in re.sub(r"\d{4}-\S+Z", "", text)  # but in the time, perhaps
     assert "secret" not in text
     assert "uint8 [4, 5, 3]" in text
     assert "60 bytes" in text
 
 
-def test_an_error_in_text_has_its_traceback(capsys):
+def test_an_error_in_text_has_its_traceback(logged):
     configure("text", "test")
     try:
         raise ValueError("two\nlines")  # noqa: TRY301
     except ValueError:
         structlog.get_logger("x").exception("failed", capture_id="a")
-    text = capsys.readouterr().err
+    text = logged()
     assert "[error    ] failed                         capture_id=a process=test\n" in text
-    assert "ValueError: two\nlines" in text
+    assert "  ValueError: two\n  lines" in text
 
 
-def test_every_line_is_json_whatever_is_in_it(capsys):
+def test_what_came_from_outside_obeys_no_terminal_and_begins_no_line(logged):
+    configure("text", "test")
+    log = structlog.get_logger("x")
+    evil = "a\x1b[31m\x9b1mb\u202ec\n2026-01-01 [info] forged\udc80"
+    log.warning("refused", reason=evil, plain="\x1b]0;x\x07", several=[evil], by={"k": evil})
+    log.warning(evil)
+    print("printed \x1b[2J", file=sys.stderr)
+    try:
+        raise ValueError(evil)  # noqa: TRY301
+    except ValueError:
+        log.exception("failed")
+    text = logged()
+    assert all(line.isprintable() for line in text.split("\n"))
+    assert not [line for line in text.split("\n") if line.startswith("2026-01-01")]
+    assert r"reason='a\x1b[31m\x9b1mb\u202ec\n2026-01-01 [info] forged\udc80'" in text
+    assert r"plain=\x1b]0;x\x07" in text
+    assert r"printed \x1b[2J" in text
+
+
+def test_what_is_printed_in_json_is_an_event(logged):
+    configure("json", "test")
+    print("two\nlines", "\x1b", file=sys.stderr)
+    assert [line["event"] for line in lines(logged())] == ["two", "lines \x1b"]
+
+
+def test_every_line_is_json_whatever_is_in_it(logged):
     configure("json", "test")
     log = structlog.get_logger("x")
     log.info("new\nline", value=math.nan, other=math.inf, thing=object(), text="\x1b[0m\udc80")
@@ -66,7 +104,7 @@ def test_every_line_is_json_whatever_is_in_it(capsys):
         raise ValueError("two\nlines")  # noqa: TRY301
     except ValueError:
         log.exception("failed")
-    first, second = lines(capsys.readouterr().err)
+    first, second = lines(logged())
     assert (first["process"], first["level"], first["event"]) == ("test", "info", "new\nline")
     assert (first["value"], first["other"]) == ("nan", "inf")
     assert "two\nlines" in second["exception"]

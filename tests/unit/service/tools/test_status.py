@@ -47,3 +47,9 @@ def test_json_and_text_say_the_same():
         "hub      1 at ipc:///x", "sensors  s", "workers  none",
         "now      0 pressed, 0 queued, 0 working",
         "kept     2 faces, 1 without a face, 0 given up"]
+
+
+def test_lost_lines_of_the_log_are_shown_and_names_obey_no_terminal():
+    text = as_text("ipc:///x", status("s\x1b[2J\nkept").model_copy(update={"log_lines_lost": 3}))
+    assert "log      3 lines of the hub's lost" in text.splitlines()
+    assert r"sensors  s\x1b[2J\nkept" in text.splitlines()

@@ -1,0 +1,77 @@
+"""Lines for a terminal or a file: what came from outside is escaped, what cannot be said is lost.
+
+Whoever reads a line believes its colours and its line breaks, and a terminal obeys its escape
+sequences: names, reasons and file names may hold any of them.
+"""
+
+import os
+import select
+import sys
+from contextlib import suppress
+from typing import TextIO
+
+__all__ = ["complain", "discard_unless_flushed", "fill_standard_descriptors", "printable",
+           "reader_left", "say"]
+
+
+def printable(text: str) -> str:
+    """Escape line breaks, control characters and what changes the order of reading."""
+    if text.isprintable():
+        return text
+    return "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)
+
+
+def say(*lines: str, flush: bool = False) -> None:
+    """Print lines on stdout, escaped; raises as `print` does."""
+    for line in lines:
+        print(printable(line), flush=flush)
+
+
+def complain(line: str) -> None:
+    """Print one line on stderr, escaped; it is lost where that cannot be written."""
+    if sys.stderr is None:  # `print` would take stdout
+        return
+    with suppress(OSError, ValueError):
+        print(printable(line), file=sys.stderr)
+    discard_unless_flushed(sys.stderr)
+
+
+def discard_unless_flushed(stream: TextIO | None) -> None:
+    """Flush a stream; let it lead nowhere where that fails.
+
+    Python would try once more at exit, complain, and end with a status of its own.
+    """
+    if stream is None:
+        return
+    try:
+        stream.flush()
+    except (OSError, ValueError):
+        with suppress(OSError, ValueError):
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, stream.fileno())
+            os.close(null)
+
+
+def reader_left(stream: TextIO | None) -> bool:
+    """Say whether a stream is a pipe or a connection that nobody reads any more."""
+    if stream is None:
+        return False
+    try:
+        poll = select.poll()
+        poll.register(stream.fileno(), select.POLLOUT)
+        return any(events & (select.POLLERR | select.POLLHUP) for _, events in poll.poll(0))
+    except (OSError, ValueError):
+        return False
+
+
+def fill_standard_descriptors() -> None:
+    """Open what of stdin, stdout and stderr is closed, so that no other file gets its number.
+
+    What a library prints would go into that file. Writing fails, as it did before.
+    """
+    for descriptor in range(3):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            with suppress(OSError):  # the lowest free number is this one
+                os.set_inheritable(os.open(os.devnull, os.O_RDONLY), True)

@@ -1,0 +1,111 @@
+"""Wherever the log goes, the service goes on, and says how many lines were lost."""
+
+import fcntl
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
+import psutil
+import pytest
+
+from denseface.service.protocol import messages
+from tests.system.guarded import FRAME, FRAME_ARRAYS, Peer
+from tests.system.running import PACE, RECORDINGS, REPOSITORY, denseface
+from tests.waiting import LIMIT_S, until
+
+_PIPE_BYTES = 4096
+"""Smallest buffer that Linux gives a pipe."""
+_SHORT_QUEUE = ("from denseface.service.runtime import log_output\n"
+                "log_output._MAX_BYTES = 500\n")
+"""Python that makes a stalled log lose lines soon."""
+
+
+@contextmanager
+def broken(how: str) -> Iterator[tuple[int, list[str]]]:
+    """Give a descriptor for stderr, and what stands before the command that gets it."""
+    with ExitStack() as stack:
+        prefix = []
+        if how == "full disk":
+            stderr = os.open("/dev/full", os.O_WRONLY)
+        elif how == "closed":
+            stderr = os.open(os.devnull, os.O_WRONLY)
+            prefix = ["sh", "-c", 'exec "$@" 2>&-', "sh"]
+        else:
+            reader, stderr = os.pipe()
+            if how == "reader left":
+                os.close(reader)
+            else:
+                stack.callback(os.close, reader)
+                fcntl.fcntl(stderr, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)
+                os.write(stderr, b"\n" * _PIPE_BYTES)
+        stack.callback(os.close, stderr)
+        yield stderr, prefix
+
+
+BROKEN = ("full disk", "reader left", "reader stalls", "closed")
+
+
+@pytest.mark.parametrize("how", BROKEN)
+def test_a_hub_whose_log_is_broken_answers_presses_and_stops_in_order(how, tmp_path):
+    with broken(how) as (stderr, prefix), tempfile.TemporaryDirectory(prefix="df-") as short:
+        address = f"ipc://{short}/hub"
+        process = subprocess.Popen(
+            [*prefix, sys.executable, "-c", f"import sys\n{_SHORT_QUEUE}"
+             "from denseface.service.cli import main\nsys.exit(main(sys.argv[1:]))",
+             "hub", "--address", address, "--data", str(tmp_path / "data")],
+            cwd=REPOSITORY, stderr=stderr, env=os.environ | PACE)
+        sensor, presser = Peer(address), Peer(address)
+        try:
+            sensor.send(messages.SensorReady(name="s", source="x"))
+            until(lambda: presser.poll_status().sensors)
+            for number in range(1, 6):
+                capture_id = f"a{number}"
+                presser.send(messages.Press(request=number, capture_id=capture_id))
+                assert sensor.receive("take").message.capture_id == capture_id
+                sensor.send(messages.Frame(capture_id=capture_id, frame=FRAME), FRAME_ARRAYS)
+                presser.receive("press_accepted")
+            until(lambda: presser.poll_status().log_lines_lost >= 3)
+            assert process.poll() is None
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(LIMIT_S) == 0
+        finally:
+            process.kill()
+            process.wait()
+            sensor.close()
+            presser.close()
+
+
+@pytest.mark.parametrize("how", ["full disk", "reader stalls"])
+def test_a_service_whose_log_is_broken_makes_faces_and_stops_in_order(how, tmp_path):
+    with broken(how) as (stderr, _), tempfile.TemporaryDirectory(prefix="df-") as short:
+        address = f"ipc://{short}/hub"
+        process = subprocess.Popen(
+            [sys.executable, "-m", "denseface", "up", "--workers", "1", "--address", address,
+             "--source", str(RECORDINGS / "frontal_700.oni"), "--data", str(tmp_path / "data")],
+            cwd=REPOSITORY, stderr=stderr, env=os.environ | PACE)
+        try:
+            waited = denseface("status", "--wait", LIMIT_S, "--address", address)
+            assert waited.returncode == 0, waited.stderr
+            pressed = denseface("press", "--address", address)
+            assert pressed.returncode in (0, 1), pressed.stderr
+            status = json.loads(denseface("status", "--json", "--address", address).stdout)
+            assert status["done"] + status["failed"] == 1
+            assert (status["log_lines_lost"] > 0) == (how == "full disk")
+            hub, *_ = (one for one in psutil.Process(process.pid).children()
+                       if "hub" in one.cmdline())
+            assert process.poll() is None
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(LIMIT_S) == 0
+            assert not hub.is_running()
+        finally:
+            if process.poll() is None:
+                family = psutil.Process(process.pid).children(recursive=True)
+                process.kill()
+                for one in family:
+                    one.kill()
+            process.wait()
