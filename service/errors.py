@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AddressError", "AuthenticatorStoppedError", "CaptureFailedError", "ClientClosedError",
-    "ClientTimeoutError", "CorruptFileError", "DamagedDatabaseError", "DamagedFaceError",
+    "ClientForkedError", "ClientTimeoutError", "CorruptFileError", "DamagedDatabaseError", "DamagedFaceError",
     "DiskFullError", "FormatError", "HubRunningError", "KeyFileError", "KeyRefusedError",
     "LocalProtocolError", "PressRefusedError", "ProtocolError", "RemoteProtocolError",
     "RequestFailedError", "ServiceError", "SettingsError", "StoreError", "UnknownCaptureError",
@@ -45,6 +45,10 @@ class RemoteProtocolError(ProtocolError):
 
 class ClientClosedError(ServiceError, RuntimeError):
     """A call on a client that was closed."""
+
+
+class ClientForkedError(ServiceError, RuntimeError):
+    """A call in a process that was forked after the client was made."""
 
 
 class ClientTimeoutError(ServiceError, TimeoutError):

@@ -7,7 +7,12 @@ from pathlib import Path
 import zmq
 
 from denseface.service.client.exchanges import Exchanges
-from denseface.service.errors import ClientClosedError, ClientTimeoutError, RequestFailedError
+from denseface.service.errors import (
+    ClientClosedError,
+    ClientForkedError,
+    ClientTimeoutError,
+    RequestFailedError,
+)
 from denseface.service.protocol.messages import RequestFailed
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Buffer, Packet
@@ -28,6 +33,7 @@ class BaseClient:
         self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None
     ) -> None:
         settings = ServiceSettings.of(os.environ, address=address, key=key, hub_key=hub_key)
+        self._process = os.getpid()
         self.address = settings.address
         self._resend_s = settings.resend_s
         check_connectable(self.address)
@@ -37,7 +43,22 @@ class BaseClient:
         self._context: Context = zmq.Context()
         self._socket, self._monitor = connect(self._context, zmq.DEALER, self.address, self._keys)
 
+    def _forked(self) -> bool:
+        """Say whether this process was forked after the client was made.
+
+        It has none of the threads that move the messages, so its calls would wait for ever; and it
+        shares descriptors with the process where they are: it must not touch the sockets.
+        """
+        return self._process != os.getpid()
+
+    def _check_process(self) -> None:
+        if self._forked():
+            raise ClientForkedError(
+                f"{self.address}: the client was made before this process was forked: make a new "
+                "one here")
+
     def _check_open(self) -> None:
+        self._check_process()
         if self._context.closed:
             raise self._closed()
 
@@ -54,6 +75,7 @@ class BaseClient:
         KeyRefusedError where the hub refuses this key, for the subscription too: a key that was
         revoked gets no answer.
         """
+        self._check_process()
         self._monitor.check()
         if subscription:
             subscription.monitor.check()

@@ -55,7 +55,12 @@ class AsyncClient(BaseClient):
         self.close()
 
     def close(self) -> None:
-        """Disconnect; harmless when repeated. Ends every iteration and every call under way."""
+        """Disconnect; harmless when repeated, and in a process that was forked since.
+
+        Ends every iteration and every call under way.
+        """
+        if self._forked():
+            return
         self._unwatch()
         for answer in self._pending.values():
             if not answer.done():
@@ -164,11 +169,12 @@ class AsyncClient(BaseClient):
 
     def _unwatch(self) -> None:
         if self._loop is not None:
-            self._loop.remove_reader(self._socket.fileno())
+            if not self._forked():  # which shares what the loop watches with this process
+                self._loop.remove_reader(self._socket.fileno())
             self._loop = None
 
     def _take_answers(self) -> None:
-        while True:
+        while not self._forked():
             try:
                 packet = receive_packet(self._socket, zmq.DONTWAIT)
             except zmq.Again:
@@ -192,6 +198,7 @@ class AsyncClient(BaseClient):
         loop = asyncio.get_running_loop()
         until = loop.time() + seconds
         while not socket.closed:
+            self._check_process()
             if socket.poll(0):
                 return True
             left = until - loop.time()
@@ -206,6 +213,6 @@ class AsyncClient(BaseClient):
                 continue
             finally:
                 # Where `close` removed it, the number may be another's by now.
-                if self._readable_events.pop(descriptor, None):
+                if self._readable_events.pop(descriptor, None) and not self._forked():
                     loop.remove_reader(descriptor)
         raise self._closed()

@@ -38,7 +38,8 @@ class Client(Closing, BaseClient):
         where None, `DENSEFACE_KEY` and `DENSEFACE_HUB_KEY`
 
     Every call raises `KeyRefusedError` where the hub refuses this key, and `ClientTimeoutError`
-    where nothing came in `timeout` seconds.
+    where nothing came in `timeout` seconds. In a process that was forked after the client was made
+    every call but `close` raises `ClientForkedError`.
 
     Raises
     ------
@@ -48,8 +49,12 @@ class Client(Closing, BaseClient):
     """
 
     def close(self) -> None:
-        """Disconnect; harmless when repeated. Ends every iteration over `faces`."""
-        self._context.destroy(linger=0)
+        """Disconnect; harmless when repeated, and in a process that was forked since.
+
+        Ends every iteration over `faces`.
+        """
+        if not self._forked():
+            self._context.destroy(linger=0)
 
     def press(self, capture_id: str | None = None, *, timeout: float = 15.0) -> str:
         """Take a frame now; give the capture's id once the frame is safe at the hub.
@@ -161,8 +166,8 @@ class Client(Closing, BaseClient):
         self._wait(subscription, step.timeout)
         return subscription.receive()
 
-    @staticmethod
-    def _wait(subscription: Subscription, timeout: float) -> None:
+    def _wait(self, subscription: Subscription, timeout: float) -> None:
+        self._check_process()
         until = time.monotonic() + timeout
         while not subscription.socket.poll(
                 max(0, math.ceil(min(until - time.monotonic(), CHECK_INTERVAL_S) * 1000))):

@@ -1,5 +1,7 @@
 """A subscription's socket, read without waiting."""
 
+import os
+
 import zmq
 
 from denseface.service.errors import ProtocolError
@@ -20,13 +22,14 @@ class Subscription:
         self, context: Context, address: str, keys: Credentials | None,
         topics: tuple[Topic, ...],
     ) -> None:
+        self._process = os.getpid()
         self.socket, self.monitor = connect(context, zmq.SUB, address, keys)
         for topic in topics:
             self.socket.subscribe(topic)
 
     def close(self) -> None:
-        """Unsubscribe; harmless when repeated."""
-        if not self.socket.closed:
+        """Unsubscribe; harmless when repeated, and in a process that was forked since."""
+        if not self.socket.closed and self._process == os.getpid():
             self.monitor.close()
             self.socket.close(linger=0)
 
