@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from denseface.capture.errors import CalibrationError
+from denseface.files import read_bounded
 
 __all__ = ["MAX_SIDE", "Calibration", "CameraModel", "ChosenCalibration", "DepthToColor",
            "choose_calibration"]
 
 MAX_SIDE = 16384
 """Pixels: the widest and the highest image."""
+_MAX_FILE_BYTES = 2**20
+"""Of a calibration file; a thousand times what one has."""
 
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -216,10 +219,10 @@ class Calibration(_Model):
         Raises
         ------
         CalibrationError
-            Where the file cannot be read or is not a calibration.
+            Where the file cannot be read, has more than 1 MiB or is not a calibration.
         """
         try:
-            text = Path(path).read_bytes()
+            text = read_bounded(path, _MAX_FILE_BYTES)
         except OSError as error:
             raise CalibrationError(f"{path}: {error.strerror or error}") from error
         return cls.from_json(text, name=str(path))

@@ -88,7 +88,8 @@ def open_source(uri: str | Path, calibration: Calibration | str | Path | None = 
         if kind not in _SOURCES:
             raise UnreadableSourceError(f"{text}: not a known kind of source; {_accepted()}")
         if not path.is_file():
-            found = "is a folder, not a file" if path.is_dir() else "no such file"
+            found = ("is a folder, not a file" if path.is_dir() else
+                     "is not a regular file" if path.exists() else "no such file")
             raise UnreadableSourceError(f"{text}: {found}")
     module, name = _SOURCES[kind].split(":")
     opener = getattr(import_module(f"denseface.capture.{module}"), name)

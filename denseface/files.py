@@ -11,6 +11,7 @@ import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from io import BufferedReader
 from pathlib import Path
 from typing import BinaryIO
 
@@ -20,7 +21,7 @@ _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 """Fails where the name is taken, by whatever it is."""
 
 
-def open_regular(path: str | Path) -> BinaryIO:
+def open_regular(path: str | Path) -> BufferedReader:
     """Open a file to read, and nothing that is none; never waits.
 
     Raises
@@ -48,9 +49,10 @@ def read_bounded(path: str | Path, max_bytes: int) -> bytes:
         As from `open_regular`, and where it has more than `max_bytes`.
     """
     with open_regular(path) as file:
-        # `read` allocates what it is asked for, so it is asked for no more than there is.
-        data = file.read(min(os.fstat(file.fileno()).st_size, max_bytes) + 1)
-    if len(data) > max_bytes:
+        size = os.fstat(file.fileno()).st_size
+        # `read` allocates what it is asked for; one byte more shows a file that grows.
+        data = file.read(size + 1) if size <= max_bytes else b""
+    if max(size, len(data)) > max_bytes:
         raise OSError(errno.EFBIG, f"Has more than {max_bytes} bytes", str(path))
     return data
 

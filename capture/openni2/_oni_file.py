@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from denseface.capture.errors import UnreadableSourceError
+from denseface.files import open_regular
 
 DEPTH_NODE, IMAGE_NODE = 2, 3
 """Kinds of node, as in a record that adds one."""
@@ -35,6 +36,9 @@ _MODE_VALUE = struct.Struct("<III")
 """Its size, then width and height."""
 _MAX_FIELDS = 1 << 20
 """Bytes of a record's fields; more is damage."""
+_MAX_NODES, _MAX_PROPERTIES, _MAX_NAME_BYTES = 64, 1024, 256
+"""Nodes of a file, properties of one of them and bytes of a name; more is damage. A sensor has
+three nodes, of some thirty properties each."""
 
 
 @dataclass
@@ -70,7 +74,7 @@ def check_oni(path: Path) -> tuple[list[OniNode], int]:
     """
     nodes: dict[int, OniNode] = {}
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             end = _walk(path, file, nodes)
     except UnreadableSourceError:
         raise
@@ -85,7 +89,7 @@ def written_frames(path: Path) -> int:
     0 where there is no depth or no colour stream.
     """
     nodes: dict[int, OniNode] = {}
-    with suppress(UnreadableSourceError, OSError), path.open("rb") as file:
+    with suppress(UnreadableSourceError, OSError), open_regular(path) as file:
         _walk(path, file, nodes)
     found = {node.kind: node.frames for node in nodes.values()}
     return min(found.get(DEPTH_NODE, 0), found.get(IMAGE_NODE, 0))
@@ -118,16 +122,20 @@ def _walk(name: Path, file: BinaryIO, nodes: dict[int, OniNode]) -> int:
         if at > size:
             raise UnreadableSourceError(
                 f"{name}: ends after {size} bytes in the middle of a record that needs {at}")
+        known = nodes.get(node)
         if kind in _NODE_ADDED:
             nodes[node] = OniNode(int.from_bytes(_text(name, content)[1][:_U32.size], "little"))
         elif kind in _PROPERTIES:
             key, value = _text(name, content)
-            if kind == _INT_PROPERTY and node in nodes:
-                nodes[node].properties[key] = int.from_bytes(value[_U32.size:], "little")
-            elif key == _MODE and node in nodes and len(value) >= _MODE_VALUE.size:
-                nodes[node].sides = _MODE_VALUE.unpack_from(value)[1:]
-        elif kind == _NEW_DATA and node in nodes:
-            nodes[node].frames += 1
+            if kind == _INT_PROPERTY and known:
+                known.properties[key] = int.from_bytes(value[_U32.size:][:8], "little")
+            elif key == _MODE and known and len(value) >= _MODE_VALUE.size:
+                known.sides = _MODE_VALUE.unpack_from(value)[1:]
+        elif kind == _NEW_DATA and known:
+            known.frames += 1
+        if len(nodes) > _MAX_NODES or (known and len(known.properties) > _MAX_PROPERTIES):
+            raise UnreadableSourceError(f"{name}: damaged: more nodes or properties than a sensor "
+                                        "has")
 
 
 def _text(name: Path, content: bytes) -> tuple[str, bytes]:
@@ -136,7 +144,7 @@ def _text(name: Path, content: bytes) -> tuple[str, bytes]:
     end = _U32.size + length
     text = content[_U32.size:end].decode("latin-1")
     # OpenNI2 crashes on a byte outside ASCII: it indexes a hash table with it, signed.
-    if (end > len(content) or text[-1:] != "\0" or not text.isascii()
-            or not text[:-1].isprintable()):
+    if (end > len(content) or length > _MAX_NAME_BYTES or text[-1:] != "\0"
+            or not text.isascii() or not text[:-1].isprintable()):
         raise UnreadableSourceError(f"{name}: damaged: a record has no valid name")
     return text[:-1], content[end:]

@@ -125,11 +125,9 @@ class AllowList:
         files: dict[str, tuple[int, ...]] = {}
         try:
             for path in self._folder.iterdir():
-                with suppress(FileNotFoundError):  # revoked meanwhile
-                    found = path.stat()
-                    if not path.name.startswith("."):
-                        files[path.name] = (found.st_ino, found.st_mtime_ns, found.st_ctime_ns,
-                                            found.st_size)
+                if not path.name.startswith("."):
+                    with suppress(FileNotFoundError):  # revoked meanwhile
+                        files[path.name] = _stamp(path)
         except FileNotFoundError:
             return {}  # nobody was ever allowed
         except OSError as error:
@@ -174,6 +172,17 @@ def revoke(keys: Path, name: str) -> None:
         raise KeyFileError(f"{name}: no key of that name is allowed in {path.parent}") from None
     except OSError as error:
         raise KeyFileError(f"{path}: {reason_of(error)}") from error
+
+
+def _stamp(path: Path) -> tuple[int, ...]:
+    """Give what changes when a file does; nothing for one that reading is to refuse by name."""
+    try:
+        found = path.stat()
+    except FileNotFoundError:
+        raise
+    except OSError:  # a loop of links
+        return ()
+    return found.st_ino, found.st_mtime_ns, found.st_ctime_ns, found.st_size
 
 
 def _out_of_descriptors(error: BaseException | None) -> bool:

@@ -7,8 +7,12 @@ from pathlib import Path
 
 import structlog
 
+from denseface.files import read_bounded
 from denseface.service.runtime.files import write_atomically
 from denseface.service.storage._store_clock import StoreClock
+
+_MAX_REPORT_BYTES = 2**16
+"""Of a file's report."""
 
 
 class Quarantine:
@@ -65,7 +69,7 @@ class Quarantine:
 
 def _read(report: Path) -> dict[str, object]:
     try:
-        found = json.loads(report.read_bytes())
+        found = json.loads(read_bounded(report, _MAX_REPORT_BYTES))
     except (OSError, ValueError):
         return {}
     return found if isinstance(found, dict) else {}

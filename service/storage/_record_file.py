@@ -11,13 +11,13 @@ themselves was a fifth of all that the hub computes for a capture.
 
 import errno
 import hashlib
-import os
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from denseface.files import read_bounded
 from denseface.service.errors import CorruptFileError, DiskFullError, StoreError, reason_of
 from denseface.service.runtime.files import write_atomically
 
@@ -65,16 +65,11 @@ def read_parts(path: Path, checksum: str | None = None) -> tuple[list[memoryview
         Where this process is out of descriptors or memory.
     """
     try:
-        with path.open("rb") as file:
-            # `read` allocates what it is asked for, so it is asked for no more than there is.
-            size = min(os.fstat(file.fileno()).st_size, _MAX_BYTES) + 1
-            data = memoryview(file.read(size))
+        data = memoryview(read_bounded(path, _MAX_BYTES))
     except OSError as error:
         transient = error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
         raise (StoreError if transient else CorruptFileError)(
             f"{path}: {reason_of(error)}") from error
-    if len(data) > _MAX_BYTES:
-        raise CorruptFileError(f"{path}: has more than {_MAX_BYTES} bytes")
     start = len(_MAGIC) + _DIGEST_BYTES
     magic, stated, body = data[:len(_MAGIC)], bytes(data[len(_MAGIC):start]).hex(), data[start:]
     parts = _split(body)

@@ -149,8 +149,26 @@ def test_the_same_data_for_all_members_counts_for_each(tmp_path):
 
 
 def test_more_entries_than_there_are_keys_are_refused_at_the_first(tmp_path):
+    path = zipped(tmp_path / "n.npz", [(f"{n}.npy", b"") for n in range(1000)])
+    assert "unexpected entry '0.npy'" in str(read(path))
+
+
+def test_a_list_of_members_without_end_is_not_read(tmp_path):
+    """Each of its entries would take a hundred times its bytes."""
     path = zipped(tmp_path / "n.npz", [(f"{n}.npy", b"") for n in range(5000)])
-    assert "unexpected entry '0.npy'" in str(read(path, 16 * 2**20))
+    assert "list of members has" in str(read(path))
+
+
+@pytest.mark.parametrize(("shape", "size"), [
+    ("(True, 8)", 16), ("(6, True)", 12), ("(True, True)", 2), ("(6, 8.0)", 96), ("(6, '8')", 96),
+    ("[6, 8]", 96), ("48", 96), ("(6, -8)", 96), ("(6, None)", 96), ("((6, 8),)", 96)])
+def test_a_shape_that_is_no_shape_is_named(tmp_path, shape, size):
+    """To Python, True is the integer 1, and NumPy's reader takes it for one."""
+    good = entries(write(tmp_path / "w.npz"))
+    text = f"{{'descr': '<u2', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
+    good["depth.npy"] = b"\x93NUMPY\1\0" + struct.pack("<H", len(text)) + text + bytes(size)
+    assert isinstance(read(zipped(tmp_path / "s.npz", list(good.items()))),
+                      UnreadableSourceError | FrameError)
 
 
 @pytest.mark.parametrize("name", [

@@ -135,7 +135,10 @@ def test_a_face_of_wrong_shapes_is_named(tmp_path):
     with np.load(path) as file:
         arrays = dict(file)
     for name, wrong in (("dense_points", arrays["dense_points"][:5]), ("report", np.array("{}")),
-                        ("grid_shape", np.array(3)), ("dense_sigma", -arrays["dense_sigma"]),
+                        ("grid_shape", np.array(3)), ("grid_shape", np.array([2**40, 2**40])),
+                        ("grid_step_mm", np.float64("nan")), ("report", np.array("\ud800")),
+                        ("report", np.zeros(2**20)),
+                        ("dense_sigma", -arrays["dense_sigma"]),
                         ("dense_cells", arrays["dense_cells"] + 99)):
         np.savez(path, **arrays | {name: wrong})
         with pytest.raises(FormatError, match=r"face\.npz: "):
