@@ -67,6 +67,8 @@ class ServiceSettings(BaseModel):
     """Longest wait for the sensor's frame after a press, seconds."""
     job_timeout_s: _Seconds = 60.0
     """Longest reconstruction; a worker that takes longer ends itself, seconds."""
+    hang_timeout_s: _Seconds = 30.0
+    """Silence after which `denseface up` ends a process, seconds; at least `silence_s` is given."""
     queue: Annotated[int, Field(ge=1, le=100_000)] = 1000
     """Frames that may wait for a worker; beyond it a press is refused."""
     retention: Annotated[float | None, BeforeValidator(parse_retention)] = 86400.0

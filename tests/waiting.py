@@ -35,6 +35,7 @@ SERVICE = {
     "DENSEFACE_LIVENESS": f"{min(3 * PATIENCE, 100):.0f}",
     "DENSEFACE_TAKE_TIMEOUT_S": f"{10 * PATIENCE:g}",
     "DENSEFACE_JOB_TIMEOUT_S": f"{60 * PATIENCE:g}",
+    "DENSEFACE_HANG_TIMEOUT_S": f"{30 * PATIENCE:g}",
 } if PATIENCE > 1 else {}
 """The service's own defaults, scaled: set for all tests but those of these very time-outs."""
 

@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from denseface.service.daemons.startup import start_process
 
-    start_process("capture", args.log)
+    supervisor = start_process("capture", args.log)
     from denseface.service.daemons import capture
 
-    return capture.run(_options.service_settings(args), args.source, args.calibration)
+    return capture.run(_options.service_settings(args), args.source, args.calibration, supervisor)

@@ -12,7 +12,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from denseface.service.daemons.startup import start_process
 
-    start_process("hub", args.log)
+    supervisor = start_process("hub", args.log)
     from denseface.service.daemons import hub
 
-    return hub.run(_options.service_settings(args), _options.recon_settings(args))
+    return hub.run(_options.service_settings(args), _options.recon_settings(args), supervisor)

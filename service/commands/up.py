@@ -19,7 +19,8 @@ def run(args: argparse.Namespace) -> int:
     start_process("up", args.log)
     from denseface.service.daemons.supervisor import Supervisor, check_settings, process_table
 
-    check_settings(_options.service_settings(args))
+    settings = _options.service_settings(args)
+    check_settings(settings)
     _options.recon_settings(args)
     table = process_table(
         args.workers,
@@ -27,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
         hub=_options.repeated(args, "data", "keys", "key", "listen", "retention", "metrics",
                               "preset", "set"),
         capture=_options.repeated(args, "source", "calibration"))
-    return Supervisor(table).run()
+    return Supervisor(table, max(settings.hang_timeout_s, settings.silence_s)).run()
 
 
 def _worker_count(text: str) -> int:

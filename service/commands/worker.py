@@ -14,7 +14,7 @@ def run(args: argparse.Namespace) -> int:
     from denseface.service.daemons.startup import start_process, use_one_thread
 
     use_one_thread()
-    start_process("worker", args.log)
+    supervisor = start_process("worker", args.log)
     from denseface.service.daemons import worker
 
-    return worker.run(_options.service_settings(args))
+    return worker.run(_options.service_settings(args), supervisor)

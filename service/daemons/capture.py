@@ -27,6 +27,7 @@ from denseface.service.runtime.background import Background
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.log_output import exit_now
 from denseface.service.runtime.signals import StopSignal
+from denseface.service.runtime.supervisor_link import SupervisorLink
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.hub_connection import HubConnection
 
@@ -39,7 +40,8 @@ _MAX_RESEND_S = 30.0
 _log = structlog.get_logger("capture")
 
 
-def run(settings: ServiceSettings, uri: str, calibration: Path | None = None) -> int:
+def run(settings: ServiceSettings, uri: str, calibration: Path | None = None,
+        supervisor: SupervisorLink | None = None) -> int:
     """Serve frames of a source until SIGINT or SIGTERM and give the exit status.
 
     A press gets the newest frame of a live sensor; of a recording the next one, which after the
@@ -54,7 +56,7 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None) ->
     sensor = SensorReader(uri, calibration)
     with StopSignal() as stop, Background[RgbdFrame | None]("sensor") as driver:
         try:
-            with HubConnection(settings, "capture") as connection:
+            with HubConnection(settings, "capture", supervisor) as connection:
                 _Capture(settings, connection, sensor, driver).serve(stop)
         finally:
             _close(driver, sensor)

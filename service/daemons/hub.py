@@ -19,10 +19,12 @@ from denseface.service.monitoring import Observer, Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.message_base import BaseMessage
 from denseface.service.protocol.outgoing import Output, Publish, send, steps
+from denseface.service.protocol.status import Restarts
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Buffer, Packet, decode_to_hub, encode
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.signals import StopSignal
+from denseface.service.runtime.supervisor_link import SupervisorLink
 from denseface.service.security.permissions import missing_role
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage import FolderStore, WriterThreads
@@ -40,7 +42,8 @@ _SENT_FAILPOINTS = {
 _log = structlog.get_logger("hub")
 
 
-def run(settings: ServiceSettings, recon: Settings) -> int:
+def run(settings: ServiceSettings, recon: Settings,
+        supervisor: SupervisorLink | None = None) -> int:
     """Serve until SIGINT or SIGTERM and give the exit status.
 
     Raises
@@ -58,7 +61,8 @@ def run(settings: ServiceSettings, recon: Settings) -> int:
         with closing(Listeners(context, settings, rejections, (stop, writer))) as listeners:
             hub = Hub(store, settings, recon, observer.figures, rejections, writer,
                       time.monotonic())
-            loop = _EventLoop(listeners, hub, rejections, observer, writer)
+            loop = _EventLoop(listeners, hub, rejections, observer, writer,
+                              supervisor or SupervisorLink())
             _log.info("listening", address=" ".join(listeners.addresses), data=str(settings.data))
             with _metrics_server(settings, observer):
                 loop.serve(stop)
@@ -89,6 +93,7 @@ class _EventLoop:
     rejections: Rejections
     observer: Observer
     writer: WriterThreads
+    supervisor: SupervisorLink
 
     def serve(self, stop: StopSignal) -> None:
         due = time.monotonic()
@@ -105,6 +110,10 @@ class _EventLoop:
 
     def _tick(self, now: float, due: float) -> float:
         """Let the hub do what time demands; give when the next tick is due."""
+        self.supervisor.beat()
+        if (counts := self.supervisor.restarts()) is not None:
+            self.observer.figures.restarts = {
+                name: Restarts.model_validate(by_reason) for name, by_reason in counts.items()}
         self.hub.loop_stalled(now - due)
         subscriptions = self.listeners.subscriptions()
         watched = subscriptions[Topic.PREVIEW] > 0

@@ -7,6 +7,7 @@ from denseface.service.runtime import failpoints
 from denseface.service.runtime.logging import configure
 from denseface.service.runtime.process import name_process
 from denseface.service.runtime.signals import die_with_parent
+from denseface.service.runtime.supervisor_link import SupervisorLink
 
 __all__ = ["ONE_THREAD", "start_process", "use_one_thread"]
 
@@ -14,15 +15,16 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 """Environment of a worker: there is one for each core, more threads would only fight."""
 
 
-def start_process(name: str, log_format: Literal["text", "json"]) -> None:
+def start_process(name: str, log_format: Literal["text", "json"]) -> SupervisorLink:
     """Name this process, tie it to its supervisor, configure its log, arm its failpoints.
 
-    Each line of the log bears the `name`.
+    Each line of the log bears the `name`. Gives what the process tells its supervisor by.
     """
     name_process(b"denseface")
     die_with_parent()
     configure(log_format, name)
     failpoints.arm(os.environ)
+    return SupervisorLink.inherit(os.environ)
 
 
 def use_one_thread() -> None:

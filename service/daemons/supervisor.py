@@ -1,20 +1,23 @@
 """The processes of the service: which there are, how they are started, watched and stopped."""
 
-import os
+import math
 import select
 import signal
 import subprocess
-import sys
 import time
-from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import structlog
 
+from denseface.service.daemons._watched_process import (
+    AttendedClock,
+    End,
+    ProcessSpec,
+    WatchedProcess,
+)
 from denseface.service.daemons.startup import ONE_THREAD
 from denseface.service.errors import AddressError
-from denseface.service.runtime.signals import PARENT_VARIABLE, StopSignal
+from denseface.service.runtime.signals import StopSignal
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage import check_folder
 from denseface.service.transport.addresses import check_bindable, is_local
@@ -24,29 +27,12 @@ __all__ = ["ProcessSpec", "Supervisor", "check_settings", "process_table"]
 
 _GRACE_S = 5.0
 """From SIGTERM to SIGKILL, seconds."""
-_BACKOFF_S = 0.5
-"""Pause before the restart that follows a first end, seconds; doubled at each further one."""
-_BACKOFF_MAX_S = 30.0
-"""Longest pause before a restart, seconds."""
-_STORM_S = 60.0
-"""Time over which restarts are counted, seconds."""
-_STORM_RESTARTS = 5
-"""More restarts than this in `_STORM_S`: something is wrong that a restart does not mend."""
 _USAGE = 2
 """Exit status of wrong usage or input: another try would end the same."""
-
-
-@dataclass(frozen=True)
-class ProcessSpec:
-    """One row of the process table."""
-
-    name: str
-    arguments: tuple[str, ...]
-    """Of the command `denseface`."""
-    environment: dict[str, str] = field(default_factory=dict)
-    """Added to the supervisor's own."""
-    vital: bool = True
-    """All stop where this one ends again and again; else it is tried for ever."""
+_LOOKS = 8
+"""Looks at a silent process before it counts as hung."""
+_LOOK_MAX_S = 1.0
+"""Longest time between two looks, seconds."""
 
 
 def process_table(workers: int, common: Sequence[str], hub: Sequence[str],
@@ -82,52 +68,29 @@ def check_settings(settings: ServiceSettings) -> None:
         server_credentials(settings)
 
 
-@dataclass
-class _Process:
-    """A row of the table and the process that runs for it."""
-
-    spec: ProcessSpec
-    running: subprocess.Popen[bytes] | None = None
-    due: float = 0.0
-    """When to start, by the monotonic clock, seconds."""
-    restarts: deque[float] = field(default_factory=deque)
-
-    def start(self) -> None:
-        environment = os.environ | self.spec.environment | {PARENT_VARIABLE: str(os.getpid())}
-        # -P: a folder `denseface` in the working directory is not ours. A process group of its
-        # own: Ctrl-C reaches the supervisor alone, which stops all in order.
-        self.running = subprocess.Popen(
-            [sys.executable, "-P", "-m", "denseface", *self.spec.arguments],
-            env=environment, stdin=subprocess.DEVNULL, process_group=0)
-
-    def ended(self) -> int | None:
-        """Give the exit status of a process that ended, once."""
-        status = self.running.poll() if self.running else None
-        if status is not None:
-            self.running = None
-        return status
-
-    def plan_restart(self, now: float) -> bool:
-        """Set when to start again; False in a storm."""
-        self.restarts.append(now)
-        while self.restarts[0] < now - _STORM_S:
-            self.restarts.popleft()
-        self.due = now + min(_BACKOFF_S * 2 ** (len(self.restarts) - 1), _BACKOFF_MAX_S)
-        return len(self.restarts) <= _STORM_RESTARTS
-
-
 class Supervisor:
-    """Runs a process table until it is told to stop."""
+    """Runs a process table until it is told to stop.
 
-    def __init__(self, table: Sequence[ProcessSpec]) -> None:
-        self._processes = [_Process(spec) for spec in table]
+    Parameters
+    ----------
+    table : the hub first
+    hang_timeout_s : silence after which a process is ended, seconds
+    """
+
+    def __init__(self, table: Sequence[ProcessSpec], hang_timeout_s: float = 30.0) -> None:
+        self._processes = [WatchedProcess(spec) for spec in table]
+        self._hang_timeout_s = hang_timeout_s
+        self._look_s = min(hang_timeout_s / _LOOKS, _LOOK_MAX_S)
+        self._clock = AttendedClock(self._look_s)
+        self._told = False
+        """Whether the hub that runs knows the counts of restarts."""
         self._log = structlog.get_logger("supervisor")
 
     def run(self) -> int:
-        """Start all, restart what ends, stop all at SIGINT or SIGTERM; give the exit status.
+        """Start all, restart what ends or hangs, stop all at SIGINT or SIGTERM.
 
-        All stop with status 2 where one ends so: its usage or input is wrong.
-        All stop with status 1 where a vital one ends again and again.
+        Gives the exit status. All stop with status 2 where one ends so: its usage or input is
+        wrong. All stop with status 1 where a vital one ends again and again.
         """
         with StopSignal(signal.SIGCHLD) as stop:
             try:
@@ -137,29 +100,55 @@ class Supervisor:
 
     def _watch(self, stop: StopSignal) -> int:
         while True:
-            now = time.monotonic()
-            for process in self._processes:
-                if process.running is None and now >= process.due and not stop:
-                    process.start()
+            self._start_due()
+            self._tell_hub()
             waiting = [process.due for process in self._processes if process.running is None]
-            timeout = max(0.0, min(waiting) - now) if waiting else None
-            select.select([stop], [], [], timeout)
+            next_start = min(waiting, default=math.inf) - time.monotonic()
+            select.select([stop], [], [], max(0.0, min(self._look_s, next_start)))
             stop.drain()
             if stop:
                 return stop.exit_status
             for process in self._processes:
-                status = process.ended()
-                if status is None:
-                    continue
-                name = process.spec.name
-                if status == _USAGE:
-                    return _USAGE  # it has said why
-                calm = process.plan_restart(time.monotonic())
-                if process.spec.vital and not calm:
-                    self._log.error("ends again and again", name=name, status=status)
-                    return 1
-                self._log.warning("ended, will be started again", name=name, status=status,
-                                  in_s=round(max(0.0, process.due - time.monotonic()), 1))
+                end = process.ended()
+                if end and (status := self._ended(process, end)):
+                    return status
+            self._kill_hung()
+
+    def _start_due(self) -> None:
+        now, attended = time.monotonic(), self._clock.look()
+        for process in self._processes:
+            if process.running is None and now >= process.due:
+                process.start(attended)
+                if process is self._processes[0]:
+                    self._told = False
+
+    def _tell_hub(self) -> None:
+        if not self._told:
+            self._told = self._processes[0].send_restarts({
+                process.spec.name: dict(process.counts)
+                for process in self._processes if process.counts})
+
+    def _kill_hung(self) -> None:
+        attended = self._clock.look()
+        for process in self._processes:
+            if silence := process.kill_if_hung(attended, self._hang_timeout_s):
+                self._log.error("hangs, killed", name=process.spec.name,
+                                silent_s=round(silence, 1))
+
+    def _ended(self, process: WatchedProcess, end: End) -> int:
+        """Plan the restart of a process that ended; give the status with which all stop, or 0."""
+        name = process.spec.name
+        if end.status == _USAGE:
+            return _USAGE  # it has said why
+        self._told = False
+        calm = process.plan_restart(time.monotonic(), holding=end.holding)
+        if process.spec.vital and not calm:
+            self._log.error("ends again and again", name=name, status=end.status)
+            return 1
+        self._log.warning("ended, will be started again", name=name, status=end.status,
+                          reason=end.reason, held_a_job=end.holding,
+                          in_s=round(max(0.0, process.due - time.monotonic()), 1))
+        return 0
 
     def _stop_all(self) -> None:
         """Stop the hub last, so that the others can still send to it."""
@@ -176,3 +165,5 @@ class Supervisor:
                     self._log.warning("killed", pid=one.pid, after_s=_GRACE_S)
                     one.kill()
                     one.wait()
+        for process in self._processes:
+            process.close()

@@ -21,6 +21,7 @@ from denseface.service.runtime.background import Background
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.log_output import exit_now
 from denseface.service.runtime.signals import StopSignal
+from denseface.service.runtime.supervisor_link import Beat, SupervisorLink
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable
 from denseface.service.transport.connection import Credentials
@@ -35,7 +36,7 @@ _FINISH_S = 3.0
 _log = structlog.get_logger("worker")
 
 
-def run(settings: ServiceSettings) -> int:
+def run(settings: ServiceSettings, supervisor: SupervisorLink | None = None) -> int:
     """Work until SIGINT or SIGTERM and give the exit status.
 
     The job under way is finished, or handed back to the hub where that takes too long.
@@ -48,13 +49,14 @@ def run(settings: ServiceSettings) -> int:
     check_connectable(settings.address)  # errors of the settings come before seconds of warm-up
     Credentials.of(settings)
     cv2.setNumThreads(1)
+    supervisor = supervisor or SupervisorLink()
     with StopSignal() as stop:
         begun = time.monotonic()
         warm()
         _log.info("warm", seconds=round(time.monotonic() - begun, 2))
         with Background[Face]("recon") as compute:
-            with HubConnection(settings, "worker") as connection:
-                worker = _Worker(settings, connection, compute)
+            with HubConnection(settings, "worker", supervisor) as connection:
+                worker = _Worker(settings, connection, compute, supervisor)
                 worker.serve(stop)
                 worker.finish()
             if compute:
@@ -73,6 +75,7 @@ class _Worker:
     settings: ServiceSettings
     connection: HubConnection
     compute: Background[Face]
+    supervisor: SupervisorLink = field(default_factory=SupervisorLink)
     jobs: deque[messages.Job] = field(default_factory=deque)
     """The one under way, then the one that follows."""
     send_answer: Callable[[], bool] | None = None
@@ -98,6 +101,7 @@ class _Worker:
         if self.send_answer and self.send_answer():  # else it is tried again
             failpoint("worker.result.sent")
             self.send_answer = None
+            self.supervisor.beat(Beat.HOLDING if self.jobs else Beat.IDLE)
 
     def finish(self) -> None:
         """Finish the job under way and deliver its answer; leave it where that takes too long."""
@@ -131,6 +135,8 @@ class _Worker:
                 if len(self.jobs) == _MAX_JOBS:  # the hub redelivers what no heartbeat names
                     _log.warning("job dropped, busy", capture_id=job.capture_id)
                     return
+                # Before anything of the job is touched: if that ends this process, the job is why.
+                self.supervisor.beat(Beat.HOLDING)
                 failpoint("worker.job.received")
                 self.jobs.append(job)
                 self.compute.start(lambda: _reconstruct(job, packet.arrays))

@@ -273,6 +273,7 @@ class Hub:
             latencies={stage: messages.Latency(
                 count=one.count, median_s=one.quantile_s(0.5), p99_s=one.quantile_s(0.99))
                 for stage, one in self._figures.latencies.stages().items()},
+            restarts=self._figures.restarts,
             free_bytes=self._free_bytes(), kept_bytes=self._figures.kept_bytes,
             log_lines_lost=self._figures.log_lines_lost)
 

@@ -5,6 +5,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 from itertools import pairwise
 
+from denseface.service.protocol.status import Restarts
+
 __all__ = ["BUCKETS_S", "Counters", "Figures", "Histogram", "Latencies"]
 
 BUCKETS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0,
@@ -94,3 +96,5 @@ class Figures:
         """Size of the data folder's files when last measured; None before."""
         self.log_lines_lost = 0
         """Lines of this process's log that could not be written."""
+        self.restarts: dict[str, Restarts] = {}
+        """By process, as the supervisor counts them."""

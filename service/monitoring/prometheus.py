@@ -45,6 +45,7 @@ class Metrics(Collector):
         snapshot = self._latest()
         if snapshot is not None:
             yield from _counters(snapshot)
+            yield _restarts(snapshot)
             yield from _gauges(snapshot)
             yield _latencies(snapshot.stages)
 
@@ -61,6 +62,15 @@ def _counters(snapshot: Snapshot) -> Iterator[core.Metric]:
     yield core.CounterMetricFamily(
         _PREFIX + "log_lines_lost", "Lines of the hub's log that could not be written.",
         value=snapshot.status.log_lines_lost)
+
+
+def _restarts(snapshot: Snapshot) -> core.Metric:
+    family = core.CounterMetricFamily(
+        _PREFIX + "restarts", "Processes that were started again.", labels=["process", "reason"])
+    for process, counts in snapshot.status.restarts.items():
+        for reason, count in counts:
+            family.add_metric([process, reason], count)
+    return family
 
 
 def _gauges(snapshot: Snapshot) -> Iterator[core.Metric]:

@@ -20,6 +20,16 @@ class Latency(BaseModel):
     p99_s: _TimeS
 
 
+class Restarts(BaseModel):
+    """How often one process of `denseface up` was started again since that began, by the reason."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    exited: Number = 0
+    hung: Number = 0
+    """It was silent for too long and was ended for it."""
+
+
 class Status(BaseAnswer):
     """Published on topic `status` at every heartbeat.
 
@@ -51,6 +61,8 @@ class Status(BaseAnswer):
     """What happened how often since the hub started: `accepted`, `redelivered` and others."""
     latencies: Annotated[dict[Name, Latency], Field(default_factory=dict, max_length=64)]
     """By stage."""
+    restarts: Annotated[dict[Name, Restarts], Field(default_factory=dict, max_length=300)]
+    """By process, of those that `denseface up` had to start again."""
     free_bytes: Number | None = None
     """Room left on the disk."""
     kept_bytes: Number | None = None

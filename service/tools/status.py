@@ -62,6 +62,10 @@ def as_text(address: str, status: Status) -> str:
             ("refused", "", status.refused)):
         if counts:
             rows[name] = prefix + ", ".join(f"{one} {count}" for one, count in counts.items())
+    if status.restarts:
+        rows["restarts"] = ", ".join(
+            f"{process} {reason} {count}" for process, counts in status.restarts.items()
+            for reason, count in counts if count)
     if status.log_lines_lost:
         rows["log"] = f"{status.log_lines_lost} lines of the hub's lost"
     return "\n".join(f"{name:8} {printable(value)}" for name, value in rows.items())

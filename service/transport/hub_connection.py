@@ -15,6 +15,7 @@ from denseface.service.protocol.payload import Arrays
 from denseface.service.protocol.wire import Packet, encode
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.signals import StopSignal
+from denseface.service.runtime.supervisor_link import Beat, SupervisorLink
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable
 from denseface.service.transport.connection import Credentials, connect, receive_packet
@@ -25,12 +26,15 @@ _RETRY_S = 0.1
 
 
 class HubConnection:
-    """Sends heartbeats by itself while `packets` waits; says goodbye at the end."""
+    """Sends heartbeats by itself while `packets` waits, also to the supervisor; says goodbye."""
 
-    def __init__(self, settings: ServiceSettings, name: str) -> None:
+    def __init__(
+        self, settings: ServiceSettings, name: str, supervisor: SupervisorLink | None = None
+    ) -> None:
         check_connectable(settings.address)
         keys = Credentials.of(settings)
         self._heartbeat_s = settings.heartbeat_s
+        self._supervisor = supervisor or SupervisorLink()
         self._log = structlog.get_logger(name)
         self._context: Context = zmq.Context()
         self._socket, self._monitor = connect(self._context, zmq.DEALER, settings.address, keys)
@@ -61,7 +65,9 @@ class HubConnection:
         due = 0.0
         while not stop:
             if (now := time.monotonic()) >= due:
-                sent = self.send(Heartbeat(holding=holding()))
+                held = holding()
+                self._supervisor.beat(Beat.HOLDING if held else Beat.IDLE)
+                sent = self.send(Heartbeat(holding=held))
                 due = now + (self._heartbeat_s if sent else min(_RETRY_S, self._heartbeat_s))
                 if self._monitor.read():
                     self._log.error("refused by the hub", reason=str(self._monitor.refused))

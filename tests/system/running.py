@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -66,7 +66,7 @@ class Service:
 @contextmanager
 def service(
     source: Path | str, data: Path, *arguments: object, ready: bool = True,
-    environment: dict[str, str] | None = None,
+    environment: dict[str, str] | None = None, program: Sequence[str] = ("-m", "denseface"),
 ) -> Iterator[Service]:
     """Run `denseface up` and make sure that nothing of it stays."""
     with tempfile.TemporaryDirectory(prefix="df-") as folder:  # socket paths must be short
@@ -74,8 +74,8 @@ def service(
         log = data.with_suffix(".log")
         with log.open("w") as stderr:
             process = subprocess.Popen(
-                [sys.executable, "-m", "denseface", "up", "--source", str(source), "--data",
-                 str(data), "--address", address, "--workers", "1", *map(str, arguments)],
+                [sys.executable, *program, "up", "--source", str(source), "--data", str(data),
+                 "--address", address, "--workers", "1", *map(str, arguments)],
                 cwd=REPOSITORY, stderr=stderr, text=True,
                 env=os.environ | PACE | (environment or {}))
         running = Service(process, address, data, log)

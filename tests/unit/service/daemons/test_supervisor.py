@@ -2,13 +2,40 @@
 
 import os
 import signal
+import sys
 import threading
 from pathlib import Path
 
 import pytest
 
-from denseface.service.daemons.supervisor import ProcessSpec, Supervisor, _Process, process_table
-from tests.waiting import until
+from denseface.service.daemons._watched_process import AttendedClock, ProcessSpec, WatchedProcess
+from denseface.service.daemons.supervisor import Supervisor, process_table
+from tests.waiting import PATIENCE, until
+
+_WATCHED = "denseface.service.daemons._watched_process"
+
+
+@pytest.fixture
+def run_in_turn(tmp_path, monkeypatch):
+    """Have a supervisor run one program after the other in place of `denseface`; give its status.
+
+    In each, `say` says a sign of life, and `kill` sends a signal to itself.
+    """
+    def run(*programs, hang_timeout_s=60.0):
+        fake = tmp_path / "fake"
+        fake.write_text("\n".join([
+            f"#!{sys.executable} -SE", "import os, signal, time",
+            f"turn = os.open({str(tmp_path / 'turn')!r}, os.O_CREAT | os.O_WRONLY | os.O_APPEND)",
+            "os.write(turn, b'.')",
+            "def say(beat): os.write(int(os.environ['DENSEFACE_SUPERVISOR']), beat)",
+            "def kill(number): os.kill(os.getpid(), number)",
+            f"exec({programs!r}[os.fstat(turn).st_size - 1])"]))
+        fake.chmod(0o700)
+        monkeypatch.setattr(f"{_WATCHED}.sys.executable", str(fake))
+        monkeypatch.setattr(f"{_WATCHED}._BACKOFF_S", 0.0)
+        return Supervisor([ProcessSpec("x", ())], hang_timeout_s).run()
+
+    return run
 
 
 def test_the_table_names_what_runs():
@@ -20,7 +47,7 @@ def test_the_table_names_what_runs():
 
 
 def test_restarts_come_later_and_later_until_it_is_a_storm():
-    process = _Process(ProcessSpec("x", ()))
+    process = WatchedProcess(ProcessSpec("x", ()))
     delays, calm = [], []
     for now in range(6):
         calm.append(process.plan_restart(now))
@@ -30,7 +57,7 @@ def test_restarts_come_later_and_later_until_it_is_a_storm():
 
 
 def test_an_old_restart_is_forgotten():
-    process = _Process(ProcessSpec("x", ()))
+    process = WatchedProcess(ProcessSpec("x", ()))
     assert all(process.plan_restart(now * 30.0) for now in range(20))
     assert process.due == 19 * 30 + 2
 
@@ -40,8 +67,8 @@ def test_wrong_usage_of_a_child_ends_all_with_status_2():
 
 
 def test_a_storm_ends_all_with_status_1(monkeypatch):
-    monkeypatch.setattr("denseface.service.daemons.supervisor._BACKOFF_S", 0.0)
-    monkeypatch.setattr("denseface.service.daemons.supervisor._STORM_RESTARTS", 1)
+    monkeypatch.setattr(f"{_WATCHED}._BACKOFF_S", 0.0)
+    monkeypatch.setattr(f"{_WATCHED}._STORM_RESTARTS", 1)
     assert Supervisor([ProcessSpec("x", ("status", "--address", "ipc:///none", "--wait", "0.01"))
                        ]).run() == 1
 
@@ -51,7 +78,7 @@ def test_a_process_that_does_not_end_in_time_is_killed(tmp_path, monkeypatch, ca
     stubborn.write_text("#!/bin/sh\ntrap '' TERM\necho $$ >\"$(dirname \"$0\")/pid\"\n"
                         "while :; do sleep 1; done\n")
     stubborn.chmod(0o700)
-    monkeypatch.setattr("denseface.service.daemons.supervisor.sys.executable", str(stubborn))
+    monkeypatch.setattr(f"{_WATCHED}.sys.executable", str(stubborn))
     monkeypatch.setattr("denseface.service.daemons.supervisor._GRACE_S", 0.2)
     pid = tmp_path / "pid"
 
@@ -78,5 +105,53 @@ def test_a_package_of_our_name_in_the_working_directory_is_not_run(tmp_path, mon
     (tmp_path / "denseface").mkdir()
     (tmp_path / "denseface" / "__init__.py").write_text("raise SystemExit('not ours')")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("denseface.service.daemons.supervisor._STORM_RESTARTS", 0)
+    monkeypatch.setattr(f"{_WATCHED}._STORM_RESTARTS", 0)
     assert Supervisor([ProcessSpec("x", ("no-such-command",))]).run() == 2
+
+
+HANGS = "say(b'i'); kill(signal.SIGSTOP)"
+DIES_AT_WORK = "say(b'i'); say(b'h'); kill(signal.SIGKILL)"
+DIES = "say(b'h'); say(b'i'); kill(signal.SIGKILL)"
+ENOUGH = "os._exit(2)"
+
+
+def test_what_hangs_is_killed_and_started_again(run_in_turn, capsys):
+    assert run_in_turn(HANGS, "say(b'h'); time.sleep(600)", ENOUGH,
+                       hang_timeout_s=0.4 * PATIENCE) == 2
+    said = capsys.readouterr().out
+    assert said.count("hangs, killed") == 2
+    assert said.count("reason=hung") == 2
+
+
+def test_who_says_that_it_lives_is_left_alone(run_in_turn):
+    lives = "\n".join([f"for _ in range({60 * PATIENCE:.0f}):", " say(b'i'); time.sleep(0.02)",
+                       ENOUGH])
+    assert run_in_turn(lives, "os._exit(3)", hang_timeout_s=0.4 * PATIENCE) == 2
+
+
+def test_death_at_work_is_no_storm(run_in_turn, monkeypatch):
+    monkeypatch.setattr(f"{_WATCHED}._STORM_RESTARTS", 0)
+    assert run_in_turn(*[DIES_AT_WORK] * 4, ENOUGH) == 2
+
+
+def test_death_after_work_is_one(run_in_turn, monkeypatch):
+    monkeypatch.setattr(f"{_WATCHED}._STORM_RESTARTS", 1)
+    assert run_in_turn(DIES, DIES, ENOUGH) == 1
+
+
+def test_who_starts_may_be_silent_for_longer(monkeypatch):
+    monkeypatch.setattr(f"{_WATCHED}.sys.executable", "/bin/true")
+    process = WatchedProcess(ProcessSpec("x", ()))
+    process.start(attended=5.0)
+    assert process.kill_if_hung(605.0, limit_s=1.0) == 0.0
+    assert process.kill_if_hung(606.0, limit_s=1000.0) == 0.0
+    assert process.kill_if_hung(606.0, limit_s=1.0) == 601.0
+    assert process.kill_if_hung(9999.0, limit_s=1.0) == 0.0  # it was killed already
+    end = until(process.ended)
+    assert (end.reason, end.holding, process.counts) == ("hung", False, {"hung": 1})
+
+
+def test_an_owner_that_was_away_blames_nobody_for_it():
+    times = iter([100.0, 100.5, 101.0, 4000.0, 4000.5])
+    clock = AttendedClock(1.0, lambda: next(times))
+    assert [clock.look() for _ in range(4)] == [0.5, 1.0, 2.0, 2.5]

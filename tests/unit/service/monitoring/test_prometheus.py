@@ -18,7 +18,8 @@ def status(**changed):
     return Status(**{
         "epoch": "0f", "sequence": 3, "hub_version": "1.2", "sensors": ("s",),
         "workers": ("a", "b"), "pressed": 1, "queued": 2, "working": 3, "done": 4, "failed": 5,
-        "dead": 6, "free_bytes": 2**30, "kept_bytes": 999, "log_lines_lost": 8} | changed)
+        "dead": 6, "free_bytes": 2**30, "kept_bytes": 999, "log_lines_lost": 8,
+        "restarts": {"hub": {"exited": 1, "hung": 2}}} | changed)
 
 
 @pytest.fixture
@@ -43,6 +44,8 @@ def test_all_that_the_snapshot_holds_is_rendered(snapshot):
     assert found["denseface_accepted_total",] == 9
     assert found["denseface_presses_refused_total", "disk"] == 2
     assert found["denseface_refused_total", "unknown key"] == 7
+    assert found["denseface_restarts_total", "exited", "hub"] == 1
+    assert found["denseface_restarts_total", "hub", "hung"] == 2
     assert found["denseface_publication_drops_total", "faces"] == 1
     assert [found["denseface_in_flight", one] for one in ("pressed", "queued", "working")] == [
         1, 2, 3]

@@ -19,6 +19,7 @@ from denseface.service.protocol.payload import (
     FrameHeader,
     PreviewHeader,
 )
+from denseface.service.protocol.status import Restarts
 from denseface.service.protocol.wire import Packet, decode_from_hub, decode_to_hub, encode
 from tests.unit.service.faces import small_face, small_frame
 
@@ -92,6 +93,8 @@ from_hub = st.one_of(
           latencies=st.dictionaries(texts, st.builds(
               messages.Latency, count=numbers, median_s=st.floats(0, 1e6),
               p99_s=st.floats(0, 1e6)), max_size=3),
+          restarts=st.dictionaries(texts, st.builds(
+              Restarts, exited=numbers, hung=numbers), max_size=3),
           free_bytes=st.none() | numbers, kept_bytes=st.none() | numbers, log_lines_lost=numbers),
     numbers.map(lambda number: Packet(messages.Preview(
         epoch="0f", sequence=number, preview=PREVIEW), PREVIEW_ARRAYS)),
@@ -298,7 +301,8 @@ def test_a_status_of_another_release_can_be_read():
     older = decode_from_hub([json.dumps(given).encode()]).message
     newer = decode_from_hub([json.dumps(given | {"mood": "fine"}).encode()]).message
     assert newer == older
-    assert (older.workers, older.free_bytes, older.latencies) == (("w",), None, {})
+    assert (older.workers, older.free_bytes, older.latencies, older.restarts) == (
+        ("w",), None, {}, {})
 
 
 def test_every_kind_stands_in_the_documentation():

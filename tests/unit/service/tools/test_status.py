@@ -10,10 +10,10 @@ from denseface.service.tools import status as module
 from denseface.service.tools.status import as_json, as_text, ready_status
 
 
-def status(*sensors, workers=()):
+def status(*sensors, workers=(), **more):
     return Status(request=1, epoch="e", sequence=0, hub_version="1", sensors=sensors,
                   workers=workers, pressed=0, queued=0, working=0, done=2, failed=1, dead=0,
-                  kept_bytes=None, free_bytes=None)
+                  kept_bytes=None, free_bytes=None, **more)
 
 
 class Client:
@@ -53,3 +53,10 @@ def test_lost_lines_of_the_log_are_shown_and_names_obey_no_terminal():
     text = as_text("ipc:///x", status("s\x1b[2J\nkept").model_copy(update={"log_lines_lost": 3}))
     assert "log      3 lines of the hub's lost" in text.splitlines()
     assert r"sensors  s\x1b[2J\nkept" in text.splitlines()
+
+
+def test_it_says_what_was_started_again_and_why():
+    shown = status(restarts={"hub": {"hung": 1}, "worker-1": {"exited": 2, "hung": 3}})
+    assert as_text("ipc:///x", shown).splitlines()[-1] == (
+        "restarts hub hung 1, worker-1 exited 2, worker-1 hung 3")
+    assert json.loads(as_json("ipc:///x", shown))["restarts"]["hub"] == {"exited": 0, "hung": 1}
