@@ -208,6 +208,7 @@ class Hub:
                     self._worker_ready(now, peer, name, credit)
             case messages.Heartbeat(holding=holding):
                 if not self._peers.heartbeat(peer, holding, now):
+                    self._peers.ask_for_ready(peer)
                     yield send(peer, messages.Announce())
             case messages.Goodbye():
                 if worker := self._peers.workers.get(peer):
@@ -234,10 +235,10 @@ class Hub:
         return room
 
     def _worker_ready(self, now: float, peer: bytes, name: str, credit: int) -> None:
-        known = self._peers.workers.get(peer)
+        known, asked = self._peers.workers.get(peer), self._peers.was_asked(peer)
         if known is None:
             self._log.info("worker ready", name=name)
-        elif credit <= known.credit:
+        elif credit <= known.credit and not asked:
             self._rejections.note("replayed", name=name, detail=f"credit {credit}")
         self._peers.worker_ready(peer, name, credit, now)
 

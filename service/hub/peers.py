@@ -2,8 +2,14 @@
 
 from dataclasses import dataclass, field
 
+from denseface.service.runtime.bounded_dict import BoundedDict
+
 MAX_PEERS = 256
 """Most sensors, and most workers: so many fit into a `Status`. Others are not taken."""
+
+
+_MAX_ANNOUNCED = 2 * MAX_PEERS
+"""Peers of which it is remembered that they were asked to say that they are ready."""
 
 
 @dataclass
@@ -40,6 +46,9 @@ class Peers:
 
     sensors: dict[bytes, SensorPeer] = field(default_factory=dict)
     workers: dict[bytes, WorkerPeer] = field(default_factory=dict)
+    _asked: BoundedDict[bytes, int] = field(
+        default_factory=lambda: BoundedDict(_MAX_ANNOUNCED))
+    """How often a peer was asked to say that it is ready, less the times that it did."""
 
     def sensor_ready(self, peer: bytes, name: str, now: float) -> bool:
         """Add a sensor; True where it is new."""
@@ -52,6 +61,21 @@ class Peers:
         worker = self.workers.setdefault(peer, WorkerPeer(peer, name, now))
         if credit > worker.credit:
             worker.credit, worker.free, worker.seen = credit, True, now
+
+    def ask_for_ready(self, peer: bytes) -> None:
+        """Note that a peer was asked to say that it is ready.
+
+        All heartbeats that the network held back come at once, and each is answered so.
+        """
+        self._asked[peer] = self._asked.get(peer, 0) + 1
+
+    def was_asked(self, peer: bytes) -> bool:
+        """Say whether a peer that says it is ready answers with that, once for each asking."""
+        if not (times := self._asked.pop(peer, 0)):
+            return False
+        if times > 1:
+            self._asked[peer] = times - 1
+        return True
 
     def heartbeat(self, peer: bytes, holding: str | None, now: float) -> bool:
         """Note a heartbeat; False where the peer has to say that it is ready.

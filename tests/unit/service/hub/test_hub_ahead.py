@@ -146,3 +146,21 @@ def test_a_restarted_hub_takes_the_answers_of_both(bench):
     for capture_id in ("a", "b"):
         again.result(capture_id, hashed=HASH)
     assert [one.capture_id for one in again.published] == ["a", "b"]
+
+
+def test_what_the_network_held_back_is_no_replay(bench):
+    """All its heartbeats come at once, each is answered, and so is each answer."""
+    def replays():
+        return bench.hub._rejections.counts().get("replayed", 0)
+
+    bench.worker(credit=3)
+    bench.wait(SETTINGS.silence_s + 1)
+    asked = [sent for _ in range(9) for sent in bench.say(WORKER, messages.Heartbeat())]
+    assert asked == [(WORKER, messages.Announce())] * 9
+    for _ in range(9):
+        bench.worker(credit=3)
+    assert replays() == 0
+    bench.accepted("a")
+    bench.worker(credit=3)  # nobody asked for this one
+    assert replays() == 1
+    assert bench.store.find("a").attempts == 1
