@@ -10,11 +10,11 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AddressError", "AuthenticatorStoppedError", "CaptureFailedError", "ClientClosedError",
-    "ClientForkedError", "ClientTimeoutError", "CorruptFileError", "DamagedDatabaseError", "DamagedFaceError",
-    "DiskFullError", "FormatError", "HubRunningError", "KeyFileError", "KeyRefusedError",
-    "LocalProtocolError", "PressRefusedError", "ProtocolError", "RemoteProtocolError",
-    "RequestFailedError", "ServiceError", "SettingsError", "StoreError", "UnknownCaptureError",
-    "UsageError", "first_error", "reason_of",
+    "ClientForkedError", "ClientTimeoutError", "CorruptFileError", "DamagedDatabaseError",
+    "DamagedFaceError", "DiskFullError", "FormatError", "HubRunningError", "KeyFileError",
+    "KeyRefusedError", "LocalProtocolError", "PressRefusedError", "ProtocolError",
+    "RemoteProtocolError", "RequestFailedError", "ServiceError", "SettingsError", "StoreError",
+    "UnknownCaptureError", "UsageError", "first_error", "reason_of",
 ]
 
 
