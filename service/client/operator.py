@@ -1,11 +1,12 @@
 """What an operator asks of the hub: dead letters, removal. Needs the role `operator`."""
 
+import time
 from collections.abc import Iterator
 from datetime import datetime
 
 from denseface.service.client.blocking import Client
 from denseface.service.client.exchanges import expect
-from denseface.service.errors import RemoteProtocolError, UnknownCaptureError
+from denseface.service.errors import UnknownCaptureError
 from denseface.service.protocol import messages
 from denseface.service.protocol.message_base import BaseMessage, DeadLetter
 
@@ -55,14 +56,14 @@ class Operator(Client):
         ----------
         capture_id, before, everything : exactly one: this id; what was accepted before this time,
             with a zone; everything, what is in quarantine included
-        timeout : for each batch, seconds
+        timeout : longest time in which nothing is removed, seconds
 
         Raises
         ------
         RequestFailedError
-            The disk refuses.
+            The disk refuses, or another program has the hub's database open.
         """
-        removed = 0
+        removed, until = 0, time.monotonic() + timeout
         while True:
             answer = expect(self._send_request(messages.Purge(
                 request=self._exchanges.next_number(), capture_id=capture_id, before=before,
@@ -70,8 +71,10 @@ class Operator(Client):
             removed += answer.removed
             if not answer.left:
                 return removed
-            if not answer.removed:
-                raise RemoteProtocolError("the hub removes nothing and says that some are left")
+            if answer.removed:
+                until = time.monotonic() + timeout
+            elif time.monotonic() > until:  # what was withdrawn before is being erased
+                raise self._no_answer(timeout)
 
     def _request_known(
         self, message: messages.RetryDead | messages.DropDead, timeout: float

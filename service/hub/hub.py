@@ -110,7 +110,8 @@ class Hub:
         return outputs
 
     def _process_writes(self, now: float) -> Iterator[Output]:
-        """Take finished writes and send jobs, until neither brings anything."""
+        """Take finished erasures and writes and send jobs, until none brings anything."""
+        yield from self._maintenance.erased(now, self._writer.take_erased())
         written = self._writer.take_results()
         while True:
             yield from self._written(now, written)
@@ -139,8 +140,8 @@ class Hub:
             outputs.extend(self._outcomes.tick(now))
             for peer in self._peers.silent(now - self._settings.silence_s):
                 outputs.extend(self._disconnected(peer, "silent"))
+            outputs.extend(self._maintenance.tick(now))
             outputs.extend(self._process_writes(now))
-            self._maintenance.tick(now)
             outputs.extend(self._previews.ask(now, busy=len(self._presses) > 0))
             if now >= self._status_due:
                 self._status_due = now + self._settings.heartbeat_s

@@ -1,28 +1,71 @@
-"""Retention, dead letters, purges."""
+"""Retention, dead letters, purges.
 
+What is removed is withdrawn at once, in one quick transaction; the writer erases it beside the
+hub's loop, and is asked for one batch after the other. An operator is told that captures are
+removed when nothing of them is left, in no file and not in the database's log.
+"""
+
+from collections import deque
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import structlog
 
-from denseface.service.errors import StoreError
+from denseface.service.errors import DamagedDatabaseError, StoreError
 from denseface.service.hub._common import Common
 from denseface.service.hub.jobs import Jobs
 from denseface.service.hub.outcomes import Outcomes
 from denseface.service.hub.presses import Presses
 from denseface.service.monitoring import Counters
 from denseface.service.protocol import messages
-from denseface.service.protocol.outgoing import Output, send
+from denseface.service.protocol.outgoing import Output, Send, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState
+from denseface.service.storage import Erased, PendingErasure
 
-_BATCH = 20
-"""Captures removed in one go: more would stall the event loop."""
+_BATCH = 250
+"""Captures withdrawn in one go: more would stall the event loop."""
 _PAGE = 50
 """Dead letters in one answer, as `DeadLetters.letters` allows."""
 _SWEEP_S = 600.0
 """Longest time between two sweeps for what is too old, seconds."""
+_LOG_RETRY_S = 1.0
+"""Time after which the database's log is tried again that could not be emptied, seconds."""
+_LOG_WAIT_S = 5.0
+"""Longest wait of an operator for that, seconds."""
+_WHY = {"retention": "removed after the retention", "operator": "removed by an operator"}
+"""Reason of a removal, by which it is counted -> what the log says."""
+_LOG_READ = ("erased, but the database's log still names it: another program has the database "
+             "open; the hub empties it as soon as that ends")
 
 _DeadLetterRequest = messages.RetryDead | messages.DropDead
 _Request = messages.ListDead | _DeadLetterRequest | messages.Purge
+
+
+@dataclass
+class _Asked:
+    """An operator's request to remove, answered when all is erased."""
+
+    peer: bytes
+    request: int
+    capture_id: str | None
+    """None: captures before a time, or all."""
+    removed: int
+    left: bool
+    deadline: float = 0.0
+    """Until then it waits for the database's log, seconds."""
+
+    def fail(self, why: str) -> Send:
+        return send(self.peer, messages.RequestFailed(request=self.request, message=why))
+
+
+@dataclass(frozen=True)
+class _Erasure:
+    """An erasure under way."""
+
+    reason: str = ""
+    removed: int = 0
+    """Captures that were withdrawn for it."""
+    asked: _Asked | None = None
 
 
 class Maintenance:
@@ -31,40 +74,93 @@ class Maintenance:
     def __init__(
         self, common: Common, presses: Presses, jobs: Jobs, outcomes: Outcomes, counters: Counters
     ) -> None:
-        self._store, self._captures = common.store, common.captures
-        self._retention_s = common.settings.retention
+        self._store, self._captures, self._writer, _, settings = common
+        self._retention_s = settings.retention
         self._sweep_s = min(_SWEEP_S, (self._retention_s or _SWEEP_S) / 10)
         self._presses = presses
         self._jobs = jobs
         self._outcomes = outcomes
         self._counters = counters
-        self._due = 0.0
+        self._due = self._log_due = 0.0
+        self._erasures: deque[_Erasure] = deque()
+        """Under way, in the order in which they end."""
+        self._unsaid: list[_Asked] = []
+        """Erased, but for the database's log."""
         self._log = structlog.get_logger("hub")
 
-    def tick(self, now: float) -> None:
-        """Remove a batch of what is too old."""
-        if now < self._due:
+    def tick(self, now: float) -> Iterator[Output]:
+        """Begin to remove a batch of what is too old; go on with what could not be erased."""
+        for asked in [one for one in self._unsaid if now >= one.deadline]:
+            self._unsaid.remove(asked)
+            yield asked.fail(_LOG_READ)
+        if self._erasures:
             return
-        self._due = now + self._sweep_s
         try:
-            self._store.retention.sweep(self._retention_s)
-            if self._retention_s is None:
-                return
-            old = self._store.retention.expired(self._retention_s, _BATCH)
-            if old:
-                with self._captures.transition(CaptureEvent.EXPIRED, *old) as state:
-                    self._store.retention.remove(old, state)
-                self._store.retention.erase(old)
-                self._counters.add("removed", "retention", len(old))
-                self._log.info("removed after the retention", captures=len(old))
+            if now >= self._due:
+                self._due = now + self._sweep_s
+                self._sweep(now)
+            elif self._store.retention.log_due and now >= self._log_due:
+                self._log_due = now + _LOG_RETRY_S
+                self._erase(self._store.retention.prepare(), _Erasure())
+        except DamagedDatabaseError:
+            raise
         except StoreError as error:
             self._log.error("not removed", reason=str(error))
-            return
-        if len(old) == _BATCH:
+
+    def _sweep(self, now: float) -> None:
+        """Begin to erase a batch of what was withdrawn before, or else of what is too old."""
+        retention = self._store.retention
+        retention.save_clock()
+        going, removed = retention.left_over(_BATCH), 0
+        if not going and self._retention_s is not None:
+            going = retention.expired(self._retention_s, _BATCH)
+            removed = len(going)
+            if going:
+                with self._captures.transition(CaptureEvent.EXPIRED, *going) as state:
+                    retention.remove(going, state)
+        if len(going) == _BATCH:
             self._due = now
+        self._erase(retention.prepare(going, retention_s=self._retention_s),
+                    _Erasure("retention", removed))
+
+    def erased(self, now: float, results: Sequence[Erased]) -> Iterator[Output]:
+        """Take what became of erasures, and answer those who wait for them."""
+        for one in results:
+            erasure = self._erasures.popleft()
+            try:
+                self._store.retention.finish(one)
+            except DamagedDatabaseError:
+                raise
+            except StoreError as error:
+                self._log.error("not removed", reason=str(error))
+                if erasure.asked:
+                    yield erasure.asked.fail(str(error))
+                continue
+            if erasure.removed:
+                self._counters.add("removed", erasure.reason, erasure.removed)
+                self._log.info(_WHY[erasure.reason], captures=erasure.removed)
+            if asked := erasure.asked:
+                asked.removed += one.without_row
+                asked.deadline = now + _LOG_WAIT_S
+                self._unsaid.append(asked)
+            if one.log_emptied:
+                # Of what ended before, too: all of it was in the log before this erasure.
+                unsaid, self._unsaid = self._unsaid, []
+                yield from map(self._removed, unsaid)
+            else:
+                self._log.warning("the database's log could not be emptied: someone reads it")
+
+    def _removed(self, asked: _Asked) -> Send:
+        left = self._store.retention.is_left(asked.capture_id)
+        if left and asked.capture_id is not None:  # another erasure of it failed
+            return asked.fail(f"capture {asked.capture_id} could not be erased yet")
+        return send(asked.peer, messages.Removed(
+            request=asked.request, removed=asked.removed, left=asked.left or left))
 
     def receive(self, peer: bytes, message: _Request) -> Iterator[Output]:
         """Answer an operator."""
+        if any((one.peer, one.request) == (peer, message.request) for one in self._waiting()):
+            return  # a repeat; it is answered when all is erased
         match message:
             case messages.ListDead(request=request, after=after):
                 yield send(peer, messages.DeadLetters(
@@ -73,6 +169,10 @@ class Maintenance:
                 yield from self._dead_letter(peer, message)
             case messages.Purge():
                 yield from self._purge(peer, message)
+
+    def _waiting(self) -> Iterator[_Asked]:
+        yield from self._unsaid
+        yield from (one.asked for one in self._erasures if one.asked)
 
     def _dead_letter(self, peer: bytes, message: _DeadLetterRequest) -> Iterator[Output]:
         """Retry or drop a capture that was given up."""
@@ -94,30 +194,41 @@ class Maintenance:
             self._log.info("dead letter retried", capture_id=capture_id)
             yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
         else:
-            yield from self._remove([capture_id])
-            yield send(peer, messages.Removed(request=request, removed=1, left=False))
+            yield from self._withdraw([capture_id])
+            self._erase(self._store.retention.prepare([capture_id]), _Erasure(
+                "operator", 1, _Asked(peer, request, capture_id, removed=1, left=False)))
 
     def _purge(self, peer: bytes, message: messages.Purge) -> Iterator[Output]:
+        retention = self._store.retention
         if message.capture_id is not None:
             known = self._store.find(message.capture_id)
             going = [message.capture_id] if known else []
         else:
-            going = self._store.retention.accepted_before(message.before, _BATCH)
+            going = retention.accepted_before(message.before, _BATCH)
         if message.before is None:
             yield from self._presses.purge(message.capture_id)
-        yield from self._remove(going)
-        left = len(going) == _BATCH
-        if message.everything and not left:
-            self._store.retention.clear_quarantine()
-        yield send(peer, messages.Removed(request=message.request, removed=len(going), left=left))
+        yield from self._withdraw(going)
+        # With the last batch goes what an earlier hub, or a disk that failed, has left.
+        left, others = message.capture_id is None and len(going) == _BATCH, list[str]()
+        if message.capture_id is not None:
+            others = [message.capture_id]
+        elif not left:
+            others = retention.left_over(_BATCH)
+            if message.everything:
+                others += retention.without_row()
+        self._erase(
+            retention.prepare([*going, *others], all_quarantined=message.everything and not left),
+            _Erasure("operator", len(going), _Asked(
+                peer, message.request, message.capture_id, len(going), left)))
 
-    def _remove(self, capture_ids: Sequence[str]) -> Iterator[Output]:
-        if not capture_ids:
-            return
-        with self._captures.transition(CaptureEvent.PURGED, *capture_ids) as state:
-            self._store.retention.remove(capture_ids, state)
-        self._jobs.forget(capture_ids)
-        self._store.retention.erase(capture_ids)
-        self._counters.add("removed", "operator", len(capture_ids))
-        self._log.info("removed by an operator", captures=len(capture_ids))
-        yield from self._outcomes.removed(capture_ids)
+    def _withdraw(self, capture_ids: Sequence[str]) -> Iterator[Output]:
+        if capture_ids:
+            with self._captures.transition(CaptureEvent.PURGED, *capture_ids) as state:
+                self._store.retention.remove(capture_ids, state)
+            gone = frozenset(capture_ids)
+            self._jobs.forget(gone)
+            yield from self._outcomes.removed(gone)
+
+    def _erase(self, pending: PendingErasure, erasure: _Erasure) -> None:
+        self._erasures.append(erasure)
+        self._writer.erase(pending)

@@ -88,6 +88,8 @@ class Presses:
         if press := self._presses.get(capture_id):
             press.pressers[peer] = request
             return
+        if self._store.retention.is_erasing(capture_id):
+            return  # the client repeats it in a moment
         if not self._captures.allows(capture_id, CaptureEvent.PRESSED):
             yield send(peer, messages.PressAccepted(request=request, capture_id=capture_id))
             return

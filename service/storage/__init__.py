@@ -1,6 +1,7 @@
 """The data folder: frames and faces as files, what became of them in SQLite."""
 
 from denseface.service.storage._capture_rows import CaptureRow
+from denseface.service.storage._erasure import Erased, PendingErasure
 from denseface.service.storage._folder_layout import FolderLayout
 from denseface.service.storage._folder_lock import check_folder
 from denseface.service.storage.folder_store import FolderStore
@@ -15,11 +16,13 @@ from denseface.service.storage.writer import InlineWriter, Writer, WriteResult, 
 
 __all__ = [
     "CaptureRow",
+    "Erased",
     "FaceMetadata",
     "FolderLayout",
     "FolderStore",
     "FrameMetadata",
     "InlineWriter",
+    "PendingErasure",
     "PendingWrite",
     "WriteResult",
     "Writer",

@@ -2,11 +2,12 @@
 
 import secrets
 import sqlite3
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from copy import copy
 from pathlib import Path
-
-import structlog
+from typing import Self
 
 from denseface.service.errors import DamagedDatabaseError, DiskFullError, StoreError
 
@@ -16,6 +17,8 @@ _MAX_SEQUENCE = 2**53
 """Sequence numbers stay below it; a higher one is damage."""
 _BUSY_S = 1.0
 """Longest wait for another program that has the database open, seconds."""
+_LOG_TRIES, _LOG_PAUSE_S = 10, 0.005
+"""Another thread's read of the database is over by the last try; seconds between them."""
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_IOERR_READ,
            sqlite3.SQLITE_IOERR_SHORT_READ, sqlite3.SQLITE_IOERR_CORRUPTFS)
 """Result codes, primary or extended, of a malformed database."""
@@ -72,21 +75,37 @@ class Database:
         log = path.with_name(f"{path.name}-wal")
         self.left_open = log.exists() and log.stat().st_size > 0
         """The last hub was killed: some of its last rows may be lost."""
+        self._connect()
+        try:
+            with self._translate_errors():
+                self._check()
+        except BaseException:
+            self._connection.close()
+            raise
+
+    def another(self) -> Self:
+        """Open it once more, for another thread; StoreError where that fails."""
+        another = copy(self)
+        another._connect()
+        return another
+
+    def _connect(self) -> None:
         with self._translate_errors():
-            self._connection = sqlite3.connect(path, isolation_level=None, timeout=_BUSY_S)
+            # One thread at a time uses it; which one may change.
+            self._connection = sqlite3.connect(
+                self.path, isolation_level=None, timeout=_BUSY_S, check_same_thread=False)
             try:
-                self._open()
+                self._connection.row_factory = sqlite3.Row
+                self._connection.text_factory = lambda text: text.decode(errors="replace")
+                self._connection.executescript(
+                    "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON;"
+                    "PRAGMA secure_delete=ON")
             except BaseException:
                 self._connection.close()
                 raise
 
-    def _open(self) -> None:
+    def _check(self) -> None:
         connection = self._connection
-        connection.row_factory = sqlite3.Row
-        connection.text_factory = lambda text: text.decode(errors="replace")
-        connection.executescript(
-            "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON;"
-            "PRAGMA secure_delete=ON")
         if connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0:
             connection.executescript(f"BEGIN; {_SCHEMA} COMMIT")
         (version,) = connection.execute("PRAGMA user_version").fetchone()
@@ -189,13 +208,24 @@ class Database:
             connection.execute(
                 "UPDATE sqlite_sequence SET seq = seq + ? WHERE name = 'outcomes'", (count,))
 
-    def truncate_log(self) -> None:
-        """Empty the write-ahead log, which still holds rows that were deleted."""
-        row = self.select_one("PRAGMA wal_checkpoint(TRUNCATE)")
-        if row is None or row[0]:
-            structlog.get_logger("store").warning(
-                "the write-ahead log could not be emptied: someone reads the database",
-                file=self.path.name)
+    def truncate_log(self) -> bool:
+        """Empty the write-ahead log, which still holds rows that were deleted.
+
+        False where another program reads the database: the log stays until it has ended that.
+        """
+        # First without the writer's lock; what is left to do under it is quick then.
+        self.select_one("PRAGMA wal_checkpoint(PASSIVE)")
+        # SQLite would hold that lock while it waits for readers.
+        self.select_one("PRAGMA busy_timeout = 0")
+        try:
+            for _ in range(_LOG_TRIES):
+                row = self.select_one("PRAGMA wal_checkpoint(TRUNCATE)")
+                if row is not None and not row[0]:
+                    return True
+                time.sleep(_LOG_PAUSE_S)
+        finally:
+            self.select_one(f"PRAGMA busy_timeout = {_BUSY_S * 1000:.0f}")
+        return False
 
     @contextmanager
     def _translate_errors(self) -> Iterator[None]:

@@ -1,7 +1,7 @@
 """Names and paths of the files in the data folder."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -53,6 +53,11 @@ class FolderLayout:
     def all_faces(self) -> Iterator[tuple[str, Path]]:
         """Give capture id and path of each face."""
         return _matching(self.faces, _FACE_NAME)
+
+    def faces_of(self, capture_ids: Container[str]) -> list[tuple[str, Path]]:
+        """Give capture id and path of the faces of some captures, whatever their settings."""
+        return [(capture_id, path) for capture_id, path in self.all_faces()
+                if capture_id in capture_ids]
 
     def temporary_files(self) -> Iterator[Path]:
         """Give half-written files of a hub that was killed."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import structlog
 
 from denseface.files import read_bounded
-from denseface.service.runtime.files import write_atomically
+from denseface.service.runtime.files import sync_folder, write_atomically
 from denseface.service.storage._store_clock import StoreClock
 
 _MAX_REPORT_BYTES = 2**16
@@ -25,6 +25,8 @@ class Quarantine:
     def __init__(self, folder: Path, clock: StoreClock) -> None:
         self._folder = folder
         self._clock = clock
+        self._captures: dict[str, str] = {}
+        """Name of a report that was read -> the capture that it names, "" for none."""
         self._log = structlog.get_logger("store")
 
     def add(self, path: Path, reason: str, capture_id: str | None = None) -> None:
@@ -49,15 +51,21 @@ class Quarantine:
 
     def remove(self, capture_ids: Collection[str]) -> None:
         """Remove the files of captures; OSError where one cannot be removed."""
-        for report in list(self._folder.glob("*.json")):
-            if _read(report).get("capture_id") in capture_ids:
-                _remove(report)
+        # Each report is read once: a purge of all comes here for every few hundred captures.
+        known = self._captures
+        self._captures = {
+            report.name: known[report.name] if report.name in known else _capture_of(report)
+            for report in self._folder.glob("*.json")}
+        removed = [name for name, one in self._captures.items() if one in capture_ids]
+        for name in removed:
+            _remove(self._folder / name)
+        if removed:
+            sync_folder(self._folder)
 
-    def remove_older(self, retention_s: float) -> None:
-        """Remove files older than that; OSError as `remove`."""
-        before = self._clock.now() - retention_s
+    def remove_before(self, age_s: float) -> None:
+        """Remove files that came when the store was younger; OSError as `remove`."""
         for report in list(self._folder.glob("*.json")):
-            if _age_s(report) <= before:
+            if _age_s(report) <= age_s:
                 _remove(report)
 
     def clear(self) -> None:
@@ -73,6 +81,10 @@ def _read(report: Path) -> dict[str, object]:
     except (OSError, ValueError):
         return {}
     return found if isinstance(found, dict) else {}
+
+
+def _capture_of(report: Path) -> str:
+    return str(_read(report).get("capture_id") or "")
 
 
 def _age_s(report: Path) -> float:

@@ -1,18 +1,18 @@
-"""Removal from the data folder: rows are marked, then files removed, then the rows.
+"""Removal from the data folder: rows are marked, then all is erased that they name.
 
-A hub that is killed in between leaves nothing that can be read, and the next one goes on.
+What is marked cannot be read any more; a hub that is killed then leaves the rest to the next one.
 """
 
 from collections.abc import Callable, Sequence
 from datetime import datetime
 
+from denseface.service.errors import StoreError
 from denseface.service.protocol.states import CaptureState
-from denseface.service.runtime.files import sync_folder
 from denseface.service.storage._database import Database
 from denseface.service.storage._disk_reserve import DiskReserve
+from denseface.service.storage._erasure import Erased, Eraser, Erasure, PendingErasure
 from denseface.service.storage._folder_layout import FolderLayout
 from denseface.service.storage._quarantine import Quarantine
-from denseface.service.storage._record_file import wrap_os_errors
 from denseface.service.storage._store_clock import StoreClock, format_timestamp
 
 
@@ -31,10 +31,18 @@ class Retention:
         self._layout = layout
         self._database = database
         self._clock = clock
-        self._quarantine = quarantine
         self._forget = forget
         self._reserve = DiskReserve(layout.disk_reserve)
         self._reserve.allocate()
+        self._eraser = Eraser(layout, database, quarantine, self._reserve)
+        self._erasing: set[str] = set()
+        """Captures of which an erasure is under way, or waits to begin."""
+        self._begun = 0
+        """Number of the last erasure."""
+        self.log_due = database.left_open
+        """The write-ahead log is to be emptied: it may name what was erased.
+
+        Its own length says so to the next hub, so nothing else has to be remembered."""
 
     def expired(self, retention_s: float, limit: int) -> list[str]:
         """Give ids of what was finished longer ago than the retention, oldest first."""
@@ -57,7 +65,7 @@ class Retention:
             " ORDER BY position LIMIT ?", CaptureState.REMOVED, until, limit)
 
     def remove(self, capture_ids: Sequence[str], state: CaptureState) -> None:
-        """Withdraw captures and their outcomes; `erase` or `sweep` does the rest.
+        """Withdraw captures and their outcomes; an erasure does the rest.
 
         Parameters
         ----------
@@ -65,61 +73,92 @@ class Retention:
         """
         self._reserve.spend_on(lambda: self._mark(capture_ids, state))
 
-    def erase(self, capture_ids: Sequence[str]) -> None:
-        """Erase frames, faces, reports and rows of what was removed, so that none can be read.
+    def left_over(self, limit: int) -> list[str]:
+        """Give ids of what is withdrawn, and no erasure of it is under way."""
+        found = self._database.select_ids(
+            "SELECT capture_id FROM captures WHERE state = ? ORDER BY position LIMIT ?",
+            CaptureState.REMOVED, limit + len(self._erasing))
+        return [one for one in found if one not in self._erasing][:limit]
 
-        Raises StoreError where a file cannot be erased: `sweep` tries again.
+    def is_left(self, capture_id: str | None) -> bool:
+        """Whether a capture is withdrawn and not erased, or any is where None."""
+        return self._database.select_one(
+            "SELECT 1 FROM captures WHERE state = ? AND capture_id = coalesce(?, capture_id)"
+            " LIMIT 1", CaptureState.REMOVED, capture_id) is not None
+
+    def without_row(self) -> list[str]:
+        """Give ids of the files of captures that have no row; to be called while none is written.
+
+        It lists both folders.
         """
-        self._reserve.spend_on(lambda: self._erase(capture_ids))
+        found = {capture_id: None for files in (self._layout.all_frames, self._layout.all_faces)
+                 for capture_id, _ in files()}
+        return [one for one in found if one not in self._erasing and self._hash_of(one) is None]
 
-    def sweep(self, retention_s: float | None) -> None:
-        """Finish what `remove` began; remove what is in quarantine for longer than that."""
-        self._reserve.spend_on(lambda: self._erase(self._database.select_ids(
-            "SELECT capture_id FROM captures WHERE state = ?", CaptureState.REMOVED)))
-        self._database.set_meta("clock", self._clock.save())
-        if retention_s is not None and self._clock.trusted(retention_s):
-            with wrap_os_errors(self._layout.quarantine):
-                self._quarantine.remove_older(retention_s)
+    def is_erasing(self, capture_id: str) -> bool:
+        """Whether an erasure of this capture is under way: its id cannot be used meanwhile."""
+        return capture_id in self._erasing
+
+    def prepare(
+        self, capture_ids: Sequence[str] = (), *, retention_s: float | None = None,
+        all_quarantined: bool = False,
+    ) -> PendingErasure:
+        """Give what is to be erased of captures that were removed, or have no row; then `finish`.
+
+        Parameters
+        ----------
+        retention_s : also what is in quarantine for longer than that
+        all_quarantined : also all that is in quarantine
+        """
+        if retention_s is not None and not self._clock.trusted(retention_s):
+            retention_s = None
+        self._forget(capture_ids)
+        # Twice under way, the second might erase what was pressed again after the first.
+        captures = {one: self._hash_of(one) for one in capture_ids if one not in self._erasing}
+        self._erasing.update(captures)
+        self._begun += 1
+        return PendingErasure(Erasure(
+            captures, self._begun,
+            None if retention_s is None else self._clock.now() - retention_s,
+            all_quarantined), self._eraser)
+
+    def finish(self, erased: Erased) -> None:
+        """Take what became of an erasure; raises its error.
+
+        StoreError where a file cannot be erased: it is `left_over`.
+        """
+        self._erasing.difference_update(erased.erasure.captures)
+        if not erased.log_emptied:
+            self.log_due = True
+        elif erased.erasure.number == self._begun:
+            self.log_due = False
+        if erased.error is not None:
+            raise erased.error
+
+    def erase(self, capture_ids: Sequence[str]) -> None:
+        """Erase what was removed before it returns; raises as `finish`."""
+        self.finish(self.prepare(capture_ids).run())
 
     def finish_erasing(self, capture_id: str) -> None:
         """Finish what `remove` began of a capture whose id is used again, if anything."""
-        self._erase(self._database.select_ids(
-            "SELECT capture_id FROM captures WHERE state = ? AND capture_id = ?",
-            CaptureState.REMOVED, capture_id))
+        if capture_id in self._erasing:
+            raise StoreError(f"an earlier capture {capture_id} is being removed")
+        if self._hash_of(capture_id, CaptureState.REMOVED) is not None:
+            self.erase([capture_id])
 
-    def clear_quarantine(self) -> None:
-        """Remove all that is in quarantine."""
-        with wrap_os_errors(self._layout.quarantine):
-            self._quarantine.clear()
+    def save_clock(self) -> None:
+        """Save the store's clock."""
+        self._database.set_meta("clock", self._clock.save())
+
+    def _hash_of(self, capture_id: str, state: CaptureState | None = None) -> str | None:
+        row = self._database.select_one(
+            "SELECT settings_hash FROM captures WHERE capture_id = ?"
+            " AND state = coalesce(?, state)", capture_id, state)
+        return row["settings_hash"] if row else None
 
     def _mark(self, capture_ids: Sequence[str], state: CaptureState) -> None:
         with self._database.transaction() as connection:
-            for capture_id in capture_ids:
-                connection.execute("DELETE FROM outcomes WHERE capture_id = ?", (capture_id,))
-                connection.execute(
-                    "UPDATE captures SET state = ? WHERE capture_id = ?", (state, capture_id))
-
-    def _erase(self, capture_ids: Sequence[str]) -> None:
-        """Remove files, then rows: while a file is left, so is a row that says REMOVED."""
-        if not capture_ids:
-            return
-        self._forget(capture_ids)
-        for capture_id in capture_ids:
-            row = self._database.select_one(
-                "SELECT settings_hash FROM captures WHERE capture_id = ?", capture_id)
-            paths = [self._layout.frame(capture_id)]
-            if row:
-                paths.append(self._layout.face(capture_id, row["settings_hash"]))
-            for path in paths:
-                with wrap_os_errors(path):
-                    path.unlink(missing_ok=True)
-        for folder in (self._layout.frames, self._layout.faces):
-            with wrap_os_errors(folder):
-                sync_folder(folder)
-        with wrap_os_errors(self._layout.quarantine):
-            self._quarantine.remove(capture_ids)
-        with self._database.transaction() as connection:
-            connection.executemany(
-                "DELETE FROM captures WHERE capture_id = ? AND state = 'removed'",
-                [(capture_id,) for capture_id in capture_ids])
-        self._database.truncate_log()
+            connection.executemany("DELETE FROM outcomes WHERE capture_id = ?",
+                                   [(one,) for one in capture_ids])
+            connection.executemany("UPDATE captures SET state = ? WHERE capture_id = ?",
+                                   [(state, one) for one in capture_ids])

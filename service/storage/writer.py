@@ -1,4 +1,4 @@
-"""Writes the files of frames and faces in threads of their own, so that the hub's loop goes on.
+"""Writes and erases files in threads of their own, so that the hub's loop goes on.
 
 A `Writer` reports each file as safe under its name, or the error. The hub then writes the row, in
 its own thread.
@@ -16,6 +16,7 @@ from denseface.service.errors import StoreError
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.files import sync_folder
 from denseface.service.runtime.wake_pipe import WakePipe
+from denseface.service.storage._erasure import Erased, PendingErasure
 from denseface.service.storage._record_file import wrap_os_errors
 from denseface.service.storage.records import MessageT, MetadataT, PendingWrite, Record
 
@@ -48,13 +49,19 @@ class WriteResult:
 
 
 class Writer(Protocol):
-    """Writes files; those of frames in order, and those of faces."""
+    """Writes files, those of frames in order, and those of faces; erases in order."""
 
     def start(self, pending: PendingWrite) -> None:
         """Begin to write a file."""
 
     def take_results(self) -> list[WriteResult]:
         """Give the results since the last call."""
+
+    def erase(self, pending: PendingErasure) -> None:
+        """Begin to erase."""
+
+    def take_erased(self) -> list[Erased]:
+        """Give what became of erasures since the last call."""
 
     def wait(self) -> None:
         """Wait until every write has a result."""
@@ -95,6 +102,7 @@ class InlineWriter:
 
     def __init__(self) -> None:
         self._results: list[WriteResult] = []
+        self._erased: list[Erased] = []
 
     def start(self, pending: PendingWrite) -> None:
         """Write the file."""
@@ -105,6 +113,15 @@ class InlineWriter:
         results, self._results = self._results, []
         return results
 
+    def erase(self, pending: PendingErasure) -> None:
+        """Erase."""
+        self._erased.append(pending.run())
+
+    def take_erased(self) -> list[Erased]:
+        """Give what became of erasures since the last call."""
+        erased, self._erased = self._erased, []
+        return erased
+
     def wait(self) -> None:
         """Return: every write has its result."""
 
@@ -112,26 +129,30 @@ class InlineWriter:
 class WriterThreads(WakePipe):
     """Writes frames in one thread and faces in another: a press does not wait for a face.
 
-    Readable while there are results.
+    A third one erases. Readable while there are results.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self._lock = threading.Lock()
         self._results: list[WriteResult] = []
+        self._erased: list[Erased] = []
         self._closed = False
         self._frames: _Queue = Queue()
         self._faces: _Queue = Queue()
+        self._erasures: Queue[PendingErasure | None] = Queue()
         self._threads = [
             threading.Thread(target=self._run, args=(queue,), name=name, daemon=True)
             for name, queue in (("frames", self._frames), ("faces", self._faces))]
+        self._threads.append(
+            threading.Thread(target=self._run_erasures, name="erasures", daemon=True))
         for thread in self._threads:
             thread.start()
 
     def has_results(self) -> bool:
-        """Whether `take_results` would give anything."""
+        """Whether `take_results` or `take_erased` would give anything."""
         with self._lock:
-            return bool(self._results)
+            return bool(self._results or self._erased)
 
     def start(self, pending: PendingWrite) -> None:
         """Begin to write a file."""
@@ -141,9 +162,23 @@ class WriterThreads(WakePipe):
         """Give the results since the last call."""
         with self._lock:
             results, self._results = self._results, []
-            if results and not self._closed:
-                self.drain()
+            self._drained()
         return results
+
+    def erase(self, pending: PendingErasure) -> None:
+        """Begin to erase."""
+        self._erasures.put(pending)
+
+    def take_erased(self) -> list[Erased]:
+        """Give what became of erasures since the last call."""
+        with self._lock:
+            erased, self._erased = self._erased, []
+            self._drained()
+        return erased
+
+    def _drained(self) -> None:
+        if not (self._results or self._erased or self._closed):
+            self.drain()
 
     def wait(self) -> None:
         """Wait until every write has a result."""
@@ -151,9 +186,10 @@ class WriterThreads(WakePipe):
         self._faces.join()
 
     def close(self) -> None:
-        """Finish every write and end both threads; `take_results` still gives the results."""
+        """Finish all and end the threads; `take_results` still gives the results."""
         for queue in (self._frames, self._faces):
             queue.put(None)
+        self._erasures.put(None)
         for thread in self._threads:
             thread.join()
         self._closed = True
@@ -173,3 +209,10 @@ class WriterThreads(WakePipe):
                 self.wake()
             for _ in batch:
                 queue.task_done()
+
+    def _run_erasures(self) -> None:
+        while pending := self._erasures.get():
+            erased = pending.run()
+            with self._lock:
+                self._erased.append(erased)
+                self.wake()

@@ -26,6 +26,8 @@ class FakeHub:
         self.outcomes: list[Packet] = []
         self.ignored: set[str] = set()
         self.refuse: str | None = None
+        self.removals: list[tuple[int, bool]] = []
+        """What the next purges are told."""
         self.received: list[str] = []
         self.subscriptions: list[bytes] = []
         self._context = zmq.Context()
@@ -114,6 +116,9 @@ class FakeHub:
                 found = [one for one in self.outcomes if one.message.capture_id == capture_id]
                 yield _again(found[0], request) if found else Packet(messages.CaptureUnknown(
                     request=request, capture_id=capture_id))
+            case messages.Purge():
+                removed, left = self.removals.pop(0) if self.removals else (0, True)
+                yield Packet(messages.Removed(request=request, removed=removed, left=left))
             case messages.GetNext(after=after):
                 if after < len(self.outcomes):
                     yield _again(self.outcomes[after], request)

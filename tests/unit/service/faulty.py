@@ -4,7 +4,13 @@ from collections import deque
 from collections.abc import Callable
 
 from denseface.service.errors import DiskFullError
-from denseface.service.storage import FolderStore, PendingWrite, WriteResult, write
+from denseface.service.storage import (
+    FolderStore,
+    InlineWriter,
+    PendingWrite,
+    WriteResult,
+    write,
+)
 
 __all__ = ["FaultyStore", "KilledError", "StepWriter"]
 
@@ -39,8 +45,8 @@ class FaultyStore(FolderStore):
         super().fail(*arguments)
 
 
-class StepWriter:
-    """Writes when `step` says so; while `immediate`, at once.
+class StepWriter(InlineWriter):
+    """Writes when `step` says so; while `immediate`, at once. Erases at once.
 
     Parameters
     ----------
@@ -49,6 +55,7 @@ class StepWriter:
     """
 
     def __init__(self, room: Callable[[], None], writes: Callable[[PendingWrite], None]) -> None:
+        super().__init__()
         self.immediate = True
         self.waiting: deque[PendingWrite] = deque()
         self._room = room

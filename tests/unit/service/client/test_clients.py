@@ -9,7 +9,7 @@ import psutil
 import pytest
 
 import denseface
-from denseface.service.client import AsyncClient, Client
+from denseface.service.client import AsyncClient, Client, Operator
 from denseface.service.errors import (
     ClientClosedError,
     ClientTimeoutError,
@@ -247,3 +247,11 @@ def test_no_descriptor_is_left_open(hub):
 
 def test_it_is_part_of_the_public_face():
     assert denseface.AsyncClient is AsyncClient
+
+
+def test_a_purge_goes_on_while_some_is_left(hub):
+    hub.removals = [(2, True), (0, True), (0, True), (1, False)]
+    with Operator(hub.address) as operator:
+        assert operator.purge(everything=True, timeout=LIMIT_S) == 3
+        with pytest.raises(ClientTimeoutError):
+            operator.purge(everything=True, timeout=0.1)

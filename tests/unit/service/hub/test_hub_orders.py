@@ -22,7 +22,7 @@ from denseface.service.protocol.states import TRANSITIONS, CaptureState
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage import FrameMetadata, _retention, records, writer
+from denseface.service.storage import FrameMetadata, _erasure, records, writer
 from tests.unit.service.clocks import FakeClock
 from tests.unit.service.faulty import FaultyStore, KilledError, StepWriter
 from tests.unit.service.hub.bench import FACE, FACE_ARRAYS, FRAME, FRAME_ARRAYS
@@ -46,7 +46,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.patches = [
             patch(f"{module.__name__}.{name}", self.last_step(name, getattr(module, name)))
             for module, name in ((records, "write_parts"), (writer, "sync_folder"),
-                                 (_retention, "sync_folder"))]
+                                 (_erasure, "sync_folder"))]
         for one in self.patches:
             one.start()
         self.folder = Path(tempfile.mkdtemp(dir=_MEMORY if _MEMORY.is_dir() else None))

@@ -1,0 +1,82 @@
+"""Purges of a real hub, by peers that speak no more than the wire format."""
+
+import subprocess
+import sys
+from contextlib import closing, contextmanager
+
+import pytest
+
+from denseface.service.protocol import messages
+from denseface.service.protocol.wire import decode_from_hub
+from tests.system.guarded import Peer
+from tests.system.running import hub_alone
+from tests.system.test_keeping import address, files, fill
+from tests.waiting import until
+
+__all__ = ["address"]
+
+NAME = "MargaretHamilton"
+
+
+@pytest.fixture
+def data(tmp_path):
+    fill(tmp_path / "data", NAME, "b")
+    return tmp_path / "data"
+
+
+def named(data):
+    return [path.name for path in data.iterdir()
+            if path.is_file() and NAME.encode() in path.read_bytes()]
+
+
+READER = """
+import sqlite3, sys
+database = sqlite3.connect(sys.argv[1], isolation_level=None)
+database.execute("BEGIN")
+database.execute("SELECT count(*) FROM captures").fetchone()
+print(flush=True)
+sys.stdin.read()
+"""
+"""A process of its own: this one loses its locks as soon as it looks into one of the files."""
+
+
+@contextmanager
+def reader(data):
+    """Another program that reads the database and does not end its transaction."""
+    process = subprocess.Popen([sys.executable, "-c", READER, data / "captures.sqlite3"],
+                               stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    try:
+        assert process.stdout.readline()
+        yield
+    finally:
+        process.kill()  # who closes a database in order, as the last one, empties its log
+        process.communicate()
+
+
+def test_removed_is_said_when_no_file_and_no_log_names_it(address, data):
+    with hub_alone(address, data), closing(Peer(address)) as peer:
+        peer.status()
+        with reader(data):
+            peer.send(messages.Purge(request=1, capture_id=NAME))
+            until(lambda: not [name for name in files(data) if NAME in name])
+            peer.send(messages.GetStatus(request=2))
+            assert decode_from_hub(peer.socket.recv_multipart()).message.kind == "status"
+            assert named(data)
+        # Whichever comes first: that the log cannot be emptied, or that it is.
+        answers = [peer.request(messages.Purge(request=1, capture_id=NAME))]
+        while answers[-1].kind != "removed":
+            assert "another program has the database open" in answers[-1].message
+            answers.append(peer.request(
+                messages.Purge(request=2 + len(answers), capture_id=NAME)))
+        assert named(data) == []
+
+
+def test_what_could_not_be_emptied_is_emptied_after_a_restart(address, data):
+    with reader(data):
+        with hub_alone(address, data), closing(Peer(address)) as peer:
+            peer.send(messages.Purge(request=1, everything=True))
+            until(lambda: not files(data))
+        assert named(data)
+    with hub_alone(address, data), closing(Peer(address)) as peer:
+        until(lambda: not named(data))
+        assert peer.status().done == 0

@@ -1,0 +1,65 @@
+"""How much is asked of the disk to erase many captures."""
+
+import os
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from denseface.recon.settings import Settings
+from denseface.service.protocol.states import CaptureState
+from denseface.service.storage import FolderStore
+from denseface.service.storage._database import Database
+from tests.unit.service.storage.test_folder_store import frame, result
+from tests.unit.service.storing import accept, finish
+
+NAMES = [f"c{number}" for number in range(40)]
+
+
+@pytest.fixture
+def store(tmp_path):
+    with FolderStore(tmp_path / "data") as store:
+        for name in NAMES:
+            accept(store, frame(name), Settings(), "0f")
+            finish(store, result(name, store))
+        yield store
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """Counts calls of the system, transactions and reports that are read."""
+    counts = Counter()
+
+    def counted(name, call):
+        def count(*arguments, **more):
+            counts[name] += 1
+            return call(*arguments, **more)
+        return count
+
+    for name, owner, attribute in (
+            ("unlink", Path, "unlink"), ("sync", os, "fsync"), 
+            ("transaction", Database, "transaction"), ("emptied", Database, "truncate_log"),
+            ("read", Path, "read_bytes")):
+        monkeypatch.setattr(owner, attribute, counted(name, getattr(owner, attribute)))
+    return counts
+
+
+def test_a_batch_has_two_transactions_one_sync_of_each_folder_and_one_emptied_log(store, calls):
+    store.retention.remove(NAMES, CaptureState.REMOVED)
+    assert calls == {"transaction": 1}
+    calls.clear()
+    store.retention.erase(NAMES)
+    assert calls == {"unlink": 2 * len(NAMES), "sync": 2, "transaction": 1, "emptied": 1}
+    assert not list(store._layout.frames.iterdir())
+    assert not list(store._layout.faces.iterdir())
+
+
+def test_a_report_in_quarantine_is_read_once_however_many_batches_there_are(store, calls):
+    for name in NAMES[:9]:
+        store._quarantine.add(store._layout.frame(name), "damaged", name)
+    calls.clear()
+    for batch in (NAMES[9:20], NAMES[20:], NAMES[:9]):
+        store.retention.remove(batch, CaptureState.REMOVED)
+        store.retention.erase(batch)
+    assert calls["read"] == 9
+    assert not list(store._layout.quarantine.iterdir())
