@@ -98,11 +98,17 @@ class Hub:
     def written(self, now: float, *, wait: bool = False) -> list[Output]:
         """Give written files their rows and return what to send; raises as `receive`.
 
-        With `wait`, until all that is being written has its row; no job is sent then.
+        With `wait`, until all that is being written has its row, and all that is being erased is
+        gone; no job is sent then.
         """
         outputs: list[Output] = []
         try:
-            outputs.extend(self._finish_writes(now) if wait else self._process_writes(now))
+            if wait:
+                outputs.extend(self._finish_writes(now))
+                self._writer.wait(erased=True)
+                outputs.extend(self._maintenance.erased(now, self._writer.take_erased()))
+            else:
+                outputs.extend(self._process_writes(now))
         except errors.DamagedDatabaseError:
             raise
         except errors.ServiceError as error:

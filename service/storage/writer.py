@@ -63,8 +63,8 @@ class Writer(Protocol):
     def take_erased(self) -> list[Erased]:
         """Give what became of erasures since the last call."""
 
-    def wait(self) -> None:
-        """Wait until every write has a result."""
+    def wait(self, *, erased: bool = False) -> None:
+        """Wait until every write has a result, and every erasure too if `erased`."""
 
 
 def write(pending_writes: Sequence[PendingWrite]) -> list[WriteResult]:
@@ -122,8 +122,8 @@ class InlineWriter:
         erased, self._erased = self._erased, []
         return erased
 
-    def wait(self) -> None:
-        """Return: every write has its result."""
+    def wait(self, *, erased: bool = False) -> None:
+        """Return: all have their results."""
 
 
 class WriterThreads(WakePipe):
@@ -180,10 +180,12 @@ class WriterThreads(WakePipe):
         if not (self._results or self._erased or self._closed):
             self.drain()
 
-    def wait(self) -> None:
-        """Wait until every write has a result."""
+    def wait(self, *, erased: bool = False) -> None:
+        """Wait until every write has a result, and every erasure too if `erased`."""
         self._frames.join()
         self._faces.join()
+        if erased:
+            self._erasures.join()
 
     def close(self) -> None:
         """Finish all and end the threads; `take_results` still gives the results."""
@@ -216,3 +218,4 @@ class WriterThreads(WakePipe):
             with self._lock:
                 self._erased.append(erased)
                 self.wake()
+            self._erasures.task_done()

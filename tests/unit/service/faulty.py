@@ -83,5 +83,5 @@ class StepWriter(InlineWriter):
         done, self._done = self._done, []
         return done
 
-    def wait(self) -> None:
+    def wait(self, *, erased: bool = False) -> None:
         self.step(len(self.waiting))

@@ -238,3 +238,13 @@ def test_a_thread_erases(data):
         free.set()
         until(writer.has_results)
         assert kinds(bench._sent(bench.hub.written(bench.now))) == [(OPERATOR, "removed")]
+
+
+def test_a_stop_in_order_finishes_what_is_being_erased(data):
+    with FolderStore(data) as store, WriterThreads() as writer:
+        bench = Bench(Hub(store, SETTINGS, Settings(), writer=writer), store)
+        bench.accepted("a")
+        bench._sent(bench.hub.written(bench.now, wait=True))
+        bench.say(OPERATOR, messages.Purge(request=1, everything=True))
+        assert kinds(bench._sent(bench.hub.written(bench.now, wait=True))) == [
+            (OPERATOR, "removed")]

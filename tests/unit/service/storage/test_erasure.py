@@ -37,7 +37,7 @@ def calls(monkeypatch):
         return count
 
     for name, owner, attribute in (
-            ("unlink", Path, "unlink"), ("sync", os, "fsync"), 
+            ("unlink", Path, "unlink"), ("sync", os, "fsync"),
             ("transaction", Database, "transaction"), ("emptied", Database, "truncate_log"),
             ("read", Path, "read_bytes")):
         monkeypatch.setattr(owner, attribute, counted(name, getattr(owner, attribute)))
