@@ -84,4 +84,5 @@ class StepWriter(InlineWriter):
         return done
 
     def wait(self, *, erased: bool = False) -> None:
+        super().wait(erased=erased)
         self.step(len(self.waiting))
