@@ -1,5 +1,6 @@
 """How much is asked of the disk to erase many captures."""
 
+import json
 import os
 from collections import Counter
 from pathlib import Path
@@ -39,7 +40,7 @@ def calls(monkeypatch):
     for name, owner, attribute in (
             ("unlink", Path, "unlink"), ("sync", os, "fsync"),
             ("transaction", Database, "transaction"), ("emptied", Database, "truncate_log"),
-            ("read", Path, "read_bytes")):
+            ("read", json, "loads")):
         monkeypatch.setattr(owner, attribute, counted(name, getattr(owner, attribute)))
     return counts
 
