@@ -25,12 +25,16 @@ RUN apt-get update \
     && useradd --create-home --uid 1000 --groups plugdev,video denseface \
     && install -d -o denseface -g denseface -m 0700 /data
 COPY --from=build /opt/denseface /opt/denseface
+# The metrics' port is inside the container alone; the health check asks there.
 ENV PATH=/opt/denseface/bin:$PATH \
-    DENSEFACE_DATA=/data
+    DENSEFACE_DATA=/data \
+    DENSEFACE_METRICS=127.0.0.1:9400
 USER denseface
 # Compiled for this processor into the user's cache: else the first start would wait for it.
 RUN python3 -c 'from denseface.service.daemons.worker import warm; warm()'
 WORKDIR /data
 VOLUME /data
+# Healthy where a press now would become a face.
+HEALTHCHECK --interval=30s --timeout=10s --start-period=60s --retries=3 CMD ["python3", "-IS", "-c", "import http.client, os; hub = http.client.HTTPConnection(os.environ['DENSEFACE_METRICS'], timeout=5); hub.request('GET', '/healthz'); raise SystemExit(hub.getresponse().status != 200)"]
 ENTRYPOINT ["denseface"]
 CMD ["up"]
