@@ -11,11 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from tests.chaos.cluster import PACE, Nursery
-from tests.chaos.rounds import Outcome, play
+from tests.chaos.rounds import Outcome, is_supervised, play
 from tests.chaos.source import write_small_frame
 
 _ROUND = 500
 """Presses of one data folder; a round that breaks a promise can be played again by its seed."""
+_SUPERVISED_ROUND = 100
+"""The same under `denseface up`, whose processes take seconds to start."""
 
 
 def main() -> int:
@@ -37,7 +39,8 @@ def main() -> int:
             minutes = (time.monotonic() - began) / 60
             if args.minutes is not None and minutes >= args.minutes:
                 break
-            seed, presses = args.seed + rounds, min(left, _ROUND)
+            seed = args.seed + rounds
+            presses = min(left, _SUPERVISED_ROUND if is_supervised(seed) else _ROUND)
             folder = Path(temporary) / f"seed-{seed}"
             outcome = play(nursery, folder, frame, presses, seed)
             total.add(outcome)

@@ -1,5 +1,6 @@
 """Hub, capture process and workers as real processes, restarted at once when they end."""
 
+import contextlib
 import json
 import os
 import signal
@@ -13,6 +14,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+
+import psutil
 
 from denseface.service.client import Client
 from denseface.service.errors import ServiceError
@@ -140,6 +143,22 @@ class Part:
         until(lambda: not self.running(), f"end of {self.name}")
 
 
+class Child:
+    """A process that `denseface up` runs, for as long as it is the same one."""
+
+    def __init__(self, process: psutil.Process, name: str) -> None:
+        self.name = name
+        self._process = process
+
+    def send(self, number: signal.Signals) -> bool:
+        """Send a signal; False where it has ended."""
+        try:
+            self._process.send_signal(number)
+        except psutil.NoSuchProcess:
+            return False
+        return True
+
+
 class Cluster:
     """Runs the service's parts until the `with` block ends.
 
@@ -150,6 +169,7 @@ class Cluster:
     recon : further arguments of the hub
     daemons_at : where daemons connect, given the hub's address; by default there
     thief : takes ids at a listener with keys, where the first worker then connects
+    supervised : run `denseface up` in place of its parts, which then restarts them
     """
 
     def __init__(
@@ -157,7 +177,7 @@ class Cluster:
         recon: Sequence[str] = (), environment: dict[str, str] | None = None,
         actions: dict[str, str] | None = None,
         daemons_at: Callable[[str], str] = lambda address: address,
-        thief: Thief | None = None,
+        thief: Thief | None = None, supervised: bool = False,
     ) -> None:
         self.data = folder / "data"
         self.logs = folder
@@ -179,17 +199,24 @@ class Cluster:
 
         self._part = part
         elsewhere = daemons_at(self.address)
+        self._workers = workers
         listen = thief.hub_arguments() if thief else []
-        self.hub = Part(nursery, "hub", ["hub", "--address", self.address, "--data",
-                                         str(self.data), *listen, *recon],
-                        self.hub_log.log, settings, writes_to=self.hub_log.path)
-        self.capture = part("capture", "capture", elsewhere, "--source", str(source))
-        self.workers = [part(f"worker-{number}", "worker", elsewhere)
-                        for number in range(1, workers + 1)]
-        if thief:
-            self.workers[0] = Part(nursery, "worker-1", ["worker", *thief.worker_arguments()],
-                                   folder / "worker-1.log", settings)
-        self.parts = [self.hub, self.capture, *self.workers]
+        kept = ["--address", self.address, "--data", str(self.data), *listen, *recon]
+        first = ["up", "--source", str(source), "--workers", str(workers), *kept] if (
+            supervised) else ["hub", *kept]
+        # Of what is supervised, all processes write into that pipe.
+        self.hub = Part(nursery, first[0], first, self.hub_log.log, settings,
+                        writes_to=self.hub_log.path)
+        self.supervised = supervised
+        self.parts = [self.hub]
+        if not supervised:
+            elsewhere = daemons_at(self.address)
+            self.parts.append(part("capture", "capture", elsewhere, "--source", str(source)))
+            self.parts += [part(f"worker-{number}", "worker", elsewhere)
+                           for number in range(1, workers + 1)]
+            if thief:
+                self.parts[2] = Part(nursery, "worker-1", ["worker", *thief.worker_arguments()],
+                                     folder / "worker-1.log", settings)
         self._ended = threading.Event()
         self._watcher = threading.Thread(target=self._watch, daemon=True)
 
@@ -217,6 +244,31 @@ class Cluster:
             part.end(number)
         self.hub_log.close()
 
+    @property
+    def capture(self) -> Part:
+        """The capture process, where none is supervised."""
+        return self.parts[1]
+
+    @property
+    def workers(self) -> list[Part]:
+        """The workers, where none is supervised."""
+        return [part for part in self.parts if part.name.startswith("worker")]
+
+    def victims(self) -> Sequence[Part | Child]:
+        """Give what a fault may befall: every process that runs."""
+        if not self.supervised:
+            return self.parts
+        try:
+            children = psutil.Process(self.hub.pid).children()
+        except psutil.NoSuchProcess:
+            children = []
+        found = []
+        for child in children:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                names = [one for one in child.cmdline() if one in ("hub", "capture", "worker")]
+                found += [Child(child, name) for name in names[:1]]
+        return [self.hub, *found]
+
     def ready(self) -> None:
         """Wait until sensor and workers are there."""
         with Client(self.address) as client:
@@ -225,7 +277,7 @@ class Cluster:
                     status = client.status(timeout=2 * PATIENCE)
                 except ServiceError:
                     return False
-                return bool(status.sensors) and len(status.workers) >= len(self.workers)
+                return bool(status.sensors) and len(status.workers) >= self._workers
 
             until(there, "sensor and workers")
 

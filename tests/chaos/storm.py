@@ -9,12 +9,14 @@ from pathlib import Path
 
 from denseface.service.runtime.failpoints import FAILPOINT_NAMES
 from denseface.service.storage import FolderLayout
-from tests.chaos.cluster import Part
+from tests.chaos.cluster import Child, Part
 from tests.chaos.scene import Scene
 
 __all__ = ["Storm", "random_actions"]
 
 _MEAN_PAUSE_S = 0.4
+_SUPERVISED_PAUSE_S = 4.0
+"""There a process starts from nothing, and the service ends where one ends too often."""
 _LONGEST_STOP_S = 1.5
 """Beyond the liveness of `tests.chaos.cluster.PACE`."""
 _LONGEST_STALL_S = 3.0
@@ -59,11 +61,14 @@ class Storm(threading.Thread):
             self._failpoint, self._new_subscriber, self._stall_log]
         if spoil:
             self._harms.append(self._spoil)
+        if scene.cluster.supervised:
+            self._harms += [self._hang, self._hang]
+        self._pause_s = _SUPERVISED_PAUSE_S if scene.cluster.supervised else _MEAN_PAUSE_S
 
     def run(self) -> None:
         """Choose a harm, do it, wait a little."""
         try:
-            while not self._over.wait(self._random.expovariate(1 / _MEAN_PAUSE_S)):
+            while not self._over.wait(self._random.expovariate(1 / self._pause_s)):
                 self._random.choice(self._harms)()
                 self._count_failpoints()
         except BaseException as error:
@@ -81,9 +86,8 @@ class Storm(threading.Thread):
         if self.error:
             raise self.error
 
-    def _part(self) -> Part:
-        cluster = self._scene.cluster
-        return self._random.choice([cluster.hub, cluster.capture, *cluster.workers])
+    def _part(self) -> Part | Child:
+        return self._random.choice(self._scene.cluster.victims())
 
     def _kill(self) -> None:
         part = self._part()
@@ -101,6 +105,12 @@ class Storm(threading.Thread):
             self.counts[f"SIGSTOP of a {_kind(part)}, then SIGCONT"] += 1
             self._over.wait(self._random.uniform(0.1, _LONGEST_STOP_S))
             part.send(signal.SIGCONT)
+
+    def _hang(self) -> None:
+        """Stop a process for good: who supervises it has to notice."""
+        part = self._part()
+        if isinstance(part, Child) and part.send(signal.SIGSTOP):
+            self.counts[f"SIGSTOP of a {_kind(part)}, for good"] += 1
 
     def _failpoint(self) -> None:
         name = self._random.choice(FAILPOINT_NAMES)
@@ -160,5 +170,5 @@ class Storm(threading.Thread):
                         part.send(signal.SIGCONT)
 
 
-def _kind(part: Part) -> str:
+def _kind(part: Part | Child) -> str:
     return part.name.split("-")[0].replace("capture", "capture process")
