@@ -16,7 +16,7 @@ from tests.chaos.source import write_small_frame
 
 _ROUND = 500
 """Presses of one data folder; a round that breaks a promise can be played again by its seed."""
-_SUPERVISED_ROUND = 100
+_SUPERVISED_ROUND = 300
 """The same under `denseface up`, whose processes take seconds to start."""
 
 

@@ -15,7 +15,7 @@ from tests.chaos.scene import Scene
 __all__ = ["Storm", "random_actions"]
 
 _MEAN_PAUSE_S = 0.4
-_SUPERVISED_PAUSE_S = 4.0
+_SUPERVISED_PAUSE_S = 1.5
 """There a process starts from nothing, and the service ends where one ends too often."""
 _LONGEST_STOP_S = 1.5
 """Beyond the liveness of `tests.chaos.cluster.PACE`."""
