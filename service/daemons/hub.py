@@ -121,7 +121,7 @@ class _EventLoop:
             self._drop_revoked()
         self.hub.want_previews(wanted=watched)
         outputs = self.hub.tick(now)
-        self.observer.record_tick(now, outputs, subscriptions)
+        self.observer.record_tick(now, outputs, subscriptions, self.listeners.unreachable())
         self._send_all(outputs)
         return now + (PREVIEW_PERIOD_S if watched else _TICK_S)
 

@@ -52,6 +52,7 @@ class Health:
             found.append(f"store: {why}")
         if snapshot is None:
             return found
+        found += [f"hub: nobody can connect: {why}" for why in snapshot.unreachable]
         status, reserve = snapshot.status, self.settings.reserve_mib
         if status.free_bytes is None:
             found.append("disk: its free room is not known")

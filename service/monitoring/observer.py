@@ -33,6 +33,8 @@ class Snapshot:
     stages: dict[str, Histogram]
     subscriptions: dict[str, int] = field(default_factory=dict)
     """By topic."""
+    unreachable: tuple[str, ...] = ()
+    """Why nobody can connect at an address."""
 
 
 class Observer(Closing):
@@ -55,7 +57,8 @@ class Observer(Closing):
         return self._snapshot
 
     def record_tick(
-        self, now: float, outputs: Sequence[Output], subscriptions: Mapping[str, int]
+        self, now: float, outputs: Sequence[Output], subscriptions: Mapping[str, int],
+        unreachable: Sequence[str] = (),
     ) -> None:
         """Take a snapshot at each status that a tick publishes."""
         self._measure_folder(now)
@@ -65,7 +68,7 @@ class Observer(Closing):
             if isinstance(output, Publish) and isinstance(message, Status):
                 self._snapshot = Snapshot(
                     now, message, tuple(self.figures.counters.items()),
-                    self.figures.latencies.stages(), dict(subscriptions))
+                    self.figures.latencies.stages(), dict(subscriptions), tuple(unreachable))
 
     def _measure_folder(self, now: float) -> None:
         if self._measurement.done():

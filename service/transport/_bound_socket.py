@@ -1,12 +1,14 @@
 """A socket that the hub binds, with CURVE where others can reach it."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import zmq
 
-from denseface.service.errors import AddressError
+from denseface.service.errors import AddressError, ServiceError
 from denseface.service.monitoring import Rejections
 from denseface.service.security import AllowList, KeyPair
+from denseface.service.transport.addresses import check_socket_file
 from denseface.service.transport.handshakes import Connections, HandshakeMonitor
 from denseface.service.transport.sockets import Socket
 
@@ -37,6 +39,10 @@ class BoundSocket:
         """Tells `connections`, and with credentials counts failed handshakes."""
         self.bound = False
         self._address = address
+        self._file = (
+            Path(address.removeprefix("ipc://")) if address.startswith("ipc://") else None)
+        self._inode: tuple[int, int] | None = None
+        """Of the file that was bound."""
         if credentials:
             socket.set(zmq.CURVE_SERVER, 1)
             socket.set(zmq.CURVE_SECRETKEY, credentials.pair.secret.encode())
@@ -51,13 +57,36 @@ class BoundSocket:
         """Bind, also after `cut`; AddressError where the address cannot be had."""
         if self.bound:
             return
+        self._bind()
+        # With its name resolved, so that binding again asks nobody.
+        self._address = self.socket.get_string(zmq.LAST_ENDPOINT).rstrip("\0")
+        self.bound = True
+
+    def has_its_file(self) -> bool:
+        """Say whether the socket's file, if it has one, is the one that was bound."""
+        return self._file is None or _inode_of(self._file) == self._inode
+
+    def restore_file(self) -> str | None:
+        """Bind once more where the file is not the one that was bound; give why that fails.
+
+        The connections that there are go on: a file is only where new ones come in.
+        """
+        if self._file is None or self.has_its_file():
+            return None
+        try:
+            check_socket_file(self._file)  # libzmq would take another hub's place
+            self._bind()
+        except ServiceError as error:
+            return str(error)
+        return None
+
+    def _bind(self) -> None:
         try:
             self.socket.bind(self._address)
         except zmq.ZMQError as error:
             raise AddressError(f"{self._address}: {zmq.strerror(error.errno or 0)}") from error
-        # With its name resolved, so that binding again asks nobody.
-        self._address = self.socket.get_string(zmq.LAST_ENDPOINT).rstrip("\0")
-        self.bound = True
+        if self._file:
+            self._inode = _inode_of(self._file)
 
     def cut(self) -> None:
         """End all connections, as one alone cannot be ended.
@@ -72,7 +101,17 @@ class BoundSocket:
             self.monitor.forget()
 
     def close(self) -> None:
-        """Close the socket, and its monitor before it."""
+        """Close the socket, its monitor before it, and leave no file of its own behind."""
         if self.monitor:
             self.monitor.close()
         self.socket.close()
+        if self._file and self._inode and self.has_its_file():
+            self._file.unlink(missing_ok=True)
+
+
+def _inode_of(file: Path) -> tuple[int, int] | None:
+    try:
+        found = file.lstat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino

@@ -57,16 +57,22 @@ def check_bindable(address: str) -> None:
     SettingsError where somebody may; HubRunningError where another hub answers there: binding would
     silently take its place.
     """
-    path = socket_file(address)
-    if path is None:
-        return
+    if path := socket_file(address):
+        check_socket_file(path)
+
+
+def check_socket_file(path: Path) -> None:
+    """Make the folder of a socket's file; HubRunningError where another hub answers there.
+
+    SettingsError where the folder cannot be had.
+    """
     socket_folder(path.parent)
     with socket.socket(socket.AF_UNIX) as probe:
         try:
             probe.connect(str(path))
         except OSError:
             return
-    raise HubRunningError(f"{address}: another hub is listening there")
+    raise HubRunningError(f"ipc://{path}: another hub is listening there")
 
 
 def check_connectable(address: str) -> None:

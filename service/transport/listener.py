@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
+import structlog
 import zmq
 
 from denseface.service.errors import AddressError
@@ -24,7 +25,7 @@ from denseface.service.transport._bound_socket import BoundSocket, ServerCredent
 from denseface.service.transport._input_limit import InputLimit
 from denseface.service.transport._routing_ids import RoutingIds
 from denseface.service.transport._subscribers import Subscribers
-from denseface.service.transport.addresses import publications_of, socket_file
+from denseface.service.transport.addresses import publications_of
 from denseface.service.transport.handshakes import end_connection
 
 _TOKEN_BYTES = 8
@@ -43,6 +44,7 @@ _SUBSCRIBES, _UNSUBSCRIBES = b"\1", b"\0"
 """First byte of what an XPUB receives (ZMTP); the topic follows."""
 _LOCAL_USER = AllowedKey("", "", ALL_ROLES)
 """Whoever uses a local listener."""
+_log = structlog.get_logger("hub")
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,8 @@ class Listener:
         self._subscribers = Subscribers(self._input_limit.watch if self._input_limit else None)
         self._mixed_up = False
         """libzmq may take what is read next for another connection's."""
+        self.unreachable: str | None = None
+        """Why nobody can connect any more; None where all is well."""
         router = sockets.open_socket(context, zmq.ROUTER, address)
         router.set(zmq.ROUTER_MANDATORY, 1)
         publisher = sockets.open_socket(context, zmq.XPUB, address)
@@ -107,14 +111,11 @@ class Listener:
         return [*(one.socket for one in both), *(one.monitor.socket for one in both if one.monitor)]
 
     def close(self) -> None:
-        """Unbind and leave no file behind."""
+        """Unbind and leave no file of its own behind."""
         self._router.close()
         self._publisher.close()
         if self._input_limit:
             self._input_limit.close()
-        for address in (self.address, publications_of(self.address)):
-            if path := socket_file(address):
-                path.unlink(missing_ok=True)
 
     def receive(self) -> Iterator[Incoming]:
         """Give the messages that have come, a burst of them at most."""
@@ -195,6 +196,20 @@ class Listener:
         while self._input_limit and self._input_limit.ended:
             self._rejections.note("subscriptions", address=self._input_limit.ended.popleft(),
                                   detail="sends too much to the publications")
+
+    def restore_files(self) -> None:
+        """Bind again where a socket's file was removed, as a log-out does with its folder."""
+        both = self._router, self._publisher
+        if all(one.has_its_file() for one in both):
+            self.unreachable = None
+            return
+        reasons = [reason for one in both if (reason := one.restore_file())]
+        before, self.unreachable = self.unreachable, "; ".join(reasons) or None
+        if self.unreachable is None:
+            _log.warning("the socket's file was gone: listening again", address=self.address)
+        elif self.unreachable != before:
+            _log.error("nobody can connect, the socket's file is gone", address=self.address,
+                       reason=self.unreachable)
 
     def rebind(self) -> None:
         """Listen again where connections were cut."""

@@ -72,6 +72,10 @@ class Listeners:
         """Where the hub listens."""
         return [listener.address for listener in self._listeners]
 
+    def unreachable(self) -> list[str]:
+        """Give why nobody can connect at an address, for each where that is so."""
+        return [one.unreachable for one in self._listeners if one.unreachable]
+
     def close(self) -> None:
         """Close all listeners; the authenticator last."""
         for listener in self._listeners:
@@ -81,10 +85,12 @@ class Listeners:
         self._memory.close()
 
     def tick(self) -> bool:
-        """Apply changes of the allow-list and limits of memory and descriptors.
+        """Apply changes of the allow-list and limits of memory and descriptors; see to the files.
 
         True where peers may have been cut off.
         """
+        for listener in self._listeners:
+            listener.restore_files()
         if self._allow_list is None:
             return False
         self._allow_list.refresh()
