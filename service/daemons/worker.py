@@ -14,6 +14,7 @@ from denseface import recon
 from denseface.recon import ReconstructionError, reconstruct
 from denseface.recon.face import Face
 from denseface.service.protocol import messages
+from denseface.service.protocol.message_base import MAX_JOBS
 from denseface.service.protocol.packing import warm_packing
 from denseface.service.protocol.payload import Arrays, FaceHeader
 from denseface.service.protocol.wire import Packet
@@ -29,8 +30,6 @@ from denseface.service.transport.hub_connection import HubConnection
 
 __all__ = ["run", "warm"]
 
-_MAX_JOBS = 2
-"""The job under way and the one that follows it."""
 _FINISH_S = 3.0
 """Time to finish the job under way when the process stops, seconds; below the supervisor's 5."""
 _log = structlog.get_logger("worker")
@@ -129,10 +128,10 @@ class _Worker:
     def _receive(self, packet: Packet) -> None:
         match packet.message:
             case messages.Announce():
-                if len(self.jobs) < _MAX_JOBS:
+                if len(self.jobs) < MAX_JOBS:
                     self._send_ready()
             case messages.Job() as job:
-                if len(self.jobs) == _MAX_JOBS:  # the hub redelivers what no heartbeat names
+                if len(self.jobs) == MAX_JOBS:  # the hub redelivers what no heartbeat names
                     _log.warning("job dropped, busy", capture_id=job.capture_id)
                     return
                 # Before anything of the job is touched: if that ends this process, the job is why.

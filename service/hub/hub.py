@@ -6,7 +6,7 @@ in `service.protocol.states`.
 """
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 
 import structlog
@@ -19,7 +19,7 @@ from denseface.service.hub.captures import Captures
 from denseface.service.hub.jobs import Jobs
 from denseface.service.hub.maintenance import Maintenance
 from denseface.service.hub.outcomes import Outcomes
-from denseface.service.hub.peers import MAX_PEERS, Peers
+from denseface.service.hub.peers import Peers
 from denseface.service.hub.presses import Presses
 from denseface.service.hub.previews import Previews
 from denseface.service.monitoring import Figures, Rejections
@@ -61,7 +61,8 @@ class Hub:
         self._peers = Peers()
         common = Common(store, Captures(store), self._writer, self._peers, settings)
         self._outcomes = Outcomes(store, self._requeue_damaged)
-        self._jobs = Jobs(common, self._outcomes.publish, self._rejections)
+        self._jobs = Jobs(
+            common, self._outcomes.publish, self._rejections, self._figures.counters)
         self._presses = Presses(
             common, recon, self._jobs.add, opened + settings.silence_s, self._rejections)
         self._maintenance = Maintenance(
@@ -146,6 +147,7 @@ class Hub:
             outputs.extend(self._outcomes.tick(now))
             for peer in self._peers.silent(now - self._settings.silence_s):
                 outputs.extend(self._disconnected(peer, "silent"))
+            self._jobs.tick(now)
             outputs.extend(self._maintenance.tick(now))
             outputs.extend(self._process_writes(now))
             outputs.extend(self._previews.ask(now, busy=len(self._presses) > 0))
@@ -194,7 +196,7 @@ class Hub:
             case messages.Press() as message:
                 yield from self._presses.press(now, peer, message, self._jobs.queued, key)
             case messages.GetFace() as message:
-                yield from self._outcomes.get_face(now, peer, message)
+                yield from self._outcomes.get_face(now, peer, message, key)
             case messages.GetNext() as message:
                 yield from self._outcomes.get_next(peer, message)
             case messages.FindStart() as message:
@@ -206,13 +208,8 @@ class Hub:
                 yield from self._maintenance.receive(peer, message)
             case messages.GetStatus(request=request):
                 yield send(peer, self._status(request))
-            case messages.SensorReady(name=name, source=source):
-                if (self._has_room("sensor", self._peers.sensors, peer, name)
-                        and self._peers.sensor_ready(peer, name, now)):
-                    self._log.info("sensor ready", name=name, source=source)
-            case messages.WorkerReady(name=name, credit=credit):
-                if self._has_room("worker", self._peers.workers, peer, name):
-                    self._worker_ready(now, peer, name, credit)
+            case messages.SensorReady() | messages.WorkerReady() as message:
+                yield from self._peer_ready(now, peer, message, key)
             case messages.Heartbeat(holding=holding):
                 if not self._peers.heartbeat(peer, holding, now):
                     self._peers.ask_for_ready(peer)
@@ -222,32 +219,43 @@ class Hub:
                     self._jobs.hand_back(worker, [*worker.jobs])
                 yield from self._disconnected(peer, "goodbye")
             case messages.Frame() as message:
-                yield from self._presses.frame(peer, message, packet)
+                yield from self._presses.frame(now, peer, message, packet)
             case messages.PreviewFrame() as message:
                 yield from self._previews.receive(peer, message, packet)
             case messages.FrameFailed() as message:
                 yield from self._presses.frame_failed(peer, message)
             case messages.Result() as message:
-                self._jobs.result(peer, message, packet)
+                self._jobs.result(now, peer, message, packet, key)
             case messages.JobFailed() as message:
-                yield from self._jobs.failed(peer, message)
+                yield from self._jobs.failed(now, peer, message, key)
 
     def _requeue_damaged(self, error: errors.DamagedFaceError, kept_before: bool) -> None:
         self._jobs.requeue_damaged(error.capture_id, str(error), reset_attempts=kept_before)
 
-    def _has_room(self, kind: str, known: Collection[bytes], peer: bytes, name: str) -> bool:
-        room = peer in known or len(known) < MAX_PEERS
-        if not room:
-            self._log.error("too many", kind=kind, name=name, most=MAX_PEERS)
-        return room
+    def _peer_ready(
+        self, now: float, peer: bytes, message: messages.SensorReady | messages.WorkerReady,
+        key: str,
+    ) -> Iterator[Output]:
+        """Take a sensor or worker, or tell it that there are too many."""
+        sensor = isinstance(message, messages.SensorReady)
+        known = self._peers.sensors if sensor else self._peers.workers
+        limit = self._peers.too_many(peer, key, known)
+        if limit is not None:
+            why = f"{limit} {'sensors' if sensor else 'workers'} are there already"
+            self._rejections.note("limit", key=key, name=message.name, detail=why)
+            yield send(peer, messages.Denied(message=why))
+        elif isinstance(message, messages.WorkerReady):
+            self._worker_ready(now, peer, message.name, message.credit, key)
+        elif self._peers.sensor_ready(peer, message.name, now, key):
+            self._log.info("sensor ready", name=message.name, source=message.source)
 
-    def _worker_ready(self, now: float, peer: bytes, name: str, credit: int) -> None:
+    def _worker_ready(self, now: float, peer: bytes, name: str, credit: int, key: str) -> None:
         known, asked = self._peers.workers.get(peer), self._peers.was_asked(peer)
         if known is None:
             self._log.info("worker ready", name=name)
         elif credit <= known.credit and not asked:
             self._rejections.note("replayed", name=name, detail=f"credit {credit}")
-        self._peers.worker_ready(peer, name, credit, now)
+        self._peers.worker_ready(peer, name, credit, now, key)
 
     def _disconnected(self, peer: bytes, reason: str) -> Iterator[Output]:
         say = self._log.info if reason == "goodbye" else self._log.warning

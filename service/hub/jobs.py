@@ -1,6 +1,6 @@
 """From a saved frame to an outcome, whatever happens to the workers."""
 
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 
@@ -8,11 +8,17 @@ import structlog
 from pydantic import ValidationError
 
 from denseface.recon.settings import Settings
-from denseface.service.errors import CorruptFileError, ProtocolError, ServiceError, StoreError
+from denseface.service.errors import (
+    CorruptFileError,
+    ProtocolError,
+    ServiceError,
+    StoreError,
+)
 from denseface.service.hub._common import Common
+from denseface.service.hub.answers import Attempts, JobFacts, check_result
 from denseface.service.hub.peers import WorkerPeer
 from denseface.service.hub.unsaved_faces import UnsavedFaces
-from denseface.service.monitoring import Rejections
+from denseface.service.monitoring import Counters, Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState
@@ -22,6 +28,9 @@ from denseface.service.storage import CaptureRow, WriteResult
 
 _LOST = ("WorkerLost", "the worker that held it went away")
 """Error and reason of a job whose worker is gone."""
+_MAX_HANDED_BACK = 16
+"""Times that a capture may be handed back, beyond which each counts as an attempt: else a worker
+that takes and gives it back for ever would keep it from its end."""
 _RETRY_S = 1.0
 """Time after which the disk is tried again that refused something, seconds."""
 
@@ -30,16 +39,20 @@ class Jobs:
     """Frames that wait for a worker or are held by one."""
 
     def __init__(
-        self, common: Common, publish: Callable[[str], Iterator[Output]], rejections: Rejections
+        self, common: Common, publish: Callable[[str], Iterator[Output]], rejections: Rejections,
+        counters: Counters,
     ) -> None:
         """Queue what the store has unfinished; `publish` publishes a capture's outcome."""
         self._store, self._captures, writer, self._peers, settings = common
-        self._attempts = settings.attempts
+        self._max_attempts = settings.attempts
+        # A worker that keeps to this ends itself first: the hub hears no lie, only silence.
+        self._lease_s = settings.job_timeout_s + settings.silence_s
         self._publish = publish
         self._rejections = rejections
+        self._counters = counters
         self._queue = deque(self._store.unfinished())
-        self._last_errors: dict[str, tuple[str, str]] = {}
-        """Error and reason of the last attempt that failed, for a dead letter."""
+        self._attempts: defaultdict[str, Attempts] = defaultdict(Attempts)
+        """Of captures that have no outcome."""
         self._unsaved_faces = UnsavedFaces(self._store, writer)
         self._paused_until = 0.0
         self._log = structlog.get_logger("hub")
@@ -65,16 +78,18 @@ class Jobs:
         """Drop captures that were removed, from the workers' jobs too."""
         self._queue = deque(one for one in self._queue if one not in capture_ids)
         for capture_id in capture_ids:
-            self._last_errors.pop(capture_id, None)
+            self._attempts.pop(capture_id, None)
             self._unsaved_faces.drop(capture_id)
         for worker in self._peers.workers.values():
+            if worker.jobs and worker.jobs[0] in capture_ids:
+                worker.deadline += self._lease_s  # it does not know, and goes on with it first
             worker.jobs = [one for one in worker.jobs if one not in capture_ids]
 
     def requeue_damaged(self, capture_id: str, reason: str, *, reset_attempts: bool = True) -> None:
         """Have a damaged face made again; without `reset_attempts` attempts go on counting."""
         with self._captures.transition(CaptureEvent.DAMAGED, capture_id) as state:
             self._store.reopen(capture_id, state, reset_attempts=reset_attempts)
-        self._last_errors[capture_id] = "CorruptFileError", reason
+        self._attempts[capture_id].last_error = "CorruptFileError", reason
         self.add(capture_id)
         self._log.warning("face to be made again", capture_id=capture_id, reason=reason)
 
@@ -102,22 +117,30 @@ class Jobs:
             stored = self._store.find(capture_id)
             if stored is None or not self._captures.allows(capture_id, CaptureEvent.DISPATCHED):
                 self._queue.popleft()
-            elif stored.attempts >= self._attempts:
-                yield from self._give_up(capture_id, *self._last_errors.get(capture_id, _LOST))
+                if stored is None:
+                    self._attempts.pop(capture_id, None)
+            elif stored.attempts >= self._max_attempts:
+                yield from self._give_up(
+                    capture_id, *(self._attempts[capture_id].last_error or _LOST))
             # A frame that may have killed a worker is tried alone: no other is lost with it.
             elif worker := self._peers.free_worker(alone=stored.attempts > 0):
                 yield from self._send_job(now, capture_id, stored, worker)
             else:
                 return
 
-    def result(self, peer: bytes, message: messages.Result, packet: Packet) -> None:
+    def result(
+        self, now: float, peer: bytes, message: messages.Result, packet: Packet, key: str
+    ) -> None:
         """Begin to save a face, unless this capture has one; `written` is told what came of it."""
         failpoint("hub.result.received")
-        if self._take_answer(peer, message, CaptureEvent.RESULT):
+        if self._take_answer(now, peer, message, CaptureEvent.RESULT, key):
             try:
-                message.face.check(packet.arrays)
+                check_result(message, packet.arrays, self._facts(message.capture_id), now)
                 self._unsaved_faces.save(packet)
             except (ProtocolError, StoreError) as error:
+                if isinstance(error, ProtocolError):
+                    self._rejections.note("untrue", key=key, capture_id=message.capture_id,
+                                          detail=str(error))
                 self._take_back(message.capture_id, type(error).__name__, str(error))
             else:
                 self._captures.advance(message.capture_id, CaptureEvent.RESULT)
@@ -129,6 +152,7 @@ class Jobs:
             capture_id = one.pending.capture_id
             if error is None:
                 self._unsaved_faces.drop(capture_id)
+                self._attempts.pop(capture_id, None)
                 self._log.info("done", capture_id=capture_id)
                 yield from self._publish_safely(capture_id)
                 continue
@@ -146,10 +170,12 @@ class Jobs:
         except StoreError as error:  # subscribers see the gap and ask for it
             self._log.error("not published", capture_id=capture_id, reason=str(error))
 
-    def failed(self, peer: bytes, message: messages.JobFailed) -> Iterator[Output]:
+    def failed(
+        self, now: float, peer: bytes, message: messages.JobFailed, key: str
+    ) -> Iterator[Output]:
         """Publish "no face", or try again."""
         event = CaptureEvent.REJECTED if message.final else CaptureEvent.LOST
-        if not self._take_answer(peer, message, event):
+        if not self._take_answer(now, peer, message, event, key):
             return
         capture_id = message.capture_id
         if not message.final:
@@ -161,25 +187,41 @@ class Jobs:
         except StoreError as error:
             self._take_back(capture_id, type(error).__name__, str(error))
         else:
+            self._attempts.pop(capture_id, None)
             self._log.info("failed", capture_id=capture_id, error=message.error)
             yield from self._publish(capture_id)
 
-    def worker_lost(self, worker: WorkerPeer) -> None:
+    def tick(self, now: float) -> None:
+        """Take the jobs of workers that held one for too long, and forget these workers."""
+        for worker in self._peers.overdue(now):
+            del self._peers.workers[worker.peer]
+            reason = f"a worker held it for more than {self._lease_s:g} s"
+            self._log.warning("worker gone", name=worker.name, reason=reason)
+            self._counters.add("overdue")
+            self.worker_lost(worker, ("JobOverdue", reason))
+
+    def worker_lost(self, worker: WorkerPeer, why: tuple[str, str] = _LOST) -> None:
         """Queue again what a worker held that is gone; only its first job counts as an attempt."""
         self.hand_back(worker, worker.jobs[1:])
         while worker.jobs:
-            self._take_back(worker.jobs.pop(), *_LOST)
+            self._take_back(worker.jobs.pop(), *why)
 
     def hand_back(self, worker: WorkerPeer, capture_ids: Sequence[str]) -> None:
-        """Queue jobs of a worker again; they count as no attempt."""
+        """Queue jobs of a worker again; they count as no attempt, unless that happens too often."""
         for capture_id in reversed(capture_ids):
             worker.jobs.remove(capture_id)
-            try:
-                self._store.undo_attempt(capture_id)
-            except StoreError as error:
-                self._log.warning("attempt still counted", reason=str(error))
+            attempts = self._attempts[capture_id]
+            attempts.handed_back += 1
+            if attempts.handed_back <= _MAX_HANDED_BACK:
+                self._undo_attempt(capture_id)
             self._take_back(capture_id, "HandedBack", "the worker that held it was stopped",
                             CaptureEvent.HANDED_BACK)
+
+    def _undo_attempt(self, capture_id: str) -> None:
+        try:
+            self._store.undo_attempt(capture_id)
+        except StoreError as error:
+            self._log.warning("attempt still counted", reason=str(error))
 
     def _send_job(
         self, now: float, capture_id: str, stored: CaptureRow, worker: WorkerPeer
@@ -193,7 +235,12 @@ class Jobs:
         attempt = self._store.start_attempt(capture_id)
         self._queue.popleft()
         if not worker.jobs:
-            worker.seen = now
+            worker.seen, worker.deadline = now, now + self._lease_s
+        sent = self._attempts[capture_id]
+        if sent.facts is None:
+            sent.facts = JobFacts(settings, kept.message.frame, now)
+            sent.by_earlier_hub = attempt > 1
+        sent.keys.add(worker.key)
         worker.free, worker.alone = False, attempt > 1
         worker.jobs.append(capture_id)
         self._captures.advance(capture_id, CaptureEvent.DISPATCHED)
@@ -207,7 +254,7 @@ class Jobs:
         with self._captures.transition(CaptureEvent.EXHAUSTED, capture_id) as state:
             self._store.fail(capture_id, state, error, reason)
         self._queue.popleft()
-        self._last_errors.pop(capture_id, None)
+        self._attempts.pop(capture_id, None)
         self._log.error("dead letter", capture_id=capture_id, error=error, reason=reason)
         yield from self._publish(capture_id)
 
@@ -233,11 +280,12 @@ class Jobs:
         if capture_id not in self._queue:
             self._log.warning(
                 "to be tried again", capture_id=capture_id, error=error, reason=reason)
-            self._last_errors[capture_id] = error, reason
+            self._attempts[capture_id].last_error = error, reason
             self._queue.appendleft(capture_id)
 
     def _take_answer(
-        self, peer: bytes, answer: messages.Result | messages.JobFailed, event: CaptureEvent
+        self, now: float, peer: bytes, answer: messages.Result | messages.JobFailed,
+        event: CaptureEvent, key: str,
     ) -> bool:
         """Take an answered job from its worker and say whether the answer is expected."""
         capture_id = answer.capture_id
@@ -245,12 +293,13 @@ class Jobs:
         useful = (
             stored is not None and stored.settings_hash == answer.settings_hash
             and stored.frame_sha256 == answer.frame_sha256
-            and self._captures.allows(capture_id, event))
+            and self._captures.allows(capture_id, event) and self._was_sent(stored, key))
         worker = self._peers.workers.get(peer)
         if worker and capture_id in worker.jobs:
             at = worker.jobs.index(capture_id)
             # Jobs are answered in order: the answers to those before it were lost.
             before, worker.jobs = worker.jobs[:at], worker.jobs[at + 1:]
+            worker.deadline = now + self._lease_s
             for one in before if useful else [*before, capture_id]:
                 reason = ("the answer was to another job" if one == capture_id
                           else "its answer was lost")
@@ -259,6 +308,28 @@ class Jobs:
             self._rejections.note(
                 "replayed", capture_id=capture_id, detail=f"{event}, not asked for")
         return useful
+
+    def _was_sent(self, stored: CaptureRow, key: str) -> bool:
+        """Say whether a job was sent to workers of this key, or by an earlier hub to anybody.
+
+        Then its answer names the frame's checksum, which only they know.
+        """
+        known = self._attempts.get(stored.capture_id)
+        if known is None or known.facts is None:
+            return stored.attempts > 0
+        return known.by_earlier_hub or key in known.keys
+
+    def _facts(self, capture_id: str) -> JobFacts:
+        """Give what the job said; StoreError where it has to be read and cannot."""
+        known = self._attempts.get(capture_id)
+        if known and known.facts:
+            return known.facts
+        kept = self._store.frame(capture_id)
+        try:
+            settings = Settings.model_validate_json(kept.metadata.settings)
+        except ValidationError as error:
+            raise CorruptFileError(f"capture {capture_id}: settings of another version") from error
+        return JobFacts(settings, kept.message.frame)
 
     def _holder(self, capture_id: str) -> WorkerPeer | None:
         return next((worker for worker in self._peers.workers.values()

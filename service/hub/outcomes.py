@@ -12,13 +12,14 @@ from denseface.service.storage import FolderStore
 
 _MAX_WAITERS = 1000
 """Requests that may wait for an outcome; beyond, they are answered at once."""
-_MAX_WAITERS_PER_CLIENT = 100
-"""As `_MAX_WAITERS`, of one client."""
+_MAX_WAITERS_PER_KEY = 100
+"""As `_MAX_WAITERS`, with one key; where none is needed, of one client."""
 
 
 class _Waiter(NamedTuple):
     capture_id: str
     deadline: float
+    key: str
 
 
 class Outcomes:
@@ -48,9 +49,10 @@ class Outcomes:
             for peer, request, _ in self._take_waiters([capture_id]):
                 yield _answer(peer, request, packet)
 
-    def _may_wait(self, peer: bytes) -> bool:
-        own = sum(one == peer for one, _ in self._waiters)
-        return len(self._waiters) < _MAX_WAITERS and own < _MAX_WAITERS_PER_CLIENT
+    def _may_wait(self, peer: bytes, key: str) -> bool:
+        own = sum(waiter.key == key if key else one == peer
+                  for (one, _), waiter in self._waiters.items())
+        return len(self._waiters) < _MAX_WAITERS and own < _MAX_WAITERS_PER_KEY
 
     def removed(self, capture_ids: Collection[str]) -> Iterator[Output]:
         """Answer the requests that wait for captures that were removed."""
@@ -64,7 +66,9 @@ class Outcomes:
             del self._waiters[peer, request]
         return waiting
 
-    def get_face(self, now: float, peer: bytes, message: messages.GetFace) -> Iterator[Output]:
+    def get_face(
+        self, now: float, peer: bytes, message: messages.GetFace, key: str = ""
+    ) -> Iterator[Output]:
         """Send an outcome, or let the request wait for it."""
         capture_id, request = message.capture_id, message.request
         try:
@@ -78,8 +82,8 @@ class Outcomes:
             yield send(peer, messages.CaptureUnknown(request=request, capture_id=capture_id))
         elif (peer, request) in self._waiters:
             return  # a repeat: its wait does not begin anew
-        elif message.wait_s > 0 and self._may_wait(peer):
-            self._waiters[peer, request] = _Waiter(capture_id, now + message.wait_s)
+        elif message.wait_s > 0 and self._may_wait(peer, key):
+            self._waiters[peer, request] = _Waiter(capture_id, now + message.wait_s, key)
         else:
             yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
 
@@ -111,7 +115,7 @@ class Outcomes:
     def tick(self, now: float) -> Iterator[Output]:
         """Answer the requests whose wait is over."""
         for peer, request in [key for key, one in self._waiters.items() if now >= one.deadline]:
-            capture_id, _ = self._waiters.pop((peer, request))
+            capture_id = self._waiters.pop((peer, request)).capture_id
             yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
 
 

@@ -1,13 +1,16 @@
 """The sensors and workers that are connected to the hub, and whether they are alive."""
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from denseface.service.protocol.message_base import MAX_JOBS
 from denseface.service.runtime.bounded_dict import BoundedDict
 
 MAX_PEERS = 256
 """Most sensors, and most workers: so many fit into a `Status`. Others are not taken."""
-
-
+MAX_PEERS_PER_KEY = 64
+"""Most sensors, and most workers, that connect with one key: one key is one machine."""
 _MAX_ANNOUNCED = 2 * MAX_PEERS
 """Peers of which it is remembered that they were asked to say that they are ready."""
 
@@ -20,6 +23,8 @@ class SensorPeer:
     name: str
     seen: float
     """When it last said something, seconds."""
+    key: str = ""
+    """Fingerprint of its key; empty where it needed none."""
 
 
 @dataclass
@@ -30,12 +35,16 @@ class WorkerPeer:
     name: str
     seen: float
     """When it last said something, and that it holds a job where it was sent one; seconds."""
+    key: str = ""
+    """As of a sensor."""
     credit: int = -1
     """The last `WorkerReady.credit` heard."""
     free: bool = False
     """Ready for one more job."""
     jobs: list[str] = field(default_factory=list)
     """Captures sent and not answered, in order: it works on the first."""
+    deadline: float = math.inf
+    """When the first is taken back, whatever it says; seconds."""
     alone: bool = False
     """No job is to be sent beside the last one."""
 
@@ -50,15 +59,15 @@ class Peers:
         default_factory=lambda: BoundedDict(_MAX_ANNOUNCED))
     """How often a peer was asked to say that it is ready, less the times that it did."""
 
-    def sensor_ready(self, peer: bytes, name: str, now: float) -> bool:
+    def sensor_ready(self, peer: bytes, name: str, now: float, key: str = "") -> bool:
         """Add a sensor; True where it is new."""
         new = peer not in self.sensors
-        self.sensors[peer] = SensorPeer(peer, name, now)
+        self.sensors[peer] = SensorPeer(peer, name, now, key)
         return new
 
-    def worker_ready(self, peer: bytes, name: str, credit: int, now: float) -> None:
+    def worker_ready(self, peer: bytes, name: str, credit: int, now: float, key: str = "") -> None:
         """Mark a worker as free, unless this credit was used before."""
-        worker = self.workers.setdefault(peer, WorkerPeer(peer, name, now))
+        worker = self.workers.setdefault(peer, WorkerPeer(peer, name, now, key))
         if credit > worker.credit:
             worker.credit, worker.free, worker.seen = credit, True, now
 
@@ -97,20 +106,40 @@ class Peers:
         """Allow every peer so much more silence."""
         for one in self._all():
             one.seen += seconds
+        for worker in self.workers.values():
+            worker.deadline += seconds
 
     def free_worker(self, *, alone: bool) -> WorkerPeer | None:
         """Return the free worker with the fewest jobs; one without any where the job is `alone`."""
-        free = [worker for worker in self.workers.values() if worker.free and (
-            not worker.jobs or not (alone or worker.alone))]
+        free = [worker for worker in self.workers.values()
+                if worker.free and len(worker.jobs) < MAX_JOBS
+                and (not worker.jobs or not (alone or worker.alone))]
         return min(free, key=lambda worker: len(worker.jobs), default=None)
 
     def sensor(self) -> SensorPeer | None:
         """Return the sensor that connected first."""
         return next(iter(self.sensors.values()), None)
 
+    def overdue(self, now: float) -> list[WorkerPeer]:
+        """Return the workers whose first job should have been answered."""
+        return [worker for worker in self.workers.values()
+                if worker.jobs and now >= worker.deadline]
+
     def silent(self, before: float) -> list[bytes]:
         """Return the peers that said nothing since a time."""
         return [one.peer for one in self._all() if one.seen < before]
+
+    @staticmethod
+    def too_many(
+        peer: bytes, key: str, known: Mapping[bytes, SensorPeer | WorkerPeer]
+    ) -> int | None:
+        """Give the limit that a new sensor or worker would exceed; None where there is room."""
+        if peer in known:
+            return None
+        if len(known) >= MAX_PEERS:
+            return MAX_PEERS
+        own = sum(one.key == key for one in known.values())
+        return MAX_PEERS_PER_KEY if key and own >= MAX_PEERS_PER_KEY else None
 
     def _all(self) -> list[SensorPeer | WorkerPeer]:
         return [*self.sensors.values(), *self.workers.values()]

@@ -1,8 +1,10 @@
 """From a press to a frame that is safe on the disk, or to a refusal."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
+from typing import NamedTuple, TypeAlias
 
 import structlog
 
@@ -21,7 +23,11 @@ from denseface.service.storage import WriteResult
 _MIB = 2**20
 """Bytes."""
 _MAX_REFUSALS = 1000
-"""Refusals that are remembered for a repeat of their request."""
+"""Refusals of one key that are remembered for a repeat of their request."""
+_MAX_PRESSES_PER_KEY = 64
+"""Presses of one key that may wait for their frame; beyond, they are refused."""
+_MAX_PRESSERS = 64
+"""Clients that are told what became of one press; others hear it when they repeat theirs."""
 _MAX_SAVING = 32
 """Frames in memory that are being written; beyond, presses are refused."""
 
@@ -31,18 +37,31 @@ def settings_hash(settings: Settings) -> str:
     return sha256(settings.model_dump_json().encode()).hexdigest()[:16]
 
 
+_Refusals: TypeAlias = BoundedDict[tuple[bytes, str, int], messages.PressRefused]
+"""How the last requests were refused, so that a repeat of one gets the same answer."""
+
+
+class _Presser(NamedTuple):
+    request: int
+    """The last one."""
+    key: str
+
+
 @dataclass
 class _Press:
     """A capture whose frame is not yet on the disk."""
 
     sensor: bytes
     deadline: float
+    """Until then the frame is to come, and then to be written; seconds."""
     key: str
     """Fingerprint of the first presser's key; empty where it needed none."""
-    pressers: dict[bytes, int] = field(default_factory=dict)
-    """The last request of each client that pressed this id."""
+    pressers: dict[bytes, _Presser] = field(default_factory=dict)
+    """The clients that pressed this id."""
     frame_sender: bytes | None = None
     """The sensor whose frame is being written; None before it came."""
+    late: bool = False
+    """Whether the disk has not answered for so long that nobody waits for it any more."""
 
 
 class Presses:
@@ -68,9 +87,9 @@ class Presses:
         self._recon = recon
         self._recon_hash = settings_hash(recon)
         self._presses: dict[str, _Press] = {}
-        self._refused: BoundedDict[
-            tuple[bytes, str, int], messages.PressRefused] = BoundedDict(_MAX_REFUSALS)
-        """How the last requests were refused, so that a repeat of one gets the same answer."""
+        self._refused: defaultdict[str, _Refusals] = defaultdict(
+            lambda: BoundedDict(_MAX_REFUSALS))
+        """By key: nobody makes the hub forget what it said to another."""
         self._log = structlog.get_logger("hub")
 
     def __len__(self) -> int:
@@ -81,12 +100,12 @@ class Presses:
     ) -> Iterator[Output]:
         """Ask a sensor for a frame, unless this id is known already."""
         capture_id, request = message.capture_id, message.request
-        if refused := self._refused.get((peer, capture_id, request)):
+        if refused := self._refused[key].get((peer, capture_id, request)):
             # A repeat that crossed its answer: the client has told its user already.
             yield send(peer, refused)
             return
         if press := self._presses.get(capture_id):
-            press.pressers[peer] = request
+            yield from self._press_again(press, peer, _Presser(request, key))
             return
         if self._store.retention.is_erasing(capture_id):
             return  # the client repeats it in a moment
@@ -96,20 +115,34 @@ class Presses:
         sensor = self._peers.sensor()
         if sensor is None and now < self._sensors_due:
             return  # the client repeats it in a moment
-        obstacle = self._obstacle(queued)
+        presser = _Presser(request, key)
+        obstacle = self._obstacle(queued, key)
         if sensor is None or obstacle:
             reason, why = obstacle or ("no_sensor", "no sensor is connected")
-            yield from self._refuse_all(capture_id, {peer: request}, reason, why)
+            yield from self._refuse_all(capture_id, {peer: presser}, reason, why)
             return
         self._captures.advance(capture_id, CaptureEvent.PRESSED)
         self._log.info("pressed", capture_id=capture_id, sensor=sensor.name)
         deadline = now + self._settings.take_timeout_s
-        self._presses[capture_id] = _Press(sensor.peer, deadline, key, {peer: request})
+        self._presses[capture_id] = _Press(sensor.peer, deadline, key, {peer: presser})
         yield send(sensor.peer, messages.Take(capture_id=capture_id))
 
-    def _obstacle(self, queued: int) -> tuple[messages.PressReason, str] | None:
+    def _press_again(self, press: _Press, peer: bytes, presser: _Presser) -> Iterator[Output]:
+        if peer in press.pressers or len(press.pressers) < _MAX_PRESSERS:
+            press.pressers[peer] = presser
+        if press.late:
+            yield self._not_known(peer, presser)
+
+    def _obstacle(self, queued: int, key: str) -> tuple[messages.PressReason, str] | None:
         if queued + len(self) >= self._settings.queue:
             return "queue", f"{self._settings.queue} frames wait for a worker already"
+        own = sum(press.key == key for press in self._presses.values()) if key else 0
+        if own >= _MAX_PRESSES_PER_KEY:
+            why = f"{own} presses of this key wait for their frame already"
+            self._rejections.note("limit", key=key, detail=why)
+            return "queue", why
+        if any(press.late for press in self._presses.values()):
+            return "disk", f"the disk does not answer ({self._settings.take_timeout_s:g} s)"
         if sum(press.frame_sender is not None for press in self._presses.values()) >= _MAX_SAVING:
             return "disk", f"{_MAX_SAVING} frames wait for the disk already"
         try:
@@ -122,7 +155,9 @@ class Presses:
                 "to stay free for the faces of what was accepted)")
         return None
 
-    def frame(self, peer: bytes, message: messages.Frame, packet: Packet) -> Iterator[Output]:
+    def frame(
+        self, now: float, peer: bytes, message: messages.Frame, packet: Packet
+    ) -> Iterator[Output]:
         """Begin to save a frame; `written` is told what came of it."""
         failpoint("hub.frame.received")
         capture_id = message.capture_id
@@ -139,7 +174,7 @@ class Presses:
             yield send(peer, messages.FrameRefused(
                 capture_id=capture_id, message="another sensor was asked"))
             return
-        press.frame_sender = peer
+        press.frame_sender, press.deadline = peer, now + self._settings.take_timeout_s
         self._captures.advance(capture_id, CaptureEvent.FRAME_RECEIVED)
         try:
             pending = self._store.prepare_frame(packet, self._recon, self._recon_hash, press.key)
@@ -165,8 +200,9 @@ class Presses:
         self._accepted(capture_id)
         if press.frame_sender is not None:
             yield send(press.frame_sender, messages.FrameAccepted(capture_id=capture_id))
-        for presser, request in press.pressers.items():
-            yield send(presser, messages.PressAccepted(request=request, capture_id=capture_id))
+        for peer, presser in press.pressers.items():
+            yield send(peer, messages.PressAccepted(
+                request=presser.request, capture_id=capture_id))
 
     def _not_saved(self, capture_id: str, error: Exception) -> Iterator[Output]:
         if (sender := self._presses[capture_id].frame_sender) is not None:
@@ -196,13 +232,14 @@ class Presses:
             yield from self._refuse_all(capture_id, press.pressers, reason, why)
 
     def _refuse_all(
-        self, capture_id: str, pressers: dict[bytes, int], reason: messages.PressReason, why: str
+        self, capture_id: str, pressers: Mapping[bytes, _Presser], reason: messages.PressReason,
+        why: str,
     ) -> Iterator[Output]:
         self._log.warning("press refused", capture_id=capture_id, reason=why)
-        for peer, request in pressers.items():
+        for peer, (request, key) in pressers.items():
             refused = messages.PressRefused(
                 request=request, capture_id=capture_id, reason=reason, message=why)
-            self._refused[peer, capture_id, request] = refused
+            self._refused[key][peer, capture_id, request] = refused
             yield send(peer, refused)
 
     def purge(self, capture_id: str | None) -> Iterator[Output]:
@@ -217,8 +254,21 @@ class Presses:
             yield from self._refuse(capture_id, "sensor_gone", f"the sensor went away ({reason})")
 
     def tick(self, now: float) -> Iterator[Output]:
-        """Refuse presses whose frame is late."""
+        """Refuse presses whose frame is late; let nobody wait for a disk that does not answer."""
         why = f"no frame from the sensor in {self._settings.take_timeout_s:g} s"
         for capture_id in [key for key, press in self._presses.items()
                            if now >= press.deadline and press.frame_sender is None]:
             yield from self._refuse(capture_id, "timeout", why)
+        for capture_id, press in self._presses.items():
+            if now < press.deadline or press.late or press.frame_sender is None:
+                continue
+            press.late = True
+            self._log.error("disk does not answer", capture_id=capture_id)
+            for peer, presser in press.pressers.items():
+                yield self._not_known(peer, presser)
+
+    def _not_known(self, peer: bytes, presser: _Presser) -> Output:
+        """Say that nobody can say whether there will be a capture: its file may appear yet."""
+        return send(peer, messages.RequestFailed(request=presser.request, message=(
+            f"the disk has not answered for {self._settings.take_timeout_s:g} s; whether the frame "
+            "is kept is not known, press the same id again to learn it")))

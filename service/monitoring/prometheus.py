@@ -18,6 +18,7 @@ COUNTERS: dict[str, tuple[str, str | None, str]] = {
     "failed": ("failed", None, "Captures published as without a face."),
     "dead": ("dead", None, "Captures given up after repeated attempts."),
     "redelivered": ("redelivered", None, "Jobs given out again."),
+    "overdue": ("overdue", None, "Jobs taken back from workers that held them for too long."),
     "removed": ("removed", "by", "Captures removed."),
     "refused": ("refused", "reason", "Connections and messages refused."),
     "drops": ("publication_drops", "topic",

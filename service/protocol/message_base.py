@@ -26,6 +26,8 @@ Number = Annotated[int, Field(ge=0, lt=2**63)]
 """A count or a number in a sequence; SQLite and other languages have it in 64 bits."""
 Seconds = Annotated[float, Field(ge=0, le=3600)]
 """How long a request may wait."""
+MAX_JOBS = 2
+"""Jobs that a worker has at once: the one under way and the one that follows it."""
 
 
 def _utc(moment: datetime) -> datetime:

@@ -168,6 +168,26 @@ def test_messages_are_lost_doubled_and_reordered(scene, seed):
         assert all(proxies[0].counts[fate] for fate in ("lost", "doubled", "delayed", "passed"))
 
 
+def test_frames_that_kill_their_worker_end_as_dead_letters_and_the_rest_goes_on(scene):
+    attempts = 2
+    running = scene(environment=PATIENT | {"DENSEFACE_ATTEMPTS": str(attempts)})
+    (worker,) = running.cluster.workers
+    first = running.cluster.token("worker.job.computing")
+    first.touch()
+    pressed = running.press("poison", 2)
+    until(pressed.done, "two accepted presses")
+    for deaths in range(1, 2 * attempts + 1):
+        until(lambda: not first.exists(), f"death {deaths}")
+        if deaths < 2 * attempts:
+            first.touch()
+    running.settle()
+    running.press("after")
+    running.settle()
+    assert worker.starts == 1 + 2 * attempts
+    assert running.cluster.hub.starts == 1
+    check(running, done=1, dead=2)
+
+
 def test_slow_and_dead_subscribers_hurt_only_themselves(scene):
     running = scene()
     with zmq.Context() as context, context.socket(zmq.SUB) as deaf:

@@ -16,7 +16,7 @@ def small_frame(seed: int = 0) -> RgbdFrame:
 
 
 def small_face(rows: int = 12, columns: int = 9, step: float = 2.0) -> Face:
-    """A dome over a grid with its corner cells missing."""
+    """A dome over a grid with its corner cells missing, as a face of a `small_frame`."""
     v, u = np.mgrid[:rows, :columns]
     keep = (u + v > 1) & (u + v < rows + columns - 3)
     v, u = v[keep], u[keep]
@@ -27,10 +27,10 @@ def small_face(rows: int = 12, columns: int = 9, step: float = 2.0) -> Face:
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     colors = np.stack([u * 20, v * 15, np.full_like(u, 90)], axis=1).astype(np.uint8)
     report = Report(
-        capture_id="", face_box=(1, 2, 30, 30), candidates=(), initial_points=len(points[::4]),
-        dense_points=len(points), mean_spacing_mm=2 * step, r0_mm=8 * step, noise_mm=0.5,
-        timings_ms={"total": 1.0}, settings=Settings(), calibration="made up", skew_us=0,
-        version="0")
+        capture_id="", face_box=(1, 2, 5, 4), candidates=(), initial_points=len(points[::4]),
+        dense_points=len(points), mean_spacing_mm=2 * step, r0_mm=Settings().r0_factor * 2 * step,
+        noise_mm=0.5, timings_ms={"total": 1.0}, settings=Settings(), calibration="unspecified",
+        skew_us=-1000, version="0")
     return Face(
         PointCloud(points[::4].copy(), colors[::4].copy()),
         DenseCloud(points, colors, normals.astype(np.float32),

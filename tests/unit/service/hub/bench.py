@@ -33,8 +33,10 @@ class Bench:
     now: float = 100.0
     published: list[BaseMessage] = field(default_factory=list)
 
-    def say(self, peer: bytes, message, arrays=None) -> list[tuple[bytes, BaseMessage]]:
-        return self._sent(self.hub.receive(self.now, peer, Packet(message, arrays or {})))
+    def say(
+        self, peer: bytes, message, arrays=None, key: str = ""
+    ) -> list[tuple[bytes, BaseMessage]]:
+        return self._sent(self.hub.receive(self.now, peer, Packet(message, arrays or {}), key))
 
     def wait(self, seconds: float) -> list[tuple[bytes, BaseMessage]]:
         self.now += seconds

@@ -2,7 +2,7 @@
 
 Besides what `test_hub_orders` tries: messages of every kind with wrong fields, replays by others,
 strangers, peers that are sensor and worker at once, and crowds. Each passes the decoder first, and
-all that the hub says must be fit to be written.
+all that the hub says must be fit to be written; after each, so must be its status and its metrics.
 """
 
 import json
@@ -13,13 +13,18 @@ from random import Random
 from tempfile import TemporaryDirectory
 
 import pytest
+from prometheus_client import generate_latest
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import ProtocolError
 from denseface.service.hub import Hub
 from denseface.service.hub.peers import MAX_PEERS
+from denseface.service.monitoring import Figures
+from denseface.service.monitoring.message_watch import MessageWatch
+from denseface.service.monitoring.observer import Snapshot
+from denseface.service.monitoring.prometheus import Metrics
 from denseface.service.protocol import messages
-from denseface.service.protocol.outgoing import Output, Publish
+from denseface.service.protocol.outgoing import Output, Publish, steps
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, decode_from_hub, decode_to_hub, encode
 from denseface.service.security.permissions import ROLES_BY_KIND
@@ -35,6 +40,7 @@ _MEMORY = Path("/dev/shm")  # noqa: S108
 """Syncing is not what is tested here."""
 IDS = ("a", "b", "c", "d")
 PEERS = tuple(b"p%d" % number for number in range(6))
+KEYS = ("", "", "c0ffee")
 OPERATOR = {messages.Purge, messages.DropDead, messages.RetryDead}
 CORPUS = [parts for parts in encoded() if json.loads(parts[0])["kind"] in ROLES_BY_KIND]
 
@@ -63,9 +69,23 @@ class Hostile:
 
     def start(self) -> None:
         self.writer = StepWriter(lambda: None, lambda _: None)
-        self.hub = Hub(self.store, SETTINGS, Settings(), writer=self.writer)
+        self.figures = Figures()
+        self.watch = MessageWatch(self.figures)
+        self.hub = Hub(self.store, SETTINGS, Settings(), self.figures, writer=self.writer)
+        self.metrics = Metrics(self.snapshot).registry
 
-    def handle(self, outputs: list[Output]) -> None:
+    def snapshot(self) -> Snapshot:
+        """What is shown of the hub, as it would be read from a message."""
+        (answer,) = self.hub.receive(self.now, b"looks", Packet(messages.GetStatus(request=1)))
+        status = decode_from_hub(encode(answer.packet)).message
+        assert isinstance(status, messages.Status), status
+        return Snapshot(self.now, status, tuple(self.figures.counters.items()),
+                        self.figures.latencies.stages())
+
+    def handle(self, outputs: list[Output], caused_by: Packet | None = None) -> None:
+        for step in steps(outputs):
+            self.watch.record(self.now, caused_by, step)
+            caused_by = None
         for output in outputs:
             message = decode_from_hub(encode(output.packet)).message
             match message:
@@ -83,7 +103,8 @@ class Hostile:
             return
         self.taken += 1
         self.heard = [*self.heard[-50:], parts]
-        self.handle(self.hub.receive(self.now, peer, packet))
+        self.handle(self.hub.receive(self.now, peer, packet, self.rng.choice(KEYS)), packet)
+        assert generate_latest(self.metrics)
         kept = {one for one in self.accepted if self.store.find(one)}
         if type(packet.message) in OPERATOR:
             self.accepted = kept

@@ -80,8 +80,35 @@ def test_a_frame_that_came_is_kept_whatever_the_sensor_does_then(bench):
     bench.frame()
     assert bench.say(SENSOR, messages.FrameFailed(capture_id="a", message="?")) == []
     assert bench.say(SENSOR, messages.Goodbye()) == []
-    assert bench.wait(SETTINGS.take_timeout_s + 1) == []
+    assert bench.wait(SETTINGS.take_timeout_s - 1) == []
     assert (CLIENT, "press_accepted") in kinds(bench.written())
+
+
+def test_nobody_waits_for_a_disk_that_does_not_answer(bench):
+    bench.press(request=7)
+    bench.frame()
+    (said,) = bench.wait(SETTINGS.take_timeout_s)
+    assert (said[0], said[1].kind, said[1].request) == (CLIENT, "request_failed", 7)
+    assert "the disk has not answered for 10 s" in said[1].message
+    assert bench.wait(1) == []  # once
+    assert kinds(bench.press(request=8)) == [(CLIENT, "request_failed")]
+    bench.sensor()
+    (refused,) = bench.press("b", request=9)
+    assert (refused[1].kind, refused[1].reason) == ("press_refused", "disk")
+    assert kinds(bench.written()) == [(SENSOR, "frame_accepted"), (CLIENT, "press_accepted")]
+    assert kinds(bench.press(request=10)) == [(CLIENT, "press_accepted")]
+    assert kinds(bench.press("b", request=11)) == [(SENSOR, "take")]
+
+
+def test_a_frame_that_is_refused_late_is_refused(bench):
+    bench.press(request=7)
+    bench.frame()
+    bench.wait(SETTINGS.take_timeout_s)
+    bench.full = True
+    assert kinds(bench.written()) == [(SENSOR, "frame_refused"), (CLIENT, "press_refused")]
+    bench.full = False
+    bench.sensor()
+    assert kinds(bench.press(request=8)) == [(SENSOR, "take")]
 
 
 def test_a_frame_that_cannot_be_written_is_refused_and_may_be_pressed_again(bench):
