@@ -17,6 +17,7 @@ def run(args: argparse.Namespace) -> int:
     from denseface.service.daemons.startup import start_process
 
     start_process("up", args.log)
+    from denseface.service.daemons.service_manager import ServiceManager
     from denseface.service.daemons.supervisor import Supervisor, check_settings, process_table
 
     settings = _options.service_settings(args)
@@ -28,7 +29,8 @@ def run(args: argparse.Namespace) -> int:
         hub=_options.repeated(args, "data", "keys", "key", "listen", "retention", "metrics",
                               "preset", "set"),
         capture=_options.repeated(args, "source", "calibration"))
-    return Supervisor(table, max(settings.hang_timeout_s, settings.silence_s)).run()
+    with ServiceManager(os.environ) as manager:
+        return Supervisor(table, max(settings.hang_timeout_s, settings.silence_s), manager).run()
 
 
 def _worker_count(text: str) -> int:

@@ -7,6 +7,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 from denseface.service.runtime.signals import PARENT_VARIABLE
@@ -23,8 +24,7 @@ _STORM_S = 60.0
 _STORM_RESTARTS = 5
 """More restarts than this in `_STORM_S`: something is wrong that a restart does not mend."""
 _START_S = 600.0
-"""Longest silence of a process that has said nothing yet, seconds: it may have kernels to compile,
-or a large data folder to read."""
+"""Longest start, seconds: there may be kernels to compile, or a large data folder to read."""
 
 
 @dataclass(frozen=True)
@@ -93,10 +93,19 @@ class WatchedProcess:
     """The last sign of life; None while it starts."""
     _heard: float = 0.0
     """When that came, or it was started: seconds of the supervisor's `AttendedClock`."""
+    _ticks: int = 0
+    """Processor time that it had used when that last grew, clock ticks."""
+    _worked: float = 0.0
+    """When that was, as `_heard`."""
     _killed: bool = False
     """Because it hung."""
     _restarts: deque[float] = field(default_factory=deque)
     """Times of those that count for a storm, by the monotonic clock, seconds."""
+
+    @property
+    def started(self) -> bool:
+        """Whether the process that runs has given a sign of life."""
+        return self._beat is not None
 
     def start(self, attended: float) -> None:
         """Start the process now, `attended` by the supervisor's `AttendedClock`."""
@@ -114,18 +123,25 @@ class WatchedProcess:
             link.close()
             raise
         link.started()
-        self._link, self._beat, self._heard, self._killed = link, None, attended, False
+        self._link, self._beat, self._killed = link, None, False
+        self._heard, self._worked, self._ticks = attended, attended, 0
 
     def kill_if_hung(self, attended: float, limit_s: float) -> float:
         """Read what the process said and kill it where it has been silent for longer than a limit.
 
-        One that starts has longer. Gives its silence, seconds; 0 where it was not killed now.
+        One that starts has longer, as long as it does something. Gives its silence, seconds; 0
+        where it was not killed now.
         """
         if self.running is None or self._killed:
             return 0.0
         self._listen(attended)
         silence = attended - self._heard
-        if silence <= (max(limit_s, _START_S) if self._beat is None else limit_s):
+        if self._beat is None and silence <= max(limit_s, _START_S):
+            ticks = _processor_ticks(self.running.pid)
+            if ticks != self._ticks:
+                self._ticks, self._worked = ticks, attended
+            silence = attended - self._worked
+        if silence <= limit_s:
             return 0.0
         self._killed = True
         self.running.kill()  # SIGTERM would wait for SIGCONT where it is stopped
@@ -171,3 +187,10 @@ class WatchedProcess:
     def _listen(self, attended: float) -> None:
         if self._link is not None and (beat := self._link.last_beat()):
             self._beat, self._heard = beat, attended
+
+
+def _processor_ticks(pid: int) -> int:
+    """Give the processor time of a process, user and system; see proc(5)."""
+    stat = Path(f"/proc/{pid}/stat").read_text()
+    fields = stat.rpartition(")")[2].split()  # after the name, which may hold anything
+    return int(fields[11]) + int(fields[12])

@@ -15,6 +15,7 @@ from denseface.service.daemons._watched_process import (
     ProcessSpec,
     WatchedProcess,
 )
+from denseface.service.daemons.service_manager import ServiceManager
 from denseface.service.daemons.startup import ONE_THREAD
 from denseface.service.errors import AddressError
 from denseface.service.runtime.signals import StopSignal
@@ -75,15 +76,21 @@ class Supervisor:
     ----------
     table : the hub first
     hang_timeout_s : silence after which a process is ended, seconds
+    manager : is told that the hub is ready, and at each look that the supervisor lives
     """
 
-    def __init__(self, table: Sequence[ProcessSpec], hang_timeout_s: float = 30.0) -> None:
+    def __init__(self, table: Sequence[ProcessSpec], hang_timeout_s: float = 30.0,
+                 manager: ServiceManager | None = None) -> None:
         self._processes = [WatchedProcess(spec) for spec in table]
         self._hang_timeout_s = hang_timeout_s
-        self._look_s = min(hang_timeout_s / _LOOKS, _LOOK_MAX_S)
+        self._manager = manager or ServiceManager({})
+        limits_s = hang_timeout_s, self._manager.limit_s or hang_timeout_s
+        self._look_s = min(min(limits_s) / _LOOKS, _LOOK_MAX_S)
         self._clock = AttendedClock(self._look_s)
         self._told = False
         """Whether the hub that runs knows the counts of restarts."""
+        self._ready = False
+        """Whether there was a hub that ran."""
         self._log = structlog.get_logger("supervisor")
 
     def run(self) -> int:
@@ -96,11 +103,13 @@ class Supervisor:
             try:
                 return self._watch(stop)
             finally:
+                self._manager.say("STOPPING=1")
                 self._stop_all()
 
     def _watch(self, stop: StopSignal) -> int:
         while True:
-            self._start_due()
+            if status := self._start_due():
+                return status
             self._tell_hub()
             waiting = [process.due for process in self._processes if process.running is None]
             next_start = min(waiting, default=math.inf) - time.monotonic()
@@ -113,20 +122,34 @@ class Supervisor:
                 if end and (status := self._ended(process, end)):
                     return status
             self._kill_hung()
+            self._tell_manager()
 
-    def _start_due(self) -> None:
+    def _start_due(self) -> int:
+        """Start what is to be started; give the status with which all stop, or 0."""
         now, attended = time.monotonic(), self._clock.look()
         for process in self._processes:
             if process.running is None and now >= process.due:
-                process.start(attended)
+                try:
+                    process.start(attended)
+                except OSError as error:  # no memory, no descriptor: it may be there again soon
+                    self._log.error("cannot be started", name=process.spec.name, reason=str(error))
+                    if not process.plan_restart(now) and process.spec.vital:
+                        return 1
                 if process is self._processes[0]:
                     self._told = False
+        return 0
 
     def _tell_hub(self) -> None:
         if not self._told:
             self._told = self._processes[0].send_restarts({
                 process.spec.name: dict(process.counts)
                 for process in self._processes if process.counts})
+
+    def _tell_manager(self) -> None:
+        self._manager.say("WATCHDOG=1")
+        if not self._ready and self._processes[0].started:
+            self._ready = True
+            self._manager.say("READY=1")
 
     def _kill_hung(self) -> None:
         attended = self._clock.look()

@@ -10,7 +10,7 @@ import pytest
 
 from denseface.service.daemons._watched_process import AttendedClock, ProcessSpec, WatchedProcess
 from denseface.service.daemons.supervisor import Supervisor, process_table
-from tests.waiting import PATIENCE, until
+from tests.waiting import LIMIT_S, PATIENCE, until
 
 _WATCHED = "denseface.service.daemons._watched_process"
 
@@ -139,16 +139,50 @@ def test_death_after_work_is_one(run_in_turn, monkeypatch):
     assert run_in_turn(DIES, DIES, ENOUGH) == 1
 
 
-def test_who_starts_may_be_silent_for_longer(monkeypatch):
+@pytest.fixture
+def starting(monkeypatch):
+    """Give a process that has said nothing yet, and the processor time that it has used."""
+    used = [0]
+    monkeypatch.setattr(f"{_WATCHED}._processor_ticks", lambda _: used[0])
     monkeypatch.setattr(f"{_WATCHED}.sys.executable", "/bin/true")
     process = WatchedProcess(ProcessSpec("x", ()))
     process.start(attended=5.0)
-    assert process.kill_if_hung(605.0, limit_s=1.0) == 0.0
+    yield process, used
+    if process.running:
+        until(process.ended)
+
+
+def test_who_does_something_may_take_long_to_start(starting):
+    process, used = starting
+    for now in range(5, 606, 30):
+        used[0] += 1
+        assert process.kill_if_hung(now, limit_s=30.0) == 0.0
     assert process.kill_if_hung(606.0, limit_s=1000.0) == 0.0
-    assert process.kill_if_hung(606.0, limit_s=1.0) == 601.0
-    assert process.kill_if_hung(9999.0, limit_s=1.0) == 0.0  # it was killed already
-    end = until(process.ended)
+    assert process.kill_if_hung(606.0, limit_s=30.0) == 601.0
+    assert process.kill_if_hung(9999.0, limit_s=30.0) == 0.0  # it was killed already
+    process.running.wait(LIMIT_S)
+    end = process.ended()
     assert (end.reason, end.holding, process.counts) == ("hung", False, {"hung": 1})
+
+
+def test_who_does_nothing_hangs_from_the_start(starting):
+    process, used = starting
+    used[0] = 7
+    assert process.kill_if_hung(10.0, limit_s=30.0) == 0.0
+    assert process.kill_if_hung(40.0, limit_s=30.0) == 0.0
+    assert process.kill_if_hung(41.0, limit_s=30.0) == 31.0
+
+
+def test_what_is_stopped_before_its_first_word_is_replaced(run_in_turn, capsys):
+    assert run_in_turn("kill(signal.SIGSTOP)", ENOUGH, hang_timeout_s=0.4 * PATIENCE) == 2
+    assert "hangs, killed" in capsys.readouterr().out
+
+
+def test_what_cannot_be_started_is_tried_again(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(f"{_WATCHED}.sys.executable", str(tmp_path / "missing"))
+    monkeypatch.setattr(f"{_WATCHED}._BACKOFF_S", 0.0)
+    assert Supervisor([ProcessSpec("x", ())]).run() == 1
+    assert capsys.readouterr().out.count("cannot be started") == 6
 
 
 def test_an_owner_that_was_away_blames_nobody_for_it():
