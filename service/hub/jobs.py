@@ -23,6 +23,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
 from denseface.service.protocol.states import CaptureEvent, CaptureState
 from denseface.service.protocol.wire import Packet
+from denseface.service.runtime.bounded_dict import BoundedDict
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.storage import CaptureRow, WriteResult
 
@@ -31,6 +32,8 @@ _LOST = ("WorkerLost", "the worker that held it went away")
 _MAX_HANDED_BACK = 16
 """Times that a capture may be handed back, beyond which each counts as an attempt: else a worker
 that takes and gives it back for ever would keep it from its end."""
+_MAX_TAKEN_BACK = 4096
+"""Jobs that were taken back from workers and whose late answers are expected."""
 _RETRY_S = 1.0
 """Time after which the disk is tried again that refused something, seconds."""
 
@@ -53,6 +56,8 @@ class Jobs:
         self._queue = deque(self._store.unfinished())
         self._attempts: defaultdict[str, Attempts] = defaultdict(Attempts)
         """Of captures that have no outcome."""
+        self._taken_back: BoundedDict[tuple[str, str], int] = BoundedDict(_MAX_TAKEN_BACK)
+        """Capture and key -> jobs of which its workers do not know that they were taken back."""
         self._unsaved_faces = UnsavedFaces(self._store, writer)
         self._paused_until = 0.0
         self._log = structlog.get_logger("hub")
@@ -83,6 +88,7 @@ class Jobs:
         for worker in self._peers.workers.values():
             if worker.jobs and worker.jobs[0] in capture_ids:
                 worker.deadline += self._lease_s  # it does not know, and goes on with it first
+            self._expect_late(worker, capture_ids)
             worker.jobs = [one for one in worker.jobs if one not in capture_ids]
 
     def requeue_damaged(self, capture_id: str, reason: str, *, reset_attempts: bool = True) -> None:
@@ -202,9 +208,25 @@ class Jobs:
 
     def worker_lost(self, worker: WorkerPeer, why: tuple[str, str] = _LOST) -> None:
         """Queue again what a worker held that is gone; only its first job counts as an attempt."""
+        self._expect_late(worker, worker.jobs)
         self.hand_back(worker, worker.jobs[1:])
         while worker.jobs:
             self._take_back(worker.jobs.pop(), *why)
+
+    def _expect_late(self, worker: WorkerPeer, capture_ids: Collection[str]) -> None:
+        """Note which jobs of a worker are taken from it that it may answer all the same."""
+        for capture_id in worker.jobs:
+            if capture_id in capture_ids:
+                one = capture_id, worker.key
+                self._taken_back[one] = self._taken_back.get(one, 0) + 1
+
+    def _is_late(self, capture_id: str, key: str) -> bool:
+        """Say whether an answer is to a job that was taken back from a worker; once for each."""
+        if not (times := self._taken_back.pop((capture_id, key), 0)):
+            return False
+        if times > 1:
+            self._taken_back[capture_id, key] = times - 1
+        return True
 
     def hand_back(self, worker: WorkerPeer, capture_ids: Sequence[str]) -> None:
         """Queue jobs of a worker again; they count as no attempt, unless that happens too often."""
@@ -295,7 +317,8 @@ class Jobs:
             and stored.frame_sha256 == answer.frame_sha256
             and self._captures.allows(capture_id, event) and self._was_sent(stored, key))
         worker = self._peers.workers.get(peer)
-        if worker and capture_id in worker.jobs:
+        held = worker is not None and capture_id in worker.jobs
+        if worker and held:
             at = worker.jobs.index(capture_id)
             # Jobs are answered in order: the answers to those before it were lost.
             before, worker.jobs = worker.jobs[:at], worker.jobs[at + 1:]
@@ -304,7 +327,10 @@ class Jobs:
                 reason = ("the answer was to another job" if one == capture_id
                           else "its answer was lost")
                 self._take_back(one, "RemoteProtocolError", reason)
-        if not useful:
+        late = not held and self._is_late(capture_id, key)
+        if not useful and late:
+            self._log.info("late answer dropped", capture_id=capture_id, answer=answer.kind)
+        elif not useful:
             self._rejections.note(
                 "replayed", capture_id=capture_id, detail=f"{event}, not asked for")
         return useful

@@ -83,6 +83,10 @@ class Subscribers:
         one.unknown += 1
         return one.unknown <= _MAX_UNKNOWN
 
+    def descriptors(self) -> list[int]:
+        """Give the open connections."""
+        return list(self._connections)
+
     def count(self, topic: Topic) -> int:
         """Give the number of connections that are subscribed to a topic."""
         return sum(topic in one.topics for one in self._connections.values())

@@ -192,7 +192,7 @@ class Listener:
         self._revoked = 0
         if self._credentials and not all(
                 map(self._credentials.allow_list.has_token, self._subscribers.tokens())):
-            self._publisher.cut()
+            self._cut_publisher()
         while self._input_limit and self._input_limit.ended:
             self._rejections.note("subscriptions", address=self._input_limit.ended.popleft(),
                                   detail="sends too much to the publications")
@@ -225,8 +225,14 @@ class Listener:
         if not self._credentials or not (self._router.bound or self._publisher.bound):
             return False
         self._router.cut()
-        self._publisher.cut()
+        self._cut_publisher()
         return True
+
+    def _cut_publisher(self) -> None:
+        # First, as `unbind` would read what subscribers say for as long as more of it comes.
+        for descriptor in self._subscribers.descriptors():
+            end_connection(descriptor)
+        self._publisher.cut()
 
     def _has_its_own_id(self, incoming: Incoming, first: zmq.Frame) -> bool:
         """Say whether a message's routing id is its sender's; note where it came from."""

@@ -16,6 +16,10 @@ def attempts(bench: Bench, *capture_ids: str) -> list[int]:
     return [bench.store.find(one).attempts for one in capture_ids]
 
 
+def replays(bench: Bench) -> int:
+    return bench.hub._rejections.counts().get("replayed", 0)
+
+
 def test_one_job_for_each_credit_before_the_first_answer(bench):
     bench.accepted("a", "b", "c")
     assert jobs(bench.worker(credit=0)) == [(WORKER, "a", 1)]
@@ -150,17 +154,37 @@ def test_a_restarted_hub_takes_the_answers_of_both(bench):
 
 def test_what_the_network_held_back_is_no_replay(bench):
     """All its heartbeats come at once, each is answered, and so is each answer."""
-    def replays():
-        return bench.hub._rejections.counts().get("replayed", 0)
-
     bench.worker(credit=3)
     bench.wait(SETTINGS.silence_s + 1)
     asked = [sent for _ in range(9) for sent in bench.say(WORKER, messages.Heartbeat())]
     assert asked == [(WORKER, messages.Announce())] * 9
     for _ in range(9):
         bench.worker(credit=3)
-    assert replays() == 0
+    assert replays(bench) == 0
     bench.accepted("a")
     bench.worker(credit=3)  # nobody asked for this one
-    assert replays() == 1
+    assert replays(bench) == 1
     assert bench.store.find("a").attempts == 1
+
+
+def test_the_answer_of_a_worker_that_was_away_is_no_replay(bench):
+    bench.accepted("a")
+    bench.worker()
+    bench.now += SETTINGS.silence_s + 0.1
+    bench.wait(0)
+    assert jobs(bench.worker(OTHER)) == [(OTHER, "a", 2)]
+    bench.result(peer=OTHER)
+    bench.result(peer=WORKER)
+    assert len(bench.published) == 1
+    assert replays(bench) == 0
+    bench.result(peer=WORKER)  # one job, one answer
+    assert replays(bench) == 1
+
+
+def test_the_answer_to_a_job_that_was_removed_is_no_replay(bench):
+    bench.accepted("a")
+    bench.worker()
+    checksum = bench.checksum("a")
+    bench.say(OTHER, messages.Purge(request=1, capture_id="a"))
+    bench.result(frame_sha256=checksum)
+    assert (bench.published, replays(bench)) == ([], 0)
