@@ -205,6 +205,7 @@ class Hub:
                 yield from self._maintenance.receive(peer, message)
             case messages.Purge() as message:
                 yield from self._finish_writes(now)  # no file of it appears afterwards
+                yield from self._presses.refuse_failed()
                 yield from self._maintenance.receive(peer, message)
             case messages.GetStatus(request=request):
                 yield send(peer, self._status(request))

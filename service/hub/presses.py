@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import NamedTuple, TypeAlias
@@ -18,7 +19,7 @@ from denseface.service.protocol.states import CaptureEvent, CaptureState
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.bounded_dict import BoundedDict
 from denseface.service.runtime.failpoints import failpoint
-from denseface.service.storage import WriteResult
+from denseface.service.storage import PendingWrite, WriteResult
 
 _MIB = 2**20
 """Bytes."""
@@ -90,6 +91,8 @@ class Presses:
         self._refused: defaultdict[str, _Refusals] = defaultdict(
             lambda: BoundedDict(_MAX_REFUSALS))
         """By key: nobody makes the hub forget what it said to another."""
+        self._failed: list[tuple[PendingWrite, ServiceError]] = []
+        """Frames that could not be saved, and are not refused yet."""
         self._log = structlog.get_logger("hub")
 
     def __len__(self) -> int:
@@ -145,6 +148,8 @@ class Presses:
             return "disk", f"the disk does not answer ({self._settings.take_timeout_s:g} s)"
         if sum(press.frame_sender is not None for press in self._presses.values()) >= _MAX_SAVING:
             return "disk", f"{_MAX_SAVING} frames wait for the disk already"
+        if self._failed:
+            return "disk", str(self._failed[0][1])
         try:
             free = self._store.free_bytes() // _MIB
         except StoreError as error:
@@ -189,10 +194,23 @@ class Presses:
             if error is None:
                 yield from self._saved(one.pending.capture_id)
             elif isinstance(error, ServiceError):
-                one.pending.discard()
-                yield from self._not_saved(one.pending.capture_id, error)
+                self._failed.append((one.pending, error))
             else:
                 raise error
+        with suppress(StoreError):
+            yield from self.refuse_failed()
+
+    def refuse_failed(self) -> Iterator[Output]:
+        """Refuse the frames that could not be saved.
+
+        StoreError, and no answer to anyone, while the next hub might find one of them accepted.
+        """
+        if not self._failed:
+            return
+        self._store.refuse([pending for pending, _ in self._failed])
+        failed, self._failed = self._failed, []
+        for pending, error in failed:
+            yield from self._not_saved(pending.capture_id, error)
 
     def _saved(self, capture_id: str) -> Iterator[Output]:
         self._log.info("accepted", capture_id=capture_id)
@@ -255,6 +273,8 @@ class Presses:
 
     def tick(self, now: float) -> Iterator[Output]:
         """Refuse presses whose frame is late; let nobody wait for a disk that does not answer."""
+        with suppress(StoreError):
+            yield from self.refuse_failed()
         why = f"no frame from the sensor in {self._settings.take_timeout_s:g} s"
         for capture_id in [key for key, press in self._presses.items()
                            if now >= press.deadline and press.frame_sender is None]:

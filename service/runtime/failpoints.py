@@ -28,8 +28,8 @@ TOKENS_VARIABLE = "DENSEFACE_FAILPOINTS_TOKENS"
 
 FAILPOINT_NAMES = (
     "hub.take.sent", "capture.take.received", "capture.frame.taken", "capture.frame.sent",
-    "hub.frame.received", "hub.frame.written", "hub.frame.synced", "hub.frame.renamed",
-    "hub.frame.named", "hub.frame.stored", "hub.frame.acknowledged", "hub.press.acknowledged",
+    "hub.frame.received", "hub.frame.written", "hub.frame.synced", "hub.frame.named",
+    "hub.frame.stored", "hub.frame.renamed", "hub.frame.acknowledged", "hub.press.acknowledged",
     "hub.attempt.counted", "hub.job.sent",
     "worker.job.received", "worker.job.computing", "worker.job.computed", "worker.result.sent",
     "hub.result.received", "hub.face.written", "hub.face.synced", "hub.face.renamed",

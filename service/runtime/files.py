@@ -3,6 +3,7 @@
 import os
 import stat
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from denseface.files import open_regular, replacing
@@ -11,7 +12,7 @@ from denseface.service.runtime._direct_io import write_direct
 from denseface.service.runtime.failpoints import failpoint
 
 __all__ = ["check_unwritable", "private_folder", "read_private_text", "socket_folder",
-           "sync_folder", "write_atomically"]
+           "sync_folder", "write_atomically", "write_synced"]
 
 _MAX_TEXT_BYTES = 4096
 """Of a private text; longer than any key file."""
@@ -22,18 +23,15 @@ _WRITABLE = 0o022
 
 
 def write_atomically(
-    path: Path, chunks: Sequence[bytes | memoryview], *, durable: bool = True,
-    sync_name: bool = True, direct: bool = False, mode: int | None = None, failpoints: str = "",
+    path: Path, chunks: Sequence[bytes | memoryview], *, sync_name: bool = True,
+    mode: int | None = None,
 ) -> None:
-    """Write a file so that `path` always has either its old contents or all of the new.
+    """Write a file so that `path` always has either its old contents or all of the new, synced.
 
     Parameters
     ----------
-    durable : sync the file before it gets its name
-    sync_name : sync the folder too, if `durable`; else `sync_folder` is left to the caller
-    direct : write past the page cache, where the file system can
+    sync_name : sync the folder too
     mode : of the file, exactly; None for 666 less the umask
-    failpoints : prefix of the names of this write's failpoints
 
     Raises
     ------
@@ -41,17 +39,44 @@ def write_atomically(
         As from the system. The old contents, or all of the new, are left.
     """
     with replacing(path, mode) as file:
-        if not (direct and write_direct(file.fileno(), chunks)):
-            for chunk in chunks:
-                file.write(chunk)
-            file.flush()
-        failpoint(f"{failpoints}.written")
-        if durable:
+        for chunk in chunks:
+            file.write(chunk)
+        file.flush()
+        os.fsync(file.fileno())
+    if sync_name:
+        sync_folder(path.parent)
+
+
+def write_synced(path: Path, chunks: Sequence[bytes | memoryview], *, failpoints: str = "") -> None:
+    """Write and sync a file for this user alone, past the page cache where the file system can.
+
+    Half of it may be left, by a kill or where a disk that fails does not remove it either: the next
+    write does. The folder is not synced.
+
+    Parameters
+    ----------
+    failpoints : prefix of the names of this write's failpoints
+
+    Raises
+    ------
+    OSError
+        As from the system.
+    """
+    path.unlink(missing_ok=True)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+    try:
+        with os.fdopen(os.open(path, flags, 0o600), "wb") as file:
+            if not write_direct(file.fileno(), chunks):
+                for chunk in chunks:
+                    file.write(chunk)
+                file.flush()
+            failpoint(f"{failpoints}.written")
             os.fsync(file.fileno())
             failpoint(f"{failpoints}.synced")
-    failpoint(f"{failpoints}.renamed")
-    if durable and sync_name:
-        sync_folder(path.parent)
+    except BaseException:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+        raise
 
 
 def sync_folder(folder: Path) -> None:

@@ -7,9 +7,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import copy
 from pathlib import Path
+from threading import Event
 from typing import Self
 
 from denseface.service.errors import DamagedDatabaseError, DiskFullError, StoreError
+from denseface.service.runtime.files import sync_folder
 
 _VERSION = 3
 """Version of the schema, in `PRAGMA user_version`."""
@@ -72,6 +74,10 @@ class Database:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.is_new = False
+        """There was none, or an empty one."""
+        self._unsettled = Event()
+        """Set where a sync or commit failed, of this connection or another: see `settle`."""
         log = path.with_name(f"{path.name}-wal")
         self.left_open = log.exists() and log.stat().st_size > 0
         """The last hub was killed: some of its last rows may be lost."""
@@ -107,7 +113,9 @@ class Database:
     def _check(self) -> None:
         connection = self._connection
         if connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0:
+            self.is_new = True
             connection.executescript(f"BEGIN; {_SCHEMA} COMMIT")
+            sync_folder(self.path.parent)  # SQLite syncs the name of its log alone
         (version,) = connection.execute("PRAGMA user_version").fetchone()
         if version != _VERSION:
             raise DamagedDatabaseError(
@@ -150,9 +158,51 @@ class Database:
         StoreError
             Where a statement fails otherwise.
         """
-        with self._translate_errors(), self._sync_mode(synced=synced), self._connection:
+        if synced and self._unsettled.is_set():
+            self.settle()
+        with self._translate_errors(), self._sync_mode(synced=synced):
             self._connection.execute("BEGIN IMMEDIATE")
-            yield self._connection
+            try:
+                yield self._connection
+                self._commit()
+            except BaseException:
+                self._connection.rollback()
+                raise
+
+    def _commit(self) -> None:
+        try:
+            self._connection.execute("COMMIT")
+        except sqlite3.Error as error:
+            # A disk that is full did not take the end of the transaction, without which it is void.
+            if _code(error) != sqlite3.SQLITE_FULL:
+                self._unsettled.set()
+            raise
+
+    def settle(self) -> None:
+        """Make sure that no transaction that failed is found by the next hub.
+
+        A commit whose sync fails has its rows in the write-ahead log. SQLite forgets them here, but
+        reads them when it opens the database again, unless another transaction was written in their
+        place. And what the kernel could not sync it may drop without another word: so all is copied
+        from the log into the database, and synced there.
+
+        Raises as `transaction`: then nobody knows what the next hub finds.
+        """
+        if not self._unsettled.is_set():
+            return
+        self._unsettled.clear()
+        settled = False
+        try:
+            with self.transaction() as connection:
+                connection.execute(
+                    "INSERT INTO meta VALUES ('settled', '1')"
+                    " ON CONFLICT (name) DO UPDATE SET value = value + 1")
+            settled = self.truncate_log()
+        finally:
+            if not settled:
+                self._unsettled.set()
+        if not settled:
+            raise StoreError(f"{self.path.name}: another program reads it")
 
     @contextmanager
     def _sync_mode(self, *, synced: bool) -> Iterator[None]:
@@ -232,7 +282,9 @@ class Database:
         try:
             yield
         except sqlite3.Error as error:
-            code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)
+            code = _code(error)
+            if code == sqlite3.SQLITE_IOERR_FSYNC:
+                self._unsettled.set()
             reason = f"{self.path.name}: {error}"
             if code in _DAMAGE or code & 0xFF in _DAMAGE:
                 raise DamagedDatabaseError(reason) from error
@@ -241,3 +293,7 @@ class Database:
             raise StoreError(reason) from error
         except UnicodeDecodeError as error:  # from a damaged name in SQLite's message
             raise DamagedDatabaseError(f"{self.path.name}: malformed") from error
+
+
+def _code(error: sqlite3.Error) -> int:
+    return getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)

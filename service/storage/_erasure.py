@@ -101,9 +101,11 @@ class Eraser:
         paths = [path for _, path in faces]
         for capture_id, known in captures.items():
             if known is not None:
-                paths.append(self._layout.face(capture_id, known))
-            if _unlink(self._layout.frame(capture_id)) and known is None:
-                without_row.add(capture_id)
+                paths += [self._layout.face(capture_id, known),
+                          self._layout.unnamed_face(capture_id, known)]
+            for path in (self._layout.frame(capture_id), self._layout.unnamed_frame(capture_id)):
+                if _unlink(path) and known is None:
+                    without_row.add(capture_id)
         for path in paths:
             _unlink(path)
         for folder in (self._layout.frames, self._layout.faces):

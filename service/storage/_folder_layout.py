@@ -9,10 +9,14 @@ from denseface.service.runtime.files import private_folder, sync_folder
 
 _FRAME_NAME = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.frame")
 """Capture id."""
+_UNNAMED_FRAME = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.pending")
+"""Capture id."""
 _FACE_NAME = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.[0-9a-f]{1,64}\.face")
 """Capture id and settings hash."""
+_UNNAMED_FACE = re.compile(r"\.([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.[0-9a-f]{1,64}\.face\.tmp")
+"""Capture id and settings hash."""
 _TEMPORARY_NAME = re.compile(r"\..*\.tmp")
-"""As `write_atomically` names it."""
+"""As `write_atomically` and `unnamed_face` name it."""
 
 
 class FolderLayout:
@@ -37,9 +41,22 @@ class FolderLayout:
         """Give the path of a capture's frame."""
         return self.frames / f"{capture_id}.frame"
 
+    def unnamed_frame(self, capture_id: str) -> Path:
+        """Give the path of a capture's frame until its row is written."""
+        return self.frames / f"{capture_id}.pending"
+
+    def accepted_frame(self, capture_id: str) -> Path:
+        """Give the path of the frame of a capture that has a row: it may be named later."""
+        path = self.frame(capture_id)
+        return path if path.exists() else self.unnamed_frame(capture_id)
+
     def face(self, capture_id: str, settings_hash: str) -> Path:
         """Give the path of a capture's face."""
         return self.faces / f"{capture_id}.{settings_hash}.face"
+
+    def unnamed_face(self, capture_id: str, settings_hash: str) -> Path:
+        """Give the path of a capture's face while it is written."""
+        return self.faces / f".{capture_id}.{settings_hash}.face.tmp"
 
     def database_files(self) -> list[Path]:
         """Give the paths of SQLite's files, which need not exist."""
@@ -50,14 +67,18 @@ class FolderLayout:
         """Give capture id and path of each frame."""
         return _matching(self.frames, _FRAME_NAME)
 
+    def unnamed_frames(self) -> Iterator[tuple[str, Path]]:
+        """Give capture id and path of each frame that was not named when its hub ended."""
+        return _matching(self.frames, _UNNAMED_FRAME)
+
     def all_faces(self) -> Iterator[tuple[str, Path]]:
         """Give capture id and path of each face."""
         return _matching(self.faces, _FACE_NAME)
 
     def faces_of(self, capture_ids: Container[str]) -> list[tuple[str, Path]]:
         """Give capture id and path of the faces of some captures, whatever their settings."""
-        return [(capture_id, path) for capture_id, path in self.all_faces()
-                if capture_id in capture_ids]
+        return [(capture_id, path) for name in (_FACE_NAME, _UNNAMED_FACE)
+                for capture_id, path in _matching(self.faces, name) if capture_id in capture_ids]
 
     def temporary_files(self) -> Iterator[Path]:
         """Give half-written files of a hub that was killed."""
@@ -69,8 +90,10 @@ class FolderLayout:
         ours = {self.frames, self.faces, self.quarantine, self.lock, self.disk_reserve,
                 *self.database_files()}
         yield from (path for path in self.root.iterdir() if path not in ours)
-        for folder, name in ((self.frames, _FRAME_NAME), (self.faces, _FACE_NAME)):
-            yield from (path for path in folder.iterdir() if not name.fullmatch(path.name))
+        for folder, names in (
+                (self.frames, (_FRAME_NAME, _UNNAMED_FRAME)), (self.faces, (_FACE_NAME,))):
+            yield from (path for path in folder.iterdir()
+                        if not any(name.fullmatch(path.name) for name in names))
 
 
 def _matching(folder: Path, name: re.Pattern[str]) -> Iterator[tuple[str, Path]]:

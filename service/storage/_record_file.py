@@ -19,7 +19,7 @@ from pathlib import Path
 
 from denseface.files import read_bounded
 from denseface.service.errors import CorruptFileError, DiskFullError, StoreError, reason_of
-from denseface.service.runtime.files import write_atomically
+from denseface.service.runtime.files import write_synced
 
 _MAGIC = b"denseface spool 3\n"
 """With the version of the layout."""
@@ -34,14 +34,13 @@ def write_parts(
 ) -> str:
     """Write and sync parts, not their folder, and give their checksum, hexadecimal.
 
-    `failpoints` is that of `write_atomically`; errors are those of `wrap_os_errors`.
+    `failpoints` and what an error leaves are those of `write_synced`; errors are those of
+    `wrap_os_errors`.
     """
     index = struct.pack(f"<I{len(parts)}Q", len(parts), *map(len, parts))
     digest = _checksum(index, parts)
     with wrap_os_errors(path):
-        write_atomically(
-            path, [_MAGIC, digest, index, *parts], sync_name=False, direct=True, mode=0o600,
-            failpoints=failpoints)
+        write_synced(path, [_MAGIC, digest, index, *parts], failpoints=failpoints)
     return digest.hex()
 
 

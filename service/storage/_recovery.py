@@ -112,6 +112,8 @@ class _MissingRows:
 
     def add(self) -> None:
         """Read the files without rows and add the rows, all or none."""
+        for capture_id, path in self._layout.unnamed_frames():
+            self._name_or_remove(capture_id, path)
         for capture_id, path in self._layout.all_frames():
             if capture_id not in self._rows:
                 self._read_frame(capture_id, path)
@@ -125,6 +127,24 @@ class _MissingRows:
                 self._give_up(capture_id, reason)
         if self._captures or self._outcomes:
             self._write()
+
+    def _name_or_remove(self, capture_id: str, path: Path) -> None:
+        """Name a frame that has a row; one without was not accepted.
+
+        Where the database is new nobody knows, and what is whole counts as accepted.
+        """
+        accepted = capture_id in self._rows
+        if self._database.is_new:
+            try:
+                read_frame(path)
+                accepted = True
+            except CorruptFileError as error:
+                self._quarantine.add(path, str(error), capture_id)
+                return
+        if accepted:
+            path.replace(self._layout.frame(capture_id))
+        else:
+            path.unlink()
 
     def _read_frame(self, capture_id: str, path: Path) -> None:
         if record := self._read(capture_id, path, read_frame):

@@ -6,6 +6,8 @@ What is marked cannot be read any more; a hub that is killed then leaves the res
 from collections.abc import Callable, Sequence
 from datetime import datetime
 
+import structlog
+
 from denseface.service.errors import StoreError
 from denseface.service.protocol.states import CaptureState
 from denseface.service.storage._database import Database
@@ -13,7 +15,9 @@ from denseface.service.storage._disk_reserve import DiskReserve
 from denseface.service.storage._erasure import Erased, Eraser, Erasure, PendingErasure
 from denseface.service.storage._folder_layout import FolderLayout
 from denseface.service.storage._quarantine import Quarantine
+from denseface.service.storage._record_file import wrap_os_errors
 from denseface.service.storage._store_clock import StoreClock, format_timestamp
+from denseface.service.storage.records import PendingWrite
 
 
 class Retention:
@@ -37,6 +41,8 @@ class Retention:
         self._eraser = Eraser(layout, database, quarantine, self._reserve)
         self._erasing: set[str] = set()
         """Captures of which an erasure is under way, or waits to begin."""
+        self._discarded: set[str] = set()
+        """Captures that were refused and whose frame could not be removed."""
         self._begun = 0
         """Number of the last erasure."""
         self.log_due = database.left_open
@@ -73,12 +79,29 @@ class Retention:
         """
         self._reserve.spend_on(lambda: self._mark(capture_ids, state))
 
+    def settle(self) -> None:
+        """As `Database.settle`, with the reserve's room where the disk is full."""
+        self._reserve.spend_on(self._database.settle)
+
+    def discard(self, pending: PendingWrite) -> None:
+        """Remove the file of a frame that was refused; one that cannot be removed is `left_over`.
+
+        The next hub would not read it: it has no row.
+        """
+        try:
+            with wrap_os_errors(pending.unnamed):
+                pending.unnamed.unlink(missing_ok=True)
+        except StoreError as error:
+            self._discarded.add(pending.capture_id)
+            structlog.get_logger("store").warning(
+                "not removed", capture_id=pending.capture_id, reason=str(error))
+
     def left_over(self, limit: int) -> list[str]:
-        """Give ids of what is withdrawn, and no erasure of it is under way."""
+        """Give ids of what is withdrawn or was refused, and no erasure of it is under way."""
         found = self._database.select_ids(
             "SELECT capture_id FROM captures WHERE state = ? ORDER BY position LIMIT ?",
             CaptureState.REMOVED, limit + len(self._erasing))
-        return [one for one in found if one not in self._erasing][:limit]
+        return [one for one in [*found, *self._discarded] if one not in self._erasing][:limit]
 
     def is_left(self, capture_id: str | None) -> bool:
         """Whether a capture is withdrawn and not erased, or any is where None."""
@@ -91,7 +114,9 @@ class Retention:
 
         It lists both folders.
         """
-        found = {capture_id: None for files in (self._layout.all_frames, self._layout.all_faces)
+        layout = self._layout
+        found = {capture_id: None
+                 for files in (layout.all_frames, layout.unnamed_frames, layout.all_faces)
                  for capture_id, _ in files()}
         return [one for one in found if one not in self._erasing and self._hash_of(one) is None]
 
@@ -134,6 +159,7 @@ class Retention:
             self.log_due = False
         if erased.error is not None:
             raise erased.error
+        self._discarded.difference_update(erased.erasure.captures)
 
     def erase(self, capture_ids: Sequence[str]) -> None:
         """Erase what was removed before it returns; raises as `finish`."""
@@ -143,6 +169,7 @@ class Retention:
         """Finish what `remove` began of a capture whose id is used again, if anything."""
         if capture_id in self._erasing:
             raise StoreError(f"an earlier capture {capture_id} is being removed")
+        self._discarded.discard(capture_id)
         if self._hash_of(capture_id, CaptureState.REMOVED) is not None:
             self.erase([capture_id])
 

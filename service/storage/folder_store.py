@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
+import structlog
+
 from denseface.recon.settings import Settings
 from denseface.service.errors import CorruptFileError, DamagedFaceError, StoreError
 from denseface.service.protocol.messages import CaptureFailed, FaceDone, Frame, Result
@@ -110,30 +112,47 @@ class FolderStore(CaptureRows, Closing):
             accepted_at=self._clock.timestamp(), clock=self._clock.save(),
             settings=settings.model_dump_json(), settings_hash=settings_hash,
             pressed_by=pressed_by)
-        return PendingWrite(capture_id, self._layout.frame(capture_id), metadata, frame)
+        return PendingWrite(
+            capture_id, self._layout.frame(capture_id), self._layout.unnamed_frame(capture_id),
+            metadata, frame)
 
     def accept(self, frames: Sequence[WriteResult], state: CaptureState) -> None:
-        """Add rows for frames that were written, all or none; their captures are in `state`."""
+        """Add rows for frames that were written, all or none; their captures are in `state`.
+
+        With its row a frame is accepted, whether its file can be named now or by the next hub.
+        """
         records = [one.record(Frame, FrameMetadata) for one in frames]
         with self._database.transaction() as connection:
             for one in records:
                 CaptureRow(
                     one.message.capture_id, state, one.metadata.settings_hash, one.checksum,
                     one.metadata.accepted_at, one.metadata.pressed_by).insert(connection)
-        self._frame_cache.add(records)
         failpoint("hub.frame.stored")
+        for written in frames:
+            try:
+                written.pending.name()
+            except StoreError as error:
+                structlog.get_logger("store").warning(
+                    "not named yet", capture_id=written.pending.capture_id, reason=str(error))
+        self._frame_cache.add(records)
+
+    def refuse(self, frames: Sequence[PendingWrite]) -> None:
+        """Make sure that no hub ever finds frames that were not accepted; StoreError if it may."""
+        self.retention.settle()
+        for one in frames:
+            self.retention.discard(one)
 
     def frame(self, capture_id: str) -> FrameRecord:
         """Give a frame; CorruptFileError where it is damaged, which quarantines it."""
         row = self.find(capture_id)
         if row is None:
             raise StoreError(f"capture {capture_id} is not in the store")
-        path = self._layout.frame(capture_id)
+        # Most go to a worker soon after they are accepted; a second time the file is read.
+        cached = self._frame_cache.pop(capture_id)
+        if cached and cached.checksum == row.frame_sha256:
+            return cached
+        path = self._layout.accepted_frame(capture_id)
         try:
-            # Most go to a worker soon after they are accepted; a second time the file is read.
-            cached = self._frame_cache.pop(capture_id)
-            if cached and cached.checksum == row.frame_sha256:
-                return cached
             return read_frame(path, row.frame_sha256)
         except CorruptFileError as error:
             self._quarantine.add(path, str(error), capture_id)
@@ -151,8 +170,10 @@ class FolderStore(CaptureRows, Closing):
         metadata = FaceMetadata(
             accepted_at=row.accepted_at, finished_at=self._clock.timestamp(),
             clock=self._clock.save())
-        path = self._layout.face(capture_id, message.settings_hash)
-        return PendingWrite(capture_id, path, metadata, result)
+        names = capture_id, message.settings_hash
+        return PendingWrite(
+            capture_id, self._layout.face(*names), self._layout.unnamed_face(*names), metadata,
+            result)
 
     def finish(self, faces: Sequence[WriteResult], state: CaptureState) -> None:
         """Add rows for faces that were written, as outcomes, in order, all or none; as `accept`."""

@@ -3,7 +3,6 @@
 Part 0 of the file is the metadata, JSON; the other parts are the message as it arrived.
 """
 
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Generic, TypeAlias, TypeVar
@@ -14,7 +13,8 @@ from denseface.service.errors import CorruptFileError, ProtocolError
 from denseface.service.protocol.messages import Frame, Result
 from denseface.service.protocol.payload import Arrays
 from denseface.service.protocol.wire import Packet, decode_stored, encode
-from denseface.service.storage._record_file import read_parts, write_parts
+from denseface.service.runtime.failpoints import failpoint
+from denseface.service.storage._record_file import read_parts, wrap_os_errors, write_parts
 
 __all__ = [
     "FaceMetadata",
@@ -74,10 +74,17 @@ FaceRecord: TypeAlias = Record[Result, FaceMetadata]
 
 @dataclass(frozen=True)
 class PendingWrite:
-    """A frame or a face of which neither file nor row is written."""
+    """A frame or a face of which neither file nor row is written.
+
+    It is written under a name that says so. A face gets its own name once it is safe. A frame does
+    when its row is written: without one it was not accepted, and the next hub removes it.
+    """
 
     capture_id: str
     path: Path
+    """Its file at last."""
+    unnamed: Path
+    """Its file until then."""
     metadata: FrameMetadata | FaceMetadata
     packet: Packet
 
@@ -94,13 +101,14 @@ class PendingWrite:
     def write(self) -> str:
         """Write and sync the file, not its folder; give its checksum; raises as `write_parts`."""
         return write_parts(
-            self.path, [self.metadata.model_dump_json().encode(), *encode(self.packet)],
+            self.unnamed, [self.metadata.model_dump_json().encode(), *encode(self.packet)],
             failpoints=self.failpoints)
 
-    def discard(self) -> None:
-        """Remove the file; one that cannot be removed gets its row at the next start."""
-        with suppress(OSError):
-            self.path.unlink(missing_ok=True)
+    def name(self) -> None:
+        """Give the file its name; raises as `wrap_os_errors`."""
+        with wrap_os_errors(self.path):
+            self.unnamed.replace(self.path)
+            failpoint(f"{self.failpoints}.renamed")
 
 
 def read_frame(path: Path, checksum: str | None = None) -> FrameRecord:

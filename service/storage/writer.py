@@ -1,6 +1,6 @@
 """Writes and erases files in threads of their own, so that the hub's loop goes on.
 
-A `Writer` reports each file as safe under its name, or the error. The hub then writes the row, in
+A `Writer` reports each file as safe, or the error. The hub then writes the row, in
 its own thread.
 """
 
@@ -68,10 +68,7 @@ class Writer(Protocol):
 
 
 def write(pending_writes: Sequence[PendingWrite]) -> list[WriteResult]:
-    """Write and sync files, then each of their folders once; errors are in the results.
-
-    The file of a frame that fails is removed.
-    """
+    """Write and sync files, then each of their folders once; errors are in the results."""
     written = [_write(pending) for pending in pending_writes]
     failed: dict[Path, StoreError] = {}
     for folder in {one.pending.path.parent for one in written if one.error is None}:
@@ -85,14 +82,15 @@ def write(pending_writes: Sequence[PendingWrite]) -> list[WriteResult]:
     for one in written:
         if one.error is None:
             failpoint(f"{one.pending.failpoints}.named")
-        elif one.pending.is_frame:
-            one.pending.discard()
     return written
 
 
 def _write(pending: PendingWrite) -> WriteResult:
     try:
-        return WriteResult(pending, pending.write())
+        checksum = pending.write()
+        if not pending.is_frame:
+            pending.name()
+        return WriteResult(pending, checksum)
     except Exception as error:
         return WriteResult(pending, error=error)
 

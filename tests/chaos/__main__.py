@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.chaos.cluster import PACE, Nursery
+from tests.chaos.disk import compile_faults, sweep_all
 from tests.chaos.rounds import Outcome, is_supervised, play
 from tests.chaos.source import write_small_frame
 
@@ -28,7 +29,11 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, help="begin no round after this time")
     parser.add_argument("--keep", type=Path, default=Path(tempfile.gettempdir()),
                         help="where a round that broke a promise is kept (default: %(default)s)")
+    parser.add_argument("--disk", action="store_true", help="let every file operation of a hub "
+                        "fail in turn, and cut the power after each, instead of presses")
     args = parser.parse_args()
+    if args.disk:
+        return _sweep_disk()
     os.environ |= PACE  # of our own clients
     began = time.monotonic()
     total, rounds, left = Outcome(), 0, args.presses
@@ -61,6 +66,15 @@ def main() -> int:
          f"{(time.monotonic() - began) / 60:.1f} min")
     print(_table(total))
     return 1 if total.violations else 0
+
+
+def _sweep_disk() -> int:
+    with tempfile.TemporaryDirectory(prefix="chaos-") as temporary:
+        folder = Path(temporary)
+        found = sweep_all(compile_faults(folder), folder, _say)
+    for one in found:
+        print(one)
+    return 1 if found else 0
 
 
 def _say(line: str) -> None:

@@ -23,6 +23,13 @@ class Answer(StrEnum):
     REFUSED = "refused"
     UNKNOWN = "unknown"
     """Nothing, however often it asked: the capture may exist or not."""
+    WITHDRAWN = "withdrawn"
+    """An operator asked for its removal and was not told that it is gone: it may be or not."""
+    REMOVED = "removed"
+    """An operator was told that it is gone."""
+
+
+_WITHDRAWN = (Answer.WITHDRAWN, Answer.REMOVED)
 
 
 @dataclass(frozen=True)
@@ -81,6 +88,8 @@ def _promises(history: History) -> Iterator[str]:
             yield f"{capture_id}: accepted and lost"
         if answer is Answer.REFUSED and one is not None:
             yield f"{capture_id}: refused, and yet {one.state}"
+        if answer is Answer.REMOVED and one is not None:
+            yield f"{capture_id}: removed, and yet {one.state}"
         if one is None:
             continue
         if one.state not in ("done", "dead") or one.sequence is None:
@@ -122,13 +131,15 @@ def _misses(history: History) -> Iterator[str]:
             yield (f"{one.capture_id}: seen as {seen.state} {seen.sequence}, "
                    f"kept as {one.state} {one.sequence}")
     for capture_id in last.keys() - kept.keys():
-        yield f"{capture_id}: seen and not kept"
+        if history.pressed.get(capture_id) not in _WITHDRAWN:
+            yield f"{capture_id}: seen and not kept"
 
 
 def _numbers(history: History) -> Iterator[str]:
     """No number is missing but those of outcomes that were withdrawn, and the store's jumps."""
     numbers = {one.sequence for one in history.kept if one.sequence is not None}
-    withdrawn = {one.sequence for one in history.followed if one.capture_id in history.damaged}
+    withdrawn = {one.sequence for one in history.followed if one.capture_id in history.damaged
+                 or history.pressed.get(one.capture_id) in _WITHDRAWN}
     for before, after in pairwise([0, *sorted(numbers | withdrawn)]):
         if (after - before - 1) % JUMP and not history.damaged:
             yield f"numbers {before + 1} to {after - 1} belong to no outcome"

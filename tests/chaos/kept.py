@@ -26,7 +26,7 @@ def read_kept(data: Path) -> list[Kept]:
 def _sound(layout: FolderLayout, row: sqlite3.Row) -> bool:
     capture_id = row["capture_id"]
     try:
-        frame = read_frame(layout.frame(capture_id), row["frame_sha256"])
+        frame = read_frame(layout.accepted_frame(capture_id), row["frame_sha256"])
         if row["face_sha256"] is None:
             return bool(frame.message.capture_id == capture_id)
         face = read_face(layout.face(capture_id, row["settings_hash"]), row["face_sha256"])

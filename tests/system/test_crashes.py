@@ -111,20 +111,21 @@ def test_whoever_hangs_is_given_up_and_may_come_back_late(scene):
 
 
 def test_a_full_disk_refuses_presses_and_keeps_what_was_accepted(scene):
-    full = {"hub.frame.synced": "raise:ENOSPC", "hub.frame.renamed": "raise:EIO",
+    full = {"hub.frame.written": "raise:EIO", "hub.frame.synced": "raise:ENOSPC",
+            "hub.frame.renamed": "raise:EIO",
             "hub.face.written": "raise:ENOSPC", "hub.face.renamed": "raise:EIO"}
     running = scene(actions=full, environment=PATIENT)
-    for name, reason in (("hub.frame.synced", "no room on the disk"),
-                         ("hub.frame.renamed", "the disk fails")):
+    for name, reason in (("hub.frame.written", "the disk fails"),
+                         ("hub.frame.synced", "no room on the disk")):
         fail_at(running, name)
         running.settle()
         (said,) = running.pressers[-1].reasons
         assert reason in said
-    for name in ("hub.face.written", "hub.face.renamed"):
+    for name in ("hub.frame.renamed", "hub.face.written", "hub.face.renamed"):
         fail_at(running, name, presses=2)
         running.settle()
         assert running.pressers[-1].reasons == []
-    check(running, done=6, dead=0)
+    check(running, done=8, dead=0)
     assert not list(FolderLayout(running.cluster.data).temporary_files())
 
 

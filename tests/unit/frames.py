@@ -1,6 +1,7 @@
 """Small made-up frames and calibrations."""
 
 from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -23,7 +24,8 @@ def calibration(**changes: object) -> Calibration:
 
 
 def frame(
-    depth: NDArray[np.uint16], color: NDArray[np.uint8], calib: Calibration | None = None, **more
+    depth: NDArray[np.uint16], color: NDArray[np.uint8], calib: Calibration | None = None,
+    **more: Any
 ) -> RgbdFrame:
     return RgbdFrame(depth, color, 1000, 2000, calib or calibration(), **more)
 
@@ -32,7 +34,7 @@ def resampled(frame: RgbdFrame, factor: int | float) -> RgbdFrame:
     """The frame of a sensor with another resolution of both cameras."""
     known = frame.calibration
     if factor > 1:
-        depth = frame.depth.repeat(factor, axis=0).repeat(factor, axis=1)
+        depth = frame.depth.repeat(int(factor), axis=0).repeat(int(factor), axis=1)
         camera = known.depth.scaled(factor)
     else:
         every = round(1 / factor)
@@ -40,7 +42,8 @@ def resampled(frame: RgbdFrame, factor: int | float) -> RgbdFrame:
         camera = known.depth.scaled(factor).model_copy(update={
             "cx": known.depth.cx * factor, "cy": known.depth.cy * factor})
     color = cv2.resize(frame.color, None, fx=factor, fy=factor,
-                       interpolation=cv2.INTER_AREA if factor < 1 else cv2.INTER_LINEAR)
+                       interpolation=cv2.INTER_AREA if factor < 1 else cv2.INTER_LINEAR
+                       ).astype(np.uint8)
     calib = Calibration(depth=camera, color=known.color.scaled(factor),
                         depth_to_color=known.depth_to_color)
     return replace(frame, depth=depth, color=color, calibration=calib)

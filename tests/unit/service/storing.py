@@ -12,12 +12,12 @@ __all__ = ["accept", "finish"]
 def accept(store: FolderStore, frame: Packet, settings: Settings, settings_hash: str) -> None:
     """Store a `Frame`; raises what the writer or the store does."""
     (written,) = write([store.prepare_frame(frame, settings, settings_hash)])
-    if written.error:
-        raise written.error
     try:
+        if written.error:
+            raise written.error
         store.accept([written], CaptureState.ACCEPTED)
     except StoreError:
-        written.pending.discard()
+        store.refuse([written.pending])
         raise
 
 

@@ -50,7 +50,8 @@ def test_a_batch_has_two_transactions_one_sync_of_each_folder_and_one_emptied_lo
     assert calls == {"transaction": 1}
     calls.clear()
     store.retention.erase(NAMES)
-    assert calls == {"unlink": 2 * len(NAMES), "sync": 2, "transaction": 1, "emptied": 1}
+    # Frame and face, each with or without its name.
+    assert calls == {"unlink": 4 * len(NAMES), "sync": 2, "transaction": 1, "emptied": 1}
     assert not list(store._layout.frames.iterdir())
     assert not list(store._layout.faces.iterdir())
 

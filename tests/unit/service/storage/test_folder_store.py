@@ -80,7 +80,7 @@ def test_a_row_comes_after_its_file_is_safe(store, monkeypatch):
     pending = store.prepare_frame(frame("a"), Settings(), "0f")
     monkeypatch.setattr(store._database, "transaction", begun)
     store.accept(write([pending]), CaptureState.ACCEPTED)
-    assert steps == ["file", "a.frame", "folder", "row"]
+    assert steps == ["file", "folder", "row", "a.frame"]
     assert store._database.select_one("PRAGMA synchronous")[0] == 2
     assert store._database.select_one("PRAGMA journal_mode")[0] == "wal"
 

@@ -252,7 +252,7 @@ def test_a_removal_that_was_cut_short_is_finished(data, monkeypatch):
 @pytest.mark.parametrize(("number", "kind", "message"), [
     (28, DiskFullError, "no room on the disk"), (122, DiskFullError, "no room on the disk"),
     (5, StoreError, "the disk fails")])
-@pytest.mark.parametrize("step", ["write", "fsync", "rename", "folder"])
+@pytest.mark.parametrize("step", ["write", "fsync", "folder"])
 def test_a_frame_that_cannot_be_kept_leaves_nothing(
         data, monkeypatch, number, kind, message, step):
     calls = []
@@ -270,11 +270,9 @@ def test_a_frame_that_cannot_be_kept_leaves_nothing(
         match step:
             case "write":
                 monkeypatch.setattr(
-                    "denseface.service.storage._record_file.write_atomically", fails)
+                    "denseface.service.storage._record_file.write_synced", fails)
             case "fsync":
                 monkeypatch.setattr("denseface.service.runtime.files.os.fsync", fails)
-            case "rename":
-                monkeypatch.setattr("pathlib.Path.replace", fails)
             case "folder":
                 monkeypatch.setattr("denseface.service.runtime.files.os.fsync", second_fails)
         with pytest.raises(kind, match=message):
@@ -283,6 +281,45 @@ def test_a_frame_that_cannot_be_kept_leaves_nothing(
         assert sorted((data / "frames").iterdir()) == before
         assert store.find("new") is None
         accept(store, frame("new"), Settings(), "0f")
+
+
+def test_a_frame_that_cannot_be_named_is_accepted_and_named_later(data, monkeypatch):
+    def fails(*_):
+        raise OSError(5, os.strerror(5))
+
+    pending, named = (data / "frames" / name for name in ("new.pending", "new.frame"))
+    with FolderStore(data, FakeClock()) as store:
+        monkeypatch.setattr("pathlib.Path.replace", fails)
+        accept(store, frame("new"), Settings(), "0f")
+        monkeypatch.undo()
+        store.frame("new")  # from memory
+        store.frame("new")
+        assert pending.exists()
+        assert not named.exists()
+    with FolderStore(data, FakeClock()) as store:
+        store.frame("new")
+        assert named.exists()
+        assert not pending.exists()
+
+
+def test_a_frame_without_its_name_and_row_is_nobody_s(data):
+    (data / "frames" / "waits.frame").rename(data / "frames" / "waits.pending")
+    _forget(data, "waits")
+    with FolderStore(data, FakeClock()) as store:
+        assert store.find("waits") is None
+        assert not (data / "frames" / "waits.pending").exists()
+
+
+def test_where_the_database_is_lost_whole_frames_without_their_name_count_as_accepted(data):
+    for name in ("waits", "dead"):
+        (data / "frames" / f"{name}.frame").rename(data / "frames" / f"{name}.pending")
+    _flip(data / "frames" / "dead.pending")
+    (data / "captures.sqlite3").unlink()
+    with FolderStore(data, FakeClock()) as store:
+        assert states(store) == REBUILT | {"dead": None}
+        store.frame("waits")
+    (report,) = reports(data)
+    assert report["capture_id"] == "dead"
 
 
 def test_a_full_database_leaves_no_frame(data):

@@ -54,17 +54,19 @@ def test_files_that_wait_together_share_the_sync_of_their_folder(store, monkeypa
 
 def test_one_that_fails_takes_none_with_it(store, monkeypatch):
     pending_writes = [pending(store, name) for name in "abc"]
-    replace = type(pending_writes[0].path).replace
+    sync, synced = os.fsync, []
 
-    def full(path, target):
-        if target.name == "b.frame":
+    def full(descriptor):
+        synced.append(descriptor)
+        if len(synced) == 2:
             raise OSError(28, "No space left on device")
-        return replace(path, target)
+        sync(descriptor)
 
-    monkeypatch.setattr("pathlib.Path.replace", full)
+    monkeypatch.setattr("denseface.service.runtime.files.os.fsync", full)
     written = write(pending_writes)
     assert [type(one.error) for one in written] == [type(None), DiskFullError, type(None)]
-    assert sorted(path.name for path in store._layout.frames.iterdir()) == ["a.frame", "c.frame"]
+    assert sorted(path.name for path in store._layout.frames.iterdir()) == [
+        "a.pending", "c.pending"]
 
 
 def test_a_folder_that_cannot_be_synced_fails_all_of_it(store, monkeypatch):
@@ -78,6 +80,7 @@ def test_a_folder_that_cannot_be_synced_fails_all_of_it(store, monkeypatch):
 
     monkeypatch.setattr("denseface.service.runtime.files.os.fsync", no_folder)
     assert [type(one.error) for one in write(pending_writes)] == [DiskFullError, DiskFullError]
+    store.refuse(pending_writes)
     assert not list(store._layout.frames.iterdir())
 
 
@@ -123,7 +126,7 @@ def test_at_the_end_what_was_begun_is_written(store):
         for one in pending_writes:
             writer.start(one)
     assert [one.pending for one in writer.take_results()] == pending_writes
-    assert all(one.path.exists() for one in pending_writes)
+    assert all(one.unnamed.exists() for one in pending_writes)
 
 
 def test_what_nobody_expected_is_told_too(store, monkeypatch):

@@ -1,0 +1,41 @@
+"""The disk fails at one file operation after another, and the power is cut: what was said stays.
+
+A part of what `script/chaos --disk` plays in full.
+"""
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from tests.chaos.disk import FOREVER, Sweep, compile_faults
+
+_IN_MEMORY = Path("/dev/shm")  # noqa: S108
+
+
+@pytest.fixture(scope="module")
+def sweep():
+    if shutil.which("cc") is None:
+        pytest.skip("there is no C compiler (cc) to build the library that makes operations fail")
+    with tempfile.TemporaryDirectory(dir=_IN_MEMORY if _IN_MEMORY.is_dir() else None) as folder:
+        one = Sweep(compile_faults(Path(folder)), Path(folder))
+        yield one
+        one.close()
+
+
+@pytest.mark.parametrize(("error", "count", "first"), [
+    ("EIO", 1, 0), ("EIO", 4, 2), ("EIO", FOREVER, 4), ("ENOSPC", 1, 6), ("ENOSPC", FOREVER, 8)])
+def test_whatever_operation_fails_what_was_said_stays_true(sweep, error, count, first):
+    operations = sweep.operations()
+    assert operations > 100
+    assert sweep.failing(error, count, range(first, operations, 10)) == []
+
+
+def test_whenever_the_power_is_cut_what_was_said_stays_true(sweep):
+    assert sweep.power_cuts(every=13) == []
+
+
+def test_a_sync_that_failed_is_not_relied_upon_when_the_power_is_cut(sweep):
+    for failing in sweep.syncs()[10::3]:
+        assert sweep.power_cuts(every=70, failing=failing) == []
