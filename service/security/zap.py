@@ -31,15 +31,18 @@ class Authenticator:
     Parameters
     ----------
     is_permitted : whether an allowed key may connect to the sockets of a domain
+    has_room : whether it may connect now; else it may try again
     """
 
     def __init__(
         self, context: "zmq.Context[zmq.Socket[bytes]]", allow_list: AllowList,
         rejections: Rejections, is_permitted: Callable[[AllowedKey, bytes], bool],
+        has_room: Callable[[AllowedKey, bytes], bool],
     ) -> None:
         self._allow_list = allow_list
         self._rejections = rejections
         self._is_permitted = is_permitted
+        self._has_room = has_room
         # A ROUTER, for a REP that failed to answer could receive no further request.
         self.socket = context.socket(zmq.ROUTER)
         self.socket.set(zmq.LINGER, 0)
@@ -53,14 +56,25 @@ class Authenticator:
             except zmq.Again:
                 return
             envelope, request = parts[:2], parts[2:]
-            user = self._user(request)
-            status = [b"200", b"OK", user.public.encode()] if user else [b"400", b"refused", b""]
+            status = self._status(request)
             number = request[1] if len(request) > 1 else b""
             self.socket.send_multipart([*envelope, _VERSION, number, *status, b""])
 
     def close(self) -> None:
         """Close the socket: libzmq refuses every new connection."""
         self.socket.close()
+
+    def _status(self, request: list[bytes]) -> list[bytes]:
+        """Give the status code, its text and the user."""
+        user = self._user(request)
+        if user is None:
+            return [b"400", b"refused", b""]
+        domain, address = request[2:4]
+        if not self._has_room(user, domain):
+            self._rejections.note("connections", address=address.decode("ascii", "replace"),
+                                  key=user.name, detail="too many of one key")
+            return [b"300", b"too many connections", b""]
+        return [b"200", b"OK", user.public.encode()]
 
     def _user(self, request: list[bytes]) -> AllowedKey | None:
         if len(request) != 7 or request[0] != _VERSION:

@@ -9,11 +9,17 @@ from denseface.service.errors import AddressError, ServiceError
 from denseface.service.monitoring import Rejections
 from denseface.service.security import AllowList, KeyPair
 from denseface.service.transport.addresses import check_socket_file
-from denseface.service.transport.handshakes import Connections, HandshakeMonitor
+from denseface.service.transport.handshakes import (
+    Connections,
+    HandshakeMonitor,
+    end_connection,
+)
 from denseface.service.transport.sockets import Socket
 
 _HANDSHAKE_MS = 10_000
 """Longest time for a handshake, milliseconds; then libzmq closes the connection."""
+_MAX_SILENT = 64
+"""Connections that may stay open though nobody has said anything by them: clients in waiting."""
 
 
 @dataclass(frozen=True)
@@ -25,33 +31,30 @@ class ServerCredentials:
 
 
 class BoundSocket:
-    """Binds a socket, cuts all its connections and binds it again.
+    """Binds a socket, ends connections of it, cuts all of them and binds it again.
 
     By its ZAP domain the authenticator knows it; without credentials anybody may connect.
     """
 
     def __init__(
         self, socket: Socket, address: str, domain: bytes, credentials: ServerCredentials | None,
-        rejections: Rejections, connections: Connections | None,
+        rejections: Rejections, connections: Connections,
     ) -> None:
         self.socket = socket
-        self.monitor: HandshakeMonitor | None = None
-        """Tells `connections`, and with credentials counts failed handshakes."""
         self.bound = False
         self._address = address
         self._file = (
             Path(address.removeprefix("ipc://")) if address.startswith("ipc://") else None)
         self._inode: tuple[int, int] | None = None
         """Of the file that was bound."""
+        socket.set(zmq.HANDSHAKE_IVL, _HANDSHAKE_MS)
         if credentials:
             socket.set(zmq.CURVE_SERVER, 1)
             socket.set(zmq.CURVE_SECRETKEY, credentials.pair.secret.encode())
             socket.set(zmq.ZAP_ENFORCE_DOMAIN, 1)
             socket.set(zmq.ZAP_DOMAIN, domain)
-            socket.set(zmq.HANDSHAKE_IVL, _HANDSHAKE_MS)
-        if connections:
-            self.monitor = HandshakeMonitor(
-                socket, rejections if credentials else None, connections)
+        self.monitor = HandshakeMonitor(socket, rejections if credentials else None, connections)
+        """Tells `connections`, and with credentials counts failed handshakes."""
 
     def bind(self) -> None:
         """Bind, also after `cut`; AddressError where the address cannot be had."""
@@ -89,7 +92,7 @@ class BoundSocket:
             self._inode = _inode_of(self._file)
 
     def cut(self) -> None:
-        """End all connections, as one alone cannot be ended.
+        """End all connections, also those of which nothing is known yet.
 
         Those that are allowed come back by themselves within a second of the next `bind`, pass the
         authenticator again and fetch what they missed.
@@ -97,13 +100,23 @@ class BoundSocket:
         if self.bound:
             self.socket.unbind(self._address)
             self.bound = False
-        if self.monitor:
-            self.monitor.forget()
+        self.monitor.forget()
+
+    def end_silent(self) -> None:
+        """End all connections by which nothing was said."""
+        self.monitor.read()
+        for descriptor in self.monitor.silent(0.0):
+            end_connection(descriptor)
+
+    def limit_silent(self) -> None:
+        """End the oldest connections that say nothing, where they are many."""
+        # Those who are not through their handshake are ended by libzmq.
+        for descriptor in self.monitor.silent(2e-3 * _HANDSHAKE_MS)[:-_MAX_SILENT]:
+            end_connection(descriptor)
 
     def close(self) -> None:
         """Close the socket, its monitor before it, and leave no file of its own behind."""
-        if self.monitor:
-            self.monitor.close()
+        self.monitor.close()
         self.socket.close()
         if self._file and self._inode and self.has_its_file():
             self._file.unlink(missing_ok=True)

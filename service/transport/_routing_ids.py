@@ -2,9 +2,12 @@
 
 A routing id is what a peer calls itself, and libzmq gives one that is free again to whoever asks
 for it. So an id stays with the key that brought it first, and nothing is sent to an id whose
-connection has closed: libzmq reports the closing before it frees the id.
+connection has closed: libzmq closes its descriptor before it frees the id.
 """
 
+import os
+from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 
 from denseface.service.runtime.bounded_dict import BoundedDict
@@ -18,6 +21,8 @@ class _Connection:
     key: str
     token: bytes
     descriptor: int
+    inode: int
+    """Of the connection: the descriptor may be another's by now."""
 
 
 class RoutingIds:
@@ -30,11 +35,14 @@ class RoutingIds:
         self._ids: dict[int, bytes | None] = {}
         """Descriptor -> id of each open connection; None before its first message."""
         self._connections: dict[bytes, _Connection] = {}
+        self._by_key: Counter[str] = Counter()
+        """Number of `_connections` by their key."""
         self._gone: BoundedDict[bytes, str] = BoundedDict(_MAX_GONE)
         """Id -> key of connections that closed."""
 
     def opened(self, descriptor: int) -> None:
         """Note a new connection."""
+        self._forget(self._ids.get(descriptor))
         self._ids[descriptor] = None
 
     def closed(self, descriptor: int) -> None:
@@ -46,10 +54,21 @@ class RoutingIds:
         for descriptor in list(self._ids):
             self.closed(descriptor)
 
+    def has_spoken(self, descriptor: int) -> bool:
+        """Say whether a message came by an open connection."""
+        return self._ids.get(descriptor) is not None
+
+    def count(self, key: str) -> int:
+        """Give the number of open connections by which a key has spoken."""
+        return self._by_key[key]
+
     def _forget(self, routing_id: bytes | None) -> None:
         """Remember of an id only whose it was."""
         if routing_id is not None:
-            self._gone[routing_id] = self._connections.pop(routing_id).key
+            key = self._gone[routing_id] = self._connections.pop(routing_id).key
+            self._by_key[key] -= 1
+            if not self._by_key[key]:
+                del self._by_key[key]
 
     def claim(self, routing_id: bytes, key: str, token: bytes, descriptor: int) -> bool:
         """Note a message of a connection; False where its id is another key's.
@@ -66,16 +85,25 @@ class RoutingIds:
         if connection and connection.descriptor != descriptor:
             self._ids[connection.descriptor] = None
             self._forget(routing_id)
-        if descriptor not in self._ids:  # it closed before its message was read
+        inode = _inode(descriptor)
+        if descriptor not in self._ids or inode is None:  # it closed before its message was read
             self._gone[routing_id] = key
             return True
-        if (before := self._ids[descriptor]) != routing_id:
-            self._forget(before)
-        self._ids[descriptor] = routing_id
-        self._connections[routing_id] = _Connection(key, token, descriptor)
+        if self._ids[descriptor] != routing_id:
+            self._forget(self._ids[descriptor])
+            self._ids[descriptor] = routing_id
+            self._by_key[key] += 1
+        self._connections[routing_id] = _Connection(key, token, descriptor, inode)
         return True
 
     def is_open(self, routing_id: bytes, token: bytes) -> bool:
         """Whether the last message by this id came from that key, by a connection still open."""
         connection = self._connections.get(routing_id)
-        return connection is not None and connection.token == token
+        return (connection is not None and connection.token == token
+                and _inode(connection.descriptor) == connection.inode)
+
+
+def _inode(descriptor: int) -> int | None:
+    with suppress(OSError):
+        return os.fstat(descriptor).st_ino
+    return None

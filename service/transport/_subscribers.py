@@ -57,6 +57,10 @@ class Subscribers:
         """Say whether a connection is open and was not given up."""
         return descriptor in self._connections
 
+    def has_spoken(self, descriptor: int) -> bool:
+        """Say whether a connection has subscribed to a topic."""
+        return descriptor in self._connections and bool(self._connections[descriptor].topics)
+
     def subscribe(self, descriptor: int, token: bytes, topic: Topic) -> bool:
         """Note a subscription; False where the key has too many connections.
 

@@ -101,7 +101,9 @@ class ConnectionMonitor:
         elif event is _E.HANDSHAKE_FAILED_PROTOCOL:
             self.refused = self._mismatch()
         else:
-            self._broken_off += value in (errno.EPIPE, errno.ECONNRESET)
+            # At a socket file no key is asked for: such a hub has too many connections.
+            self._broken_off += (value in (errno.EPIPE, errno.ECONNRESET)
+                                 and not self._address.startswith("ipc://"))
             if self._broken_off >= _MIN_BROKEN_OFF:
                 self.refused = self._mismatch()
             return
@@ -120,8 +122,8 @@ class ConnectionMonitor:
             return KeyRefusedError(
                 f"{self._address}: the hub asks for a key there: expected --key and --hub-key")
         return KeyRefusedError(
-            f"{self._address}: the handshake fails: --hub-key is not the key of the hub there, or "
-            "it listens there without keys")
+            f"{self._address}: the handshake fails: --hub-key is not the key of the hub there, it "
+            "listens there without keys, or too many are connected")
 
 
 def connect(

@@ -4,21 +4,26 @@ libzmq closes such connections by itself and reports it on the socket's monitor.
 """
 
 import errno
-import os
 import socket
+import struct
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Protocol
 
 import zmq
-from zmq.utils.monitor import recv_monitor_message
 
 from denseface.service.monitoring import Rejections
 from denseface.service.transport.sockets import Socket, open_monitor
 
 _E = zmq.Event
-_EVENTS = (_E.ACCEPTED | _E.DISCONNECTED | _E.HANDSHAKE_SUCCEEDED | _E.HANDSHAKE_FAILED_AUTH
-           | _E.HANDSHAKE_FAILED_PROTOCOL | _E.HANDSHAKE_FAILED_NO_DETAIL)
+_EVENTS = (_E.ACCEPTED | _E.DISCONNECTED | _E.CLOSED | _E.HANDSHAKE_SUCCEEDED
+           | _E.HANDSHAKE_FAILED_AUTH | _E.HANDSHAKE_FAILED_PROTOCOL
+           | _E.HANDSHAKE_FAILED_NO_DETAIL)
+_EVENT = struct.Struct("=Hi")
+"""Event and value, as libzmq's monitor sends them."""
+_MAX_EVENTS = 10_000
+"""Events read at a time, some 50 ms; more than a thousand peers that connect again."""
 _DETAILS = {
     zmq.PROTOCOL_ERROR_ZMTP_CRYPTOGRAPHIC: "made for another hub key",
     zmq.PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH: "not the CURVE mechanism",
@@ -39,6 +44,9 @@ class Connections(Protocol):
     def all_closed(self) -> None:
         """Note that all connections were closed."""
 
+    def has_spoken(self, descriptor: int) -> bool:
+        """Say whether an allowed key has said something by a connection."""
+
 
 class HandshakeMonitor:
     """Counts the failed handshakes of one bound socket, and tells `connections` who is there.
@@ -53,6 +61,10 @@ class HandshakeMonitor:
         self._listening = listening
         self._connections = connections
         self.socket = open_monitor(listening, int(_EVENTS))
+        self.flooded = False
+        """More has happened than is read at a time: the socket is to be cut."""
+        self._accepted: dict[int, float] = {}
+        """Descriptor -> when the connection was accepted, monotonic seconds, of those open."""
         self._open: dict[int, str] = {}
         """Descriptor -> address of connections whose handshake is not over."""
         self._failed: str | None = None
@@ -61,36 +73,58 @@ class HandshakeMonitor:
         """Connections refused by the authenticator, which has counted them, and not yet closed."""
 
     def read(self) -> None:
-        """Read and count what happened."""
-        while True:
+        """Read and count what happened: of a flood a part, and `flooded` says so."""
+        for _ in range(_MAX_EVENTS):
             try:
-                event = recv_monitor_message(self.socket, zmq.DONTWAIT)
+                event, _ = self.socket.recv_multipart(zmq.DONTWAIT)
             except zmq.Again:
                 return
-            self._note(zmq.Event(event["event"]), event["value"])
+            self._note(*_EVENT.unpack(event))
+        self.flooded = True
 
     def forget(self) -> None:
-        """Forget the open handshakes: all connections were cut, which libzmq does not report."""
-        self.read()
-        self._open.clear()
-        self._connections.all_closed()
+        """Forget all connections: they were cut, which libzmq does not report.
+
+        To be called when the socket is unbound, so that what is to be read has an end.
+        """
+        self.flooded = True
+        while self.flooded:
+            self.flooded = False
+            self.read()
+        self._all_closed()
+
+    def silent(self, for_s: float) -> list[int]:
+        """Give the descriptors of connections that have said nothing for a time, oldest first."""
+        before = time.monotonic() - for_s
+        return [descriptor for descriptor, since in self._accepted.items()
+                if since <= before and not self._connections.has_spoken(descriptor)]
 
     def close(self) -> None:
         """Stop reading."""
         self._listening.disable_monitor()
         self.socket.close(linger=0)
 
-    def _note(self, event: zmq.Event, value: int) -> None:
-        if event is _E.ACCEPTED:
+    def _all_closed(self) -> None:
+        self._open.clear()
+        self._accepted.clear()
+        self._connections.all_closed()
+
+    def _note(self, event: int, value: int) -> None:
+        if event == _E.ACCEPTED:
+            self._accepted.pop(value, None)
+            self._accepted[value] = time.monotonic()
             self._connections.opened(value)
             self._open[value] = address_of(value)
-        elif event is _E.HANDSHAKE_SUCCEEDED:
+        elif event == _E.CLOSED:  # the listener, and all its connections with it
+            self._all_closed()
+        elif event == _E.HANDSHAKE_SUCCEEDED:
             # Of several at once it does not say which: another address may be named later.
             if self._open:
                 self._open.popitem()
-        elif event is _E.HANDSHAKE_FAILED_AUTH:
+        elif event == _E.HANDSHAKE_FAILED_AUTH:
             self._refused += 1
-        elif event is _E.DISCONNECTED:
+        elif event == _E.DISCONNECTED:
+            self._accepted.pop(value, None)
             self._connections.closed(value)
             self._ended(self._open.pop(value, None))
         elif value == errno.EFAULT:  # libzmq refuses the connection
@@ -124,23 +158,26 @@ def address_of(descriptor: int) -> str:
     return "gone"
 
 
-def end_connection(descriptor: int) -> None:
+def end_connection(descriptor: int) -> bool:
     """End one connection of libzmq's, which itself can only end all of a socket.
 
-    libzmq finds that the other end has gone.
+    libzmq finds that the other end has gone. False where there is no connection.
     """
     with suppress(OSError), connection_of(descriptor) as connection:
-        connection.shutdown(socket.SHUT_RDWR)
+        if not connection.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN):
+            connection.shutdown(socket.SHUT_RDWR)
+            return True
+    return False
 
 
 @contextmanager
 def connection_of(descriptor: int) -> Iterator[socket.socket]:
-    """Give a connection of libzmq's as a socket; OSError where there is none."""
-    copy = os.dup(descriptor)
+    """Give a connection of libzmq's as a socket; OSError where there is none.
+
+    It takes no descriptor of its own: there may be none left.
+    """
+    connection = socket.socket(fileno=descriptor)
     try:
-        connection = socket.socket(fileno=copy)
-    except OSError:
-        os.close(copy)
-        raise
-    with connection:
         yield connection
+    finally:
+        connection.detach()

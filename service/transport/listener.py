@@ -23,6 +23,7 @@ from denseface.service.security.zap import MESSAGES_DOMAIN, PUBLICATIONS_DOMAIN
 from denseface.service.transport import sockets
 from denseface.service.transport._bound_socket import BoundSocket, ServerCredentials
 from denseface.service.transport._input_limit import InputLimit
+from denseface.service.transport._key_limits import MAX_CONNECTIONS
 from denseface.service.transport._routing_ids import RoutingIds
 from denseface.service.transport._subscribers import Subscribers
 from denseface.service.transport.addresses import publications_of
@@ -93,7 +94,7 @@ class Listener:
             publisher.set(zmq.LINGER, 0)  # nothing more for a key that is cut off
             publisher.set(zmq.RCVBUF, _PUBLISHER_RCVBUF)
         self._router = BoundSocket(router, address, MESSAGES_DOMAIN, credentials, rejections,
-                                   self._routing_ids if credentials else None)
+                                   self._routing_ids)
         self._publisher = BoundSocket(
             publisher, publications_of(address), PUBLICATIONS_DOMAIN, credentials, rejections,
             self._subscribers)
@@ -108,7 +109,7 @@ class Listener:
     def sockets(self) -> list[zmq.Socket[bytes]]:
         """What is to be polled for reading: the ROUTER, then those of `read_events`."""
         both = self._router, self._publisher
-        return [*(one.socket for one in both), *(one.monitor.socket for one in both if one.monitor)]
+        return [*(one.socket for one in both), *(one.monitor.socket for one in both)]
 
     def close(self) -> None:
         """Unbind and leave no file of its own behind."""
@@ -119,9 +120,8 @@ class Listener:
 
     def receive(self) -> Iterator[Incoming]:
         """Give the messages that have come, a burst of them at most."""
-        if monitor := self._router.monitor:
-            # First, so that a descriptor used again is not taken for the one that closed.
-            monitor.read()
+        # First, so that a descriptor used again is not taken for the one that closed.
+        self._router.monitor.read()
         for _ in range(_BURST):
             try:
                 first, parts = sockets.receive_parts(
@@ -155,9 +155,8 @@ class Listener:
 
     def read_monitors(self) -> None:
         """Take note of who has connected and who has gone."""
-        for one in (self._router, self._publisher):
-            if one.monitor:
-                one.monitor.read()
+        self._router.monitor.read()
+        self._publisher.monitor.read()
 
     def subscriptions(self, topic: Topic) -> int:
         """Give the number of connections that are subscribed to a topic."""
@@ -187,6 +186,12 @@ class Listener:
 
     def tick(self) -> None:
         """Cut off keys that are no longer allowed, if they subscribed or go on sending."""
+        for one in (self._router, self._publisher):
+            if one.monitor.flooded:
+                one.cut()
+                self._rejections.note("connections", detail="a flood: all of a port are cut")
+            if self._credentials:
+                one.limit_silent()
         if self._revoked > _FLOOD:
             self._router.cut()
         self._revoked = 0
@@ -217,12 +222,26 @@ class Listener:
             with suppress(AddressError):  # libzmq's own thread has not closed it yet
                 one.bind()
 
+    @property
+    def guarded(self) -> bool:
+        """Only allowed keys may connect."""
+        return self._credentials is not None
+
+    def count(self, key: str) -> int:
+        """Give the number of connections by which messages of a key came, by its fingerprint."""
+        return self._routing_ids.count(key)
+
+    def end_silent(self) -> None:
+        """End every connection by which nothing was said."""
+        self._router.end_silent()
+        self._publisher.end_silent()
+
     def disconnect_all(self) -> bool:
-        """End every connection from another machine; those that are allowed come back.
+        """End every connection; those that are allowed come back.
 
         False where that was done already and the address is not yet bound again.
         """
-        if not self._credentials or not (self._router.bound or self._publisher.bound):
+        if not (self._router.bound or self._publisher.bound):
             return False
         self._router.cut()
         self._cut_publisher()
@@ -236,10 +255,16 @@ class Listener:
 
     def _has_its_own_id(self, incoming: Incoming, first: zmq.Frame) -> bool:
         """Say whether a message's routing id is its sender's; note where it came from."""
-        if self._credentials is None:
-            return True
-        token = incoming.peer[:_TOKEN_BYTES]
-        if self._routing_ids.claim(first.bytes, incoming.key, token, _descriptor(first)):
+        token, descriptor = incoming.peer[:_TOKEN_BYTES], _descriptor(first)
+        new = not self._routing_ids.has_spoken(descriptor)
+        if new:
+            self._router.monitor.read()  # it may have connected after the last look
+        if new and self.guarded and self._routing_ids.count(incoming.key) >= MAX_CONNECTIONS:
+            end_connection(descriptor)
+            self._rejections.note("connections", key=incoming.sender.name,
+                                  address=incoming.address, detail="too many of one key")
+            return False
+        if self._routing_ids.claim(first.bytes, incoming.key, token, descriptor):
             return True
         self._rejections.note(
             "identity", key=incoming.sender.name, address=incoming.address,
@@ -248,10 +273,6 @@ class Listener:
 
     def _is_connected(self, peer: bytes) -> bool:
         """Say whether a peer's own connection is still open: its id may be another's by now."""
-        monitor = self._router.monitor
-        if monitor is None:
-            return True
-        monitor.read()
         return self._routing_ids.is_open(peer[_TOKEN_BYTES:], peer[:_TOKEN_BYTES])
 
     def _user(self, first: zmq.Frame) -> AllowedKey | None:

@@ -11,12 +11,14 @@ from denseface.service.monitoring import Rejections
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Buffer
 from denseface.service.runtime.files import check_unwritable
-from denseface.service.runtime.limits import DescriptorWatch, MemoryWatch
+from denseface.service.runtime.limits import MemoryWatch
 from denseface.service.security import HUB_NAME, AllowedKey, AllowList, read_pair
 from denseface.service.security.permissions import ROLES_BY_TOPIC
 from denseface.service.security.zap import PUBLICATIONS_DOMAIN, Authenticator
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport._bound_socket import ServerCredentials
+from denseface.service.transport._descriptor_guard import DescriptorGuard
+from denseface.service.transport._key_limits import MAX_CONNECTIONS, KeyLimits
 from denseface.service.transport.addresses import check_bindable, is_local, socket_file
 from denseface.service.transport.listener import Incoming, Listener
 from denseface.service.transport.sockets import Context
@@ -43,7 +45,8 @@ class Listeners:
         self._listeners: list[Listener] = []
         self._rejections = rejections
         self._memory = MemoryWatch(settings.memory_mb << 20)
-        self._descriptors = DescriptorWatch()
+        self._descriptors = DescriptorGuard()
+        self._key_limits = KeyLimits()
         self._poller = zmq.Poller()
         for pollable in wakes:
             self._poller.register(pollable, zmq.POLLIN)
@@ -56,7 +59,7 @@ class Listeners:
                 keys = server_credentials(settings)
                 self._allow_list = keys.allow_list
                 self._authenticator = Authenticator(
-                    context, keys.allow_list, rejections, self._is_permitted)
+                    context, keys.allow_list, rejections, self._is_permitted, self._has_room)
                 self._poller.register(self._authenticator.socket, zmq.POLLIN)
                 self._listeners += [
                     Listener(context, address, keys, rejections) for address in guarded]
@@ -83,6 +86,7 @@ class Listeners:
         if self._authenticator:
             self._authenticator.close()
         self._memory.close()
+        self._descriptors.close()
 
     def tick(self) -> bool:
         """Apply changes of the allow-list and limits of memory and descriptors; see to the files.
@@ -91,26 +95,38 @@ class Listeners:
         """
         for listener in self._listeners:
             listener.restore_files()
-        if self._allow_list is None:
-            return False
-        self._allow_list.refresh()
-        changed = self._allow_list.changes != self._changes
-        self._changes = self._allow_list.changes
+        changed = False
+        if self._allow_list:
+            self._allow_list.refresh()
+            changed = self._allow_list.changes != self._changes
+            self._changes = self._allow_list.changes
         for listener in self._listeners:
             listener.tick()
-        if used := self._memory.over_limit():
-            self._disconnect_all("memory", f"{used >> 20} MB in use")
-        if used := self._descriptors.over_limit():
-            self._disconnect_all("connections", f"{used} descriptors in use")
+        self._limit_memory()
+        if ended := self._descriptors.take_ended():
+            self._rejections.note(
+                "connections", detail=f"{ended} beyond those that there are descriptors for: all "
+                "that say nothing are ended")
+            for listener in self._listeners:
+                listener.end_silent()
         else:  # libzmq ends the process where it has no descriptor to bind with
             for listener in self._listeners:
                 listener.rebind()
         return changed
 
-    def _disconnect_all(self, reason: str, detail: str) -> None:
-        cut = [listener.disconnect_all() for listener in self._listeners]
-        if any(cut):
-            self._rejections.note(reason, detail=f"{detail}: all connections from others are cut")
+    def _limit_memory(self) -> None:
+        """Cut the connections of other machines; those of this one where that was too little."""
+        used = self._memory.over_limit()
+        guarded = [listener for listener in self._listeners if listener.guarded]
+        if used and guarded:
+            cut, whose = guarded, "from others"
+        elif used or self._memory.cut_was_too_little:
+            cut, whose = [one for one in self._listeners if not one.guarded], "from this machine"
+        else:
+            return
+        if sum(listener.disconnect_all() for listener in cut):
+            detail = f"{used >> 20} MB in use" if used else "too much is still in use"
+            self._rejections.note("memory", detail=f"{detail}: all connections {whose} are cut")
 
     def receive(self, timeout_ms: int) -> Iterator[Incoming]:
         """Wait, then give the messages that have come.
@@ -151,6 +167,14 @@ class Listeners:
     def is_allowed(self, peer: bytes) -> bool:
         """Say whether a peer's key is allowed still, with the roles that it had."""
         return self._listeners[peer[0]].is_allowed(peer[1:])
+
+    def _has_room(self, user: AllowedKey, domain: bytes) -> bool:
+        """Say whether a key may connect once more."""
+        # Of publications the listener counts those that subscribe.
+        if domain != PUBLICATIONS_DOMAIN and sum(
+                one.count(user.fingerprint) for one in self._listeners) >= MAX_CONNECTIONS:
+            return False
+        return self._key_limits.take_handshake(user.public)
 
     def _is_permitted(self, user: AllowedKey, domain: bytes) -> bool:
         if domain != PUBLICATIONS_DOMAIN:

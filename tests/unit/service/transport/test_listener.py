@@ -118,6 +118,32 @@ def test_who_was_refused_connects_once_allowed(context, wakes, tmp_path, monkeyp
         listeners.close()
 
 
+def test_of_a_flood_a_part_is_read_and_then_the_port_is_cut(
+        context, wakes, tmp_path, monkeypatch):
+    monkeypatch.setattr("denseface.service.transport.handshakes._MAX_EVENTS", 50)
+    _, hub_key = new_pair(tmp_path, "hub")
+    secret, public = new_pair(tmp_path, "one")
+    allow(tmp_path, "one", read_public(public), frozenset({Role.WORKER}))
+    address, rejections = _address(), Rejections(Counters())
+    settings = ServiceSettings(address=address, key=secret, hub_key=hub_key)
+    hub_settings = ServiceSettings(address=_address(), listen=(address,), keys=tmp_path)
+    listeners = Listeners(context, hub_settings, rejections, [wakes])
+    host, port = address.removeprefix("tcp://").split(":")
+    for _ in range(100):
+        socket.create_connection((host, int(port))).close()
+    dealer, monitor = connect(context, zmq.DEALER, address, Credentials.of(settings))
+    try:
+        _until(listeners, lambda _: rejections.counts().get("connections"))
+        _until(listeners, lambda _: dealer.poll(0, zmq.POLLOUT))
+        dealer.send(b"hello")
+        (incoming,) = _until(listeners, lambda received: received)
+        assert listeners.send(incoming.peer, [b"back"])
+    finally:
+        monitor.close()
+        dealer.close(linger=0)
+        listeners.close()
+
+
 def test_keys_are_for_other_machines(tmp_path):
     secret, public = new_pair(tmp_path, "a")
     away = {"address": "tcp://10.0.0.1:5700"}
@@ -156,4 +182,9 @@ def test_memory_that_stays_with_the_process_is_said_once(monkeypatch, tmp_path):
 
     assert [over_limit(used) for used in (50, 120, 110, 130, 140, 150)] == [0, 120, 0, 0, 140, 0]
     assert [over_limit(used) for used in (50, 120)] == [0, 120]
+    assert not watch.cut_was_too_little
+    assert over_limit(119) == 0
+    assert watch.cut_was_too_little
+    assert over_limit(119) == 0
+    assert not watch.cut_was_too_little
     watch.close()

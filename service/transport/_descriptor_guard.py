@@ -1,0 +1,99 @@
+"""Descriptors that are kept free while connections flood in.
+
+libzmq takes every connection, and ends the process where it has no descriptor left for one to a
+socket file, or for a listener. The hub's own files need some too. Its loop looks a few times a
+second, and a flood takes a thousand in less, so a thread of its own looks.
+"""
+
+import os
+import resource
+import socket
+import threading
+from contextlib import suppress
+
+from denseface.service.runtime.limits import OUT_OF_DESCRIPTORS
+from denseface.service.transport.handshakes import connection_of, end_connection
+
+_WANTED = 65_536
+"""Descriptors that the system is asked for."""
+_MAX_USED = 4096
+"""Descriptors from which on connections are ended; half of all where there are fewer than 8192.
+All others are there for what comes between two looks: libzmq takes some thirty a millisecond."""
+_LOOK_S, _LOOK_AGAIN_S = 0.02, 0.002
+"""Time between two looks, seconds: usually, and where half of what may be used is."""
+_GAP = 64
+"""Descriptors in a row that are no sockets, after which no more are looked for."""
+
+
+class DescriptorGuard:
+    """Ends the connections that take descriptors beyond a ceiling; until `close`.
+
+    The system gives the lowest number that is free: where that is the ceiling, all below it are
+    taken. The limit of this process is raised as far as allowed.
+    """
+
+    def __init__(self) -> None:
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        wanted = _WANTED if hard == resource.RLIM_INFINITY else min(_WANTED, hard)
+        if soft != resource.RLIM_INFINITY and soft < wanted:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+        self._own = os.open(os.devnull, os.O_RDONLY | os.O_CLOEXEC)
+        self._ended = 0
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="descriptors", daemon=True)
+        self._thread.start()
+
+    def take_ended(self) -> int:
+        """Give the number of connections that were ended since it was asked last."""
+        ended = self._ended
+        self._ended -= ended
+        return ended
+
+    def close(self) -> None:
+        """End the thread."""
+        self._stop.set()
+        self._thread.join()
+        os.close(self._own)
+
+    def _run(self) -> None:
+        wait = _LOOK_S
+        while not self._stop.wait(wait):
+            limit, ceiling = _limit_and_ceiling()
+            lowest = self._lowest_free(limit)
+            wait = _LOOK_S if lowest < ceiling // 2 else _LOOK_AGAIN_S
+            if lowest >= ceiling:
+                self._ended += _end_from(ceiling, (ceiling + limit) // 2, limit)
+
+    def _lowest_free(self, limit: int) -> int:
+        try:
+            number = os.dup(self._own)
+        except OSError as error:
+            if error.errno not in OUT_OF_DESCRIPTORS:
+                raise
+            return limit
+        os.close(number)
+        return number
+
+
+def _limit_and_ceiling() -> tuple[int, int]:
+    """Give how many descriptors there may be, and from which on connections are ended."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if limit == resource.RLIM_INFINITY:
+        limit = 2 * _WANTED
+    return limit, min(_MAX_USED, limit // 2)
+
+
+def _end_from(first: int, first_local: int, limit: int) -> int:
+    """End all connections from a descriptor on, those to socket files from a higher one.
+
+    So a flood from elsewhere does not close the local door. Gives how many were ended.
+    """
+    ended = gap = 0
+    for descriptor in range(first, limit):
+        with suppress(OSError), connection_of(descriptor) as connection:
+            gap = 0
+            if descriptor >= first_local or connection.family != socket.AF_UNIX:
+                ended += end_connection(descriptor)
+        if (gap := gap + 1) > _GAP:
+            break
+    return ended
