@@ -186,9 +186,9 @@ class Listener:
 
     def tick(self) -> None:
         """Cut off keys that are no longer allowed, if they subscribed or go on sending."""
-        for one in (self._router, self._publisher):
+        for one, cut in ((self._router, self._router.cut), (self._publisher, self._cut_publisher)):
             if one.monitor.flooded:
-                one.cut()
+                cut()
                 self._rejections.note("connections", detail="a flood: all of a port are cut")
             if self._credentials:
                 one.limit_silent()
