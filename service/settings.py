@@ -4,7 +4,7 @@ import os
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import platformdirs
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
@@ -77,6 +77,8 @@ class ServiceSettings(BaseModel):
     """Free space of the disk, MiB, below which presses are refused."""
     metrics: Annotated[tuple[str, int] | None, BeforeValidator(parse_loopback_address)] = None
     """Host and port of `/metrics` and `/healthz`, on this machine alone; None for neither."""
+    log_ids: Literal["on", "off"] = "on"
+    """Whether the log shows captures' ids; else hashes of a key that each start makes anew."""
     resend_s: _Seconds = 2.0
     """Time after which an unanswered request or frame is sent again, seconds."""
 

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from denseface.capture import CaptureError, RgbdFrame
 from denseface.capture.errors import SensorError
 from denseface.service.daemons.sensor import SensorReader
+from denseface.service.log.output import exit_now
 from denseface.service.protocol import messages
 from denseface.service.protocol.payload import MAX_PREVIEW_SIDE, FrameHeader, PreviewHeader
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.failpoints import failpoint
-from denseface.service.runtime.log_output import exit_now
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.supervisor_link import SupervisorLink
 from denseface.service.settings import ServiceSettings

@@ -3,8 +3,9 @@
 import os
 from typing import Literal
 
+from denseface.service.log.events import configure
+from denseface.service.log.ids import IDS_VARIABLE
 from denseface.service.runtime import failpoints
-from denseface.service.runtime.logging import configure
 from denseface.service.runtime.process import name_process
 from denseface.service.runtime.signals import die_with_parent
 from denseface.service.runtime.supervisor_link import SupervisorLink
@@ -22,7 +23,8 @@ def start_process(name: str, log_format: Literal["text", "json"]) -> SupervisorL
     """
     name_process(b"denseface")
     die_with_parent()
-    configure(log_format, name)
+    # What is neither on nor off is refused later, by the settings: it hides them meanwhile.
+    configure(log_format, name, ids=os.environ.get(IDS_VARIABLE, "on") in ("", "on"))
     failpoints.arm(os.environ)
     return SupervisorLink.inherit(os.environ)
 

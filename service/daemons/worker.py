@@ -13,6 +13,7 @@ import structlog
 from denseface import recon
 from denseface.recon import ReconstructionError, reconstruct
 from denseface.recon.face import Face
+from denseface.service.log.output import exit_now
 from denseface.service.protocol import messages
 from denseface.service.protocol.message_base import MAX_JOBS
 from denseface.service.protocol.packing import warm_packing
@@ -20,7 +21,6 @@ from denseface.service.protocol.payload import Arrays, FaceHeader
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.failpoints import failpoint
-from denseface.service.runtime.log_output import exit_now
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.supervisor_link import Beat, SupervisorLink
 from denseface.service.settings import ServiceSettings

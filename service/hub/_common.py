@@ -7,6 +7,9 @@ from denseface.service.hub.peers import Peers
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage import FolderStore, Writer
 
+LOCAL = "local"
+"""Stands in the log for the key of a peer that needed none."""
+
 
 class Common(NamedTuple):
     """What the parts of the hub share."""

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from denseface.recon.settings import Settings
 from denseface.service import errors, storage
-from denseface.service.hub._common import Common
+from denseface.service.hub._common import LOCAL, Common
 from denseface.service.hub.captures import Captures
 from denseface.service.hub.jobs import Jobs
 from denseface.service.hub.maintenance import Maintenance
@@ -89,7 +89,8 @@ class Hub:
         except errors.DamagedDatabaseError:
             raise
         except errors.ServiceError as error:
-            self._log.error("message failed", kind=packet.message.kind, reason=str(error))
+            self._log.error("message failed", kind=packet.message.kind, reason=str(error),
+                            key=key or LOCAL)
             request = getattr(packet.message, "request", None)
             if request is not None:
                 outputs.append(send(peer, messages.RequestFailed(
@@ -243,28 +244,30 @@ class Hub:
         limit = self._peers.too_many(peer, key, known)
         if limit is not None:
             why = f"{limit} {'sensors' if sensor else 'workers'} are there already"
-            self._rejections.note("limit", key=key, name=message.name, detail=why)
+            self._rejections.note("limit", key=key or LOCAL, name=message.name, detail=why)
             yield send(peer, messages.Denied(message=why))
         elif isinstance(message, messages.WorkerReady):
             self._worker_ready(now, peer, message.name, message.credit, key)
         elif self._peers.sensor_ready(peer, message.name, now, key):
-            self._log.info("sensor ready", name=message.name, source=message.source)
+            self._log.info("sensor ready", name=message.name, source=message.source,
+                           key=key or LOCAL)
 
     def _worker_ready(self, now: float, peer: bytes, name: str, credit: int, key: str) -> None:
         known, asked = self._peers.workers.get(peer), self._peers.was_asked(peer)
         if known is None:
-            self._log.info("worker ready", name=name)
+            self._log.info("worker ready", name=name, key=key or LOCAL)
         elif credit <= known.credit and not asked:
-            self._rejections.note("replayed", name=name, detail=f"credit {credit}")
+            self._rejections.note(
+                "replayed", key=key or LOCAL, name=name, detail=f"credit {credit}")
         self._peers.worker_ready(peer, name, credit, now, key)
 
     def _disconnected(self, peer: bytes, reason: str) -> Iterator[Output]:
         say = self._log.info if reason == "goodbye" else self._log.warning
         if sensor := self._peers.sensors.pop(peer, None):
-            say("sensor gone", name=sensor.name, reason=reason)
+            say("sensor gone", name=sensor.name, reason=reason, key=sensor.key or LOCAL)
             yield from self._presses.sensor_gone(peer, reason)
         if worker := self._peers.workers.pop(peer, None):
-            say("worker gone", name=worker.name, reason=reason)
+            say("worker gone", name=worker.name, reason=reason, key=worker.key or LOCAL)
             self._jobs.worker_lost(worker)
 
     def _status(self, request: int = 0) -> messages.Status:

@@ -11,7 +11,7 @@ import structlog
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import ServiceError, StoreError
-from denseface.service.hub._common import Common
+from denseface.service.hub._common import LOCAL, Common
 from denseface.service.monitoring import Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
@@ -125,7 +125,7 @@ class Presses:
             yield from self._refuse_all(capture_id, {peer: presser}, reason, why)
             return
         self._captures.advance(capture_id, CaptureEvent.PRESSED)
-        self._log.info("pressed", capture_id=capture_id, sensor=sensor.name)
+        self._log.info("pressed", capture_id=capture_id, sensor=sensor.name, key=key or LOCAL)
         deadline = now + self._settings.take_timeout_s
         self._presses[capture_id] = _Press(sensor.peer, deadline, key, {peer: presser})
         yield send(sensor.peer, messages.Take(capture_id=capture_id))
@@ -253,7 +253,8 @@ class Presses:
         self, capture_id: str, pressers: Mapping[bytes, _Presser], reason: messages.PressReason,
         why: str,
     ) -> Iterator[Output]:
-        self._log.warning("press refused", capture_id=capture_id, reason=why)
+        whose = next((one.key for one in pressers.values()), "") or LOCAL
+        self._log.warning("press refused", capture_id=capture_id, reason=why, key=whose)
         for peer, (request, key) in pressers.items():
             refused = messages.PressRefused(
                 request=request, capture_id=capture_id, reason=reason, message=why)

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import structlog
 
+from denseface.service.log.output import process_log
 from denseface.service.monitoring.figures import Figures, Histogram
 from denseface.service.monitoring.message_watch import MessageWatch
 from denseface.service.protocol.messages import Status
 from denseface.service.protocol.outgoing import Output, Publish
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.closing import Closing
-from denseface.service.runtime.log_output import process_log
 
 __all__ = ["Observer", "Snapshot", "folder_bytes"]
 

@@ -1,4 +1,4 @@
-"""A process's plumbing: logging, signals, threads, files, limits.
+"""A process's plumbing: terminals, signals, threads, files, limits.
 
 Imported by module: what only parses a setting needs no logging.
 """

@@ -14,14 +14,14 @@ import psutil
 import pytest
 
 from denseface.service.protocol import messages
-from tests.system.guarded import FRAME, FRAME_ARRAYS, Peer
+from tests.system.guarded import FRAME, FRAME_ARRAYS, Peer, guarded_hub
 from tests.system.running import PACE, RECORDINGS, REPOSITORY, denseface
 from tests.waiting import LIMIT_S, until
 
 _PIPE_BYTES = 4096
 """Smallest buffer that Linux gives a pipe."""
-_SHORT_QUEUE = ("from denseface.service.runtime import log_output\n"
-                "log_output._MAX_BYTES = 500\n")
+_SHORT_QUEUE = ("from denseface.service.log import output\n"
+                "output._MAX_BYTES = 500\n")
 """Python that makes a stalled log lose lines soon."""
 
 
@@ -109,3 +109,52 @@ def test_a_service_whose_log_is_broken_makes_faces_and_stops_in_order(how, tmp_p
                 for one in family:
                     one.kill()
             process.wait()
+
+
+def _refused_for_want_of_a_sensor(presser: Peer) -> bool:
+    """Press as long as the hub waits for the sensors that it may have had before it started."""
+    presser.send(messages.Press(request=0, capture_id="p0"))
+    return bool(presser.socket.poll(100))
+
+
+def test_who_floods_the_log_does_not_fill_it(tmp_path):
+    with guarded_hub(tmp_path, DENSEFACE_LIVENESS="2") as hub:
+        presser, worker = hub.peer("presser"), hub.peer("worker")
+        try:
+            until(lambda: _refused_for_want_of_a_sensor(presser))
+            for number in range(1, 501):  # there is no sensor: each is refused
+                presser.send(messages.Press(request=number, capture_id=f"p{number}"))
+                worker.send(messages.WorkerReady(name=f"w{number}", credit=0))
+                worker.send(messages.Goodbye())
+            until(lambda: hub.status().presses_refused.get("no_sensor", 0) > 500)
+            text = until(lambda: "lines suppressed" in hub.log.read_text() and hub.log.read_text())
+            assert text.count("press refused") < 100
+            assert len(text.splitlines()) < 1000
+            # It hides nobody else.
+            other = hub.peer("operator")
+            other.send(messages.WorkerReady(name="x", credit=0))
+            until(lambda: "key=operator" in hub.log.read_text())
+            other.close()
+        finally:
+            presser.close()
+            worker.close()
+
+
+def test_a_log_without_ids_names_no_capture_in_any_process(tmp_path):
+    log = tmp_path / "log"
+    with tempfile.TemporaryDirectory(prefix="df-") as short, log.open("w") as stderr:
+        address = f"ipc://{short}/hub"
+        process = subprocess.Popen(
+            [sys.executable, "-m", "denseface", "up", "--workers", "1", "--address", address,
+             "--source", str(RECORDINGS / "frontal_700.oni"), "--data", str(tmp_path / "data")],
+            cwd=REPOSITORY, stderr=stderr, env=os.environ | PACE | {"DENSEFACE_LOG_IDS": "off"})
+        try:
+            pressed = denseface("press", "--id", "Visitor-17", "--address", address)
+            assert pressed.returncode == 0, pressed.stderr
+        finally:
+            process.terminate()
+            assert process.wait(LIMIT_S) == 0
+    text = log.read_text()
+    assert "Visitor-17" not in text
+    ids = {word for word in text.split() if word.startswith("capture_id=")}
+    assert len(ids) == 1  # of hub, capture process and worker

@@ -12,7 +12,7 @@ import structlog
 
 from denseface.capture.npz import save_frame
 from denseface.service.cli import main
-from denseface.service.runtime.log_output import process_log
+from denseface.service.log.output import process_log
 from tests.unit.frames import calibration, frame
 from tests.waiting import LIMIT_S
 

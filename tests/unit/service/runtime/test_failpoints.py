@@ -78,8 +78,9 @@ def test_what_is_unknown_is_refused_in_one_line(text, named):
 @pytest.mark.parametrize(("action", "number"), [("kill", signal.SIGKILL), ("stop", signal.SIGSTOP)])
 def test_a_process_ends_or_stops_at_the_third_time(action, number):
     code = ("import os\nfrom denseface.service.runtime.failpoints import arm, failpoint\n"
-            "from denseface.service.runtime.logging import configure\n"
-            "configure('text', 'test')\narm(os.environ)\n"
+            "from denseface.service.log.events import configure\n"
+            "from denseface.service.log.output import process_log\n"
+            "configure('text', 'test')\narm(os.environ)\nprocess_log.flush()\n"
             "for time in range(4):\n print(time, flush=True)\n failpoint('hub.job.sent')\n")
     with subprocess.Popen(
             [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE,

@@ -1,9 +1,13 @@
 """Who may say what."""
 
+import sys
 
 import pytest
+import structlog
 
 from denseface.recon.settings import Settings
+from denseface.service.log.events import configure
+from denseface.service.log.output import process_log
 from denseface.service.monitoring import Counters, Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.payload import FrameHeader
@@ -16,6 +20,7 @@ from denseface.service.security.permissions import (
     missing_role,
 )
 from tests.unit.service.faces import small_frame
+from tests.waiting import LIMIT_S
 
 FRAME, _ = FrameHeader.of(small_frame())
 SAID = [
@@ -84,15 +89,18 @@ def test_a_presser_gets_what_it_pressed(role, own, may):
     assert may or lacks == "get_face needs the role subscriber"
 
 
-def test_refusals_are_all_counted_and_not_all_logged(capsys):
-    counters, now = Counters(), [0.0]
-    rejections = Rejections(counters, lambda: now[0])
-    for _ in range(1000):
+def test_refusals_are_all_counted_and_not_all_logged(capfd, monkeypatch):
+    monkeypatch.setattr(sys, "stderr", sys.stderr)
+    configure("text", "hub")
+    counters = Counters()
+    rejections = Rejections(counters)
+    for number in range(1000):
         rejections.note("role", key="a")
-    rejections.note("malformed", key="b")
-    now[0] = 60.0
-    rejections.note("role", key="a")
-    logged = [line for line in capsys.readouterr().out.splitlines() if "refused" in line]
-    assert len(logged) == 7
-    assert "suppressed=995" in logged[-1]
-    assert counters.by_label("refused") == {"malformed": 1, "role": 1001}
+        rejections.note("unknown key", key=f"stranger{number}", address=f"x:{number}")
+    rejections.note("role", key="b")
+    process_log.flush(LIMIT_S)
+    structlog.reset_defaults()
+    logged = capfd.readouterr().err
+    assert (logged.count("key=a"), logged.count("key=stranger")) == (20, 20)
+    assert logged.count("key=b") == 1
+    assert counters.by_label("refused") == {"role": 1001, "unknown key": 1000}

@@ -10,6 +10,7 @@ import os
 import select
 import signal
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from typing import NoReturn
@@ -21,6 +22,8 @@ _MAX_BYTES = 2**18
 """Lines in memory that are not yet written, bytes: a thousand or two."""
 _FLUSH_S = 1.0
 """Longest wait at exit for lines that are not yet written, seconds."""
+_INTERVAL_S = 1.0
+"""Time between two calls of `on_interval`, seconds."""
 _MAX_PARTIAL = 2**14
 """Characters of a line without an end that are kept, waiting for its end."""
 
@@ -35,10 +38,12 @@ class LogOutput:
     ----------
     on_recovery : called in the thread with the number of lines lost since it was called last and
         since the start, when a line was written after some were lost; what it `put`s comes next
+    on_interval : called in the thread once a second
     """
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
+        self.on_interval: Callable[[], None] = lambda: None
         self.on_recovery: Callable[[int, int], None] = lambda _, __: None
         self._reset()
         os.register_at_fork(after_in_child=self._reset)
@@ -92,23 +97,32 @@ class LogOutput:
         # Signals are for the main thread. Besides, a terminal stops a process in the background
         # that writes to it and does not block SIGTTOU, where `stty tostop` was said.
         signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
+        due = time.monotonic() + _INTERVAL_S
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._lines)
-                line = self._lines[0]
-            written = self._write(line)
-            with self._changed:
-                self._lines.popleft()
-                self._bytes -= len(line)
-                self._lost += not written
-                lost, told = self._lost, self._told
-                if written:
-                    self._told = lost
-                self._changed.notify_all()
-            if written and lost > told:
-                self._recovering = threading.get_ident()
-                self.on_recovery(lost - told, lost)
-                self._recovering = None
+                self._changed.wait_for(lambda: self._lines, max(0.0, due - time.monotonic()))
+                line = self._lines[0] if self._lines else None
+            if line is not None:
+                self._write_first(line)
+            if (now := time.monotonic()) >= due:
+                due = now + _INTERVAL_S
+                self.on_interval()
+
+    def _write_first(self, line: bytes) -> None:
+        """Write the first line of those that wait, or lose it; only now it waits no more."""
+        written = self._write(line)
+        with self._changed:
+            self._lines.popleft()
+            self._bytes -= len(line)
+            self._lost += not written
+            lost, told = self._lost, self._told
+            if written:
+                self._told = lost
+            self._changed.notify_all()
+        if written and lost > told:
+            self._recovering = threading.get_ident()
+            self.on_recovery(lost - told, lost)
+            self._recovering = None
 
     def _write(self, line: bytes) -> bool:
         """Write a line and wait as long as that takes; False where it is lost, or a part of it."""

@@ -7,8 +7,8 @@ import threading
 
 import pytest
 
-from denseface.service.runtime import log_output
-from denseface.service.runtime.log_output import LogOutput, LogStream
+from denseface.service.log import output
+from denseface.service.log.output import LogOutput, LogStream
 from tests.waiting import LIMIT_S, until
 
 PIPE_BYTES = 4096
@@ -74,7 +74,7 @@ def test_lines_that_cannot_be_written_are_counted_and_said_later(path, file):
 
 
 def test_nobody_waits_for_a_reader_that_has_stopped(pipe, monkeypatch):
-    monkeypatch.setattr(log_output, "_MAX_BYTES", 100)
+    monkeypatch.setattr(output, "_MAX_BYTES", 100)
     reader, writer = pipe
     log = noting(LogOutput(writer))
     for number in range(1000):

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import structlog
 
-from denseface.service.runtime.log_output import process_log
-from denseface.service.runtime.logging import configure
+from denseface.service.log.events import configure
+from denseface.service.log.output import process_log
 from tests.waiting import LIMIT_S
 
 
@@ -113,7 +113,7 @@ def test_every_line_is_json_whatever_is_in_it(logged):
 def test_what_python_and_libraries_say_is_json_too():
     code = """if True:
         import logging, threading, warnings
-        from denseface.service.runtime.logging import configure
+        from denseface.service.log.events import configure
         configure("json", "test")
         warnings.warn("old")
         logging.getLogger("library").error("broken %s", "pipe")

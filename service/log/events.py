@@ -7,12 +7,15 @@ import os
 import sys
 import threading
 import warnings
+from collections.abc import Callable
 from typing import Any, Literal, TextIO
 
 import structlog
 from structlog.typing import EventDict, ExcInfo, Processor
 
-from denseface.service.runtime.log_output import LogStream, process_log
+from denseface.service.log.ids import IdHider
+from denseface.service.log.limit import LogLimit
+from denseface.service.log.output import LogStream, process_log
 from denseface.service.runtime.terminal import printable
 
 __all__ = ["LogFormat", "configure"]
@@ -20,20 +23,25 @@ __all__ = ["LogFormat", "configure"]
 LogFormat = Literal["text", "json"]
 
 
-def configure(log_format: LogFormat, process: str) -> None:
+def configure(log_format: LogFormat, process: str, *, ids: bool = True) -> None:
     """Send every event of this process to stderr, with the process's name.
 
     So goes what is printed on `sys.stderr`. Nothing of it waits or raises: what cannot be written
-    is lost and counted (`log_output`). In text, what came from outside is escaped. In JSON, what
-    Python and the libraries report becomes events too: warnings, records of the standard library's
-    logging, exceptions that nobody catches.
+    is lost and counted (`service.log.output`), what is too much of one kind is suppressed and
+    counted (`service.log.limit`). In text, what came from outside is escaped. In JSON, what Python
+    and the libraries report becomes events too: warnings, records of the standard library's
+    logging, exceptions that nobody catches. Without `ids`, hashes stand for captures' ids.
     """
-    renderers: list[Processor]
+    hider = None if ids else IdHider()
+    hide: Callable[[str], str] = hider.hide if hider else str
+    limit = LogLimit()
+    renderers: list[Processor] = [hider] if hider else []
     if log_format == "json":
-        renderers = [structlog.processors.format_exc_info, structlog.processors.JSONRenderer()]
+        renderers = [structlog.processors.format_exc_info, *renderers,
+                     structlog.processors.JSONRenderer()]
     else:
-        renderers = [_escape, structlog.dev.ConsoleRenderer(
-            colors=os.isatty(2), exception_formatter=_write_traceback)]
+        renderers += [_escape, structlog.dev.ConsoleRenderer(
+            colors=os.isatty(2), exception_formatter=_traceback_writer(hide))]
 
     def add_process(_: Any, __: str, event: EventDict) -> EventDict:
         event["process"] = process
@@ -41,6 +49,7 @@ def configure(log_format: LogFormat, process: str) -> None:
 
     structlog.configure(
         processors=[
+            limit,
             add_process,
             structlog.processors.add_log_level,
             structlog.processors.TimeStamper(fmt="iso", utc=True),
@@ -52,11 +61,13 @@ def configure(log_format: LogFormat, process: str) -> None:
         cache_logger_on_first_use=True,
     )
     process_log.on_recovery = _log_lost
+    process_log.on_interval = lambda: _log_suppressed(limit)
     if log_format == "json":
-        sys.stderr = LogStream(lambda line: structlog.get_logger("stderr").warning(line))
+        sys.stderr = LogStream(
+            lambda line: structlog.get_logger("stderr").warning(line, per=("stderr",)))
         _forward_others()
     else:
-        sys.stderr = LogStream(lambda line: process_log.put(printable(line)))
+        sys.stderr = LogStream(lambda line: process_log.put(printable(hide(line))))
 
 
 class _Lines:
@@ -75,6 +86,11 @@ def _log_lost(lines: int, since_start: int) -> None:
     structlog.get_logger("log").warning("lines lost", lines=lines, since_start=since_start)
 
 
+def _log_suppressed(limit: LogLimit) -> None:
+    for kind, lines in limit.suppressed():
+        structlog.get_logger("log").info("lines suppressed", of=kind, lines=lines)
+
+
 class _Escaped(str):
     """A text that is escaped already; what quotes it does not escape it once more."""
 
@@ -88,11 +104,15 @@ def _escape(_: Any, __: str, event: EventDict) -> EventDict:
             for key, value in event.items()}
 
 
-def _write_traceback(stream: TextIO, error: ExcInfo) -> None:
-    """Write it indented, so that no line of an error's text passes for one of the log."""
-    text = io.StringIO()
-    structlog.dev.plain_traceback(text, error)
-    stream.writelines(f"\n  {printable(line)}" for line in text.getvalue().strip("\n").split("\n"))
+def _traceback_writer(hide: Callable[[str], str]) -> Callable[[TextIO, ExcInfo], None]:
+    def write(stream: TextIO, error: ExcInfo) -> None:
+        """Write it indented, so that no line of an error's text passes for one of the log."""
+        text = io.StringIO()
+        structlog.dev.plain_traceback(text, error)
+        for line in hide(text.getvalue()).strip("\n").split("\n"):
+            stream.write(f"\n  {printable(line)}")
+
+    return write
 
 
 def _without_data(_: Any, __: str, event: EventDict) -> EventDict:
@@ -120,7 +140,8 @@ class _Forward(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         structlog.get_logger(record.name).log(
-            record.levelno, record.getMessage(), logger=record.name, exc_info=record.exc_info)
+            record.levelno, record.getMessage(), logger=record.name, exc_info=record.exc_info,
+            per=("logging", record.name))
 
 
 def _forward_others() -> None:
@@ -130,7 +151,8 @@ def _forward_others() -> None:
         message: Warning | str, category: type[Warning], filename: str, lineno: int,
         file: TextIO | None = None, line: str | None = None,  # noqa: ARG001
     ) -> None:
-        log.warning(str(message), category=category.__name__, where=f"{filename}:{lineno}")
+        log.warning(str(message), category=category.__name__, where=f"{filename}:{lineno}",
+                    per=("warnings",))
 
     def uncaught(what: "threading.ExceptHookArgs | sys.UnraisableHookArgs") -> None:
         if what.exc_value is not None:
