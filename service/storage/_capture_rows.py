@@ -8,7 +8,7 @@ from denseface.service.errors import StoreError
 from denseface.service.protocol.message_base import DeadLetter
 from denseface.service.protocol.states import CaptureState
 from denseface.service.runtime.failpoints import failpoint
-from denseface.service.storage._database import Database
+from denseface.service.storage._database import MAX_ERROR, MAX_MESSAGE, Database
 from denseface.service.storage._store_clock import StoreClock, format_timestamp
 
 _MAX_MESSAGE = 300
@@ -56,7 +56,8 @@ class NewOutcome:
         connection.execute(
             "INSERT INTO outcomes (capture_id, face_sha256, error, message, dead, finished_at,"
             " finished_age_s) VALUES (?, ?, ?, ?, ?, ?, ?)",
-            (capture_id, self.face_sha256, self.error, self.message,
+            (capture_id, self.face_sha256, self.error and self.error[:MAX_ERROR],
+             self.message and self.message[:MAX_MESSAGE],
              self.state is CaptureState.DEAD, self.finished_at, self.age_s))
 
 

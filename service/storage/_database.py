@@ -4,7 +4,7 @@ import secrets
 import sqlite3
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from copy import copy
 from pathlib import Path
 from threading import Event
@@ -15,8 +15,10 @@ from denseface.service.runtime.files import sync_folder
 
 _VERSION = 3
 """Version of the schema, in `PRAGMA user_version`."""
-_MAX_SEQUENCE = 2**53
-"""Sequence numbers stay below it; a higher one is damage."""
+_MAX_NUMBER = 2**53
+"""Sequence numbers, positions and attempts stay below it; a higher one is damage."""
+MAX_ERROR, MAX_MESSAGE = 200, 4000
+"""Characters of an outcome's error and its reason, as `CaptureFailed` allows."""
 _BUSY_S = 1.0
 """Longest wait for another program that has the database open, seconds."""
 _LOG_TRIES, _LOG_PAUSE_S = 10, 0.005
@@ -59,6 +61,36 @@ CREATE INDEX IF NOT EXISTS outcomes_by_time ON outcomes (finished_at);
 CREATE INDEX IF NOT EXISTS outcomes_by_age ON outcomes (finished_age_s);
 """
 """Added to an older database too; they are no part of `_VERSION`, as a rebuild loses outcomes."""
+_TIME = "-".join(["[0-9]" * 4, "[0-9]" * 2, "[0-9]" * 2 + "T*+00:00"])
+"""As `format_timestamp` writes it, for GLOB; that it is a time is a CHECK of the schema."""
+_IMPOSSIBLE = {
+    "an epoch": """
+        SELECT value FROM meta WHERE name = 'epoch'
+            AND (length(value) != 16 OR value GLOB '*[^0-9a-f]*')""",
+    "a capture": f"""
+        SELECT capture_id FROM captures WHERE capture_id NOT GLOB '[A-Za-z0-9]*'
+            OR accepted_at NOT GLOB '{_TIME}' OR attempts >= {_MAX_NUMBER}""",  # noqa: S608
+    "an outcome": f"""
+        SELECT sequence FROM outcomes WHERE finished_at NOT GLOB '{_TIME}'
+            OR abs(finished_age_s) >= {_MAX_NUMBER}
+            OR length(error) > {MAX_ERROR} OR length(message) > {MAX_MESSAGE}""",  # noqa: S608
+    "the state of": """
+        SELECT capture_id FROM captures LEFT JOIN outcomes USING (capture_id) WHERE state != CASE
+            WHEN sequence IS NULL THEN iif(state = 'removed', 'removed', 'accepted')
+            WHEN face_sha256 IS NULL THEN iif(dead, 'dead', 'failed')
+            ELSE iif(dead, '', 'done') END""",
+    "the last number of": f"""
+        SELECT name FROM (
+            SELECT 'captures' AS name, (SELECT max(position) FROM captures) AS highest
+            UNION ALL SELECT 'outcomes', (SELECT max(sequence) FROM outcomes))
+            LEFT JOIN sqlite_sequence USING (name)
+            WHERE coalesce(seq, 0) NOT BETWEEN coalesce(highest, 0) AND {_MAX_NUMBER - 1}""",  # noqa: S608
+    "a reference from": """
+        SELECT "table" FROM pragma_foreign_key_check""",
+}
+"""What a sound database never holds: name of it -> query that finds it.
+
+The hub would end, or say what is not so."""
 
 
 class Database:
@@ -116,22 +148,40 @@ class Database:
             self.is_new = True
             connection.executescript(f"BEGIN; {_SCHEMA} COMMIT")
             sync_folder(self.path.parent)  # SQLite syncs the name of its log alone
-        (version,) = connection.execute("PRAGMA user_version").fetchone()
-        if version != _VERSION:
-            raise DamagedDatabaseError(
-                f"{self.path}: is of version {version}, {_VERSION} expected")
-        found = [row[0] for row in connection.execute("PRAGMA integrity_check(3)")]
-        if found != ["ok"]:
-            reason = " ".join("; ".join(found).split())
-            raise DamagedDatabaseError(f"{self.path}: {reason}"[:500])
-        last, highest = connection.execute(
-            "SELECT coalesce((SELECT seq FROM sqlite_sequence WHERE name = 'outcomes'), 0),"
-            " coalesce((SELECT max(sequence) FROM outcomes), 0)").fetchone()
-        if not highest <= last < _MAX_SEQUENCE:
-            raise DamagedDatabaseError(f"{self.path}: the last number is {last}, found {highest}")
-        connection.executescript(_INDEXES)
+        if damage := next(self._damage(), None):
+            raise DamagedDatabaseError(f"{self.path}: {' '.join(damage.split())}"[:500])
+        self._make_indexes()
         connection.execute(
             "INSERT OR IGNORE INTO meta VALUES ('epoch', ?)", (secrets.token_hex(8),))
+
+    def _damage(self) -> Iterator[str]:
+        """Say what is wrong, the coarsest first: what comes later relies on what came before."""
+        connection = self._connection
+        (version,) = connection.execute("PRAGMA user_version").fetchone()
+        if version != _VERSION:
+            yield f"is of version {version}, {_VERSION} expected"
+        with closing(sqlite3.connect(":memory:")) as sound:
+            sound.executescript(_SCHEMA)
+            for name in sorted({name for name, _ in _schema(connection) ^ _schema(sound)}):
+                yield f"the schema differs in {name}"
+        found = [row[0] for row in connection.execute("PRAGMA integrity_check(3)")]
+        if found != ["ok"]:
+            yield "; ".join(found)
+        for what, query in _IMPOSSIBLE.items():
+            if row := connection.execute(f"{query} LIMIT 1").fetchone():
+                yield f"{what} {row[0]!r} is not possible"
+
+    def _make_indexes(self) -> None:
+        """Make the indexes, and remove others: one may forbid rows that are right."""
+        connection = self._connection
+        found = "SELECT name FROM sqlite_schema WHERE type = 'index' AND sql IS NOT NULL"
+        with closing(sqlite3.connect(":memory:")) as sound:
+            sound.executescript(_SCHEMA + _INDEXES)
+            ours = {name for name, in sound.execute(found)}
+        for name, in connection.execute(found).fetchall():
+            if name not in ours:
+                connection.execute('DROP INDEX "{}"'.format(name.replace('"', '""')))
+        connection.executescript(_INDEXES)
 
     @property
     def change_count(self) -> int:
@@ -293,6 +343,12 @@ class Database:
             raise StoreError(reason) from error
         except UnicodeDecodeError as error:  # from a damaged name in SQLite's message
             raise DamagedDatabaseError(f"{self.path.name}: malformed") from error
+
+
+def _schema(connection: sqlite3.Connection) -> set[tuple[str, str]]:
+    """Give name and definition of all but indexes, and what SQLite makes for itself."""
+    return {(name, " ".join(definition.split())) for name, definition in connection.execute(
+        "SELECT name, sql FROM sqlite_schema WHERE type != 'index' AND name NOT GLOB 'sqlite_*'")}
 
 
 def _code(error: sqlite3.Error) -> int:

@@ -104,6 +104,13 @@ def test_outcomes_are_numbered_in_order(store):
     assert store.outcome("d") is None
 
 
+def test_a_reason_is_as_long_as_a_message_may_be(store):
+    accept(store, frame("a"), Settings(), "0f")
+    store.fail("a", CaptureState.DEAD, "E" * 300, "m" * 5000)
+    message = store.outcome("a").message
+    assert (len(message.error), len(message.message)) == (200, 4000)
+
+
 def test_a_second_outcome_changes_nothing(store):
     accept(store, frame("a"), Settings(), "0f")
     finish(store, result("a", store))
