@@ -328,11 +328,12 @@ class Jobs:
                           else "its answer was lost")
                 self._take_back(one, "RemoteProtocolError", reason)
         late = not held and self._is_late(capture_id, key)
-        if not useful and late:
-            self._log.info("late answer dropped", capture_id=capture_id, answer=answer.kind)
-        elif not useful:
-            self._rejections.note(
-                "replayed", capture_id=capture_id, detail=f"{event}, not asked for")
+        if not useful:
+            what = f"{event}, not asked for"
+            if late:
+                self._log.info("late answer dropped", capture_id=capture_id, detail=what)
+            else:
+                self._rejections.note("replayed", capture_id=capture_id, detail=what)
         return useful
 
     def _was_sent(self, stored: CaptureRow, key: str) -> bool:
