@@ -95,5 +95,6 @@ def _exit_status(error: Exception) -> int:
     from denseface.service import errors
 
     wrong_input = (CalibrationError, FrameError, UnreadableSourceError, errors.FormatError,
-                   errors.LocalProtocolError, errors.SettingsError, errors.UsageError)
+                   errors.FrameTooLargeError, errors.LocalProtocolError, errors.SettingsError,
+                   errors.UsageError)
     return _USAGE if isinstance(error, wrong_input) else _FAILED

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
 __all__ = [
     "AddressError", "AuthenticatorStoppedError", "CaptureFailedError", "ClientClosedError",
     "ClientForkedError", "ClientTimeoutError", "CorruptFileError", "DamagedDatabaseError",
-    "DamagedFaceError", "DiskFullError", "FormatError", "HubRunningError", "KeyFileError",
-    "KeyRefusedError", "LocalProtocolError", "PressRefusedError", "ProtocolError",
+    "DamagedFaceError", "DiskFullError", "FormatError", "FrameTooLargeError", "HubRunningError",
+    "KeyFileError", "KeyRefusedError", "LocalProtocolError", "PressRefusedError", "ProtocolError",
     "RemoteProtocolError", "RequestFailedError", "ServiceError", "SettingsError", "StoreError",
     "UnknownCaptureError", "UsageError", "first_error", "reason_of",
 ]
@@ -139,6 +139,10 @@ class KeyRefusedError(ServiceError, PermissionError):
 
 class HubRunningError(ServiceError, RuntimeError):
     """Another hub already serves this address or data folder."""
+
+
+class FrameTooLargeError(ServiceError, ValueError):
+    """A frame has more pixels than the setting allows."""
 
 
 class FormatError(ServiceError, ValueError):

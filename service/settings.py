@@ -15,6 +15,8 @@ from denseface.service.runtime.parsing import parse_loopback_address, parse_rete
 __all__ = ["ServiceSettings", "default_address", "runtime_folder"]
 
 _PREFIX = "DENSEFACE_"
+_MESSAGE_PIXELS = 2**25 // 3
+"""Largest colour image that an array of a message holds."""
 _Seconds = Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
 
 
@@ -65,6 +67,8 @@ class ServiceSettings(BaseModel):
     """Times that a frame is tried before it becomes a dead letter."""
     take_timeout_s: _Seconds = 10.0
     """Longest wait for the sensor's frame after a press, seconds."""
+    max_frame_pixels: Annotated[int, Field(ge=1, le=_MESSAGE_PIXELS)] = 2**23
+    """Most pixels of a frame's depth or colour image; a larger frame is refused."""
     job_timeout_s: _Seconds = 60.0
     """Longest reconstruction; a worker that takes longer ends itself, seconds."""
     hang_timeout_s: _Seconds = 30.0

@@ -135,10 +135,11 @@ def judge_box(box: Box, registered: Registration, focal_px: float) -> FaceCandid
                            float(x), float(y), float(w), float(h))
     u, v, z = depths.T
     z = z[(np.abs(u) < _CENTER) & (np.abs(v) < _CENTER)]
-    if len(z) < _MIN_CENTER_SHARE * w * h * (_CENTER / registered.z_buffer.pitch)**2:
-        return FaceCandidate(box=box, depth_mm=None, width_mm=None, verdict="no depth")
-    depth = percentile(z, 50)
+    enough = _MIN_CENTER_SHARE * w * h * (_CENTER / registered.z_buffer.pitch)**2
+    depth = percentile(z, 50) if len(z) and len(z) >= enough else np.inf
     width = w * depth / focal_px
+    if not np.isfinite(width):  # nor is anything seen at the depths of an absurd calibration
+        return FaceCandidate(box=box, depth_mm=None, width_mm=None, verdict="no depth")
     verdict = "face"
     if not FACE_WIDTH_MM[0] <= width <= FACE_WIDTH_MM[1]:
         verdict = "not a face's size at its depth"

@@ -23,7 +23,8 @@ def run(args: argparse.Namespace) -> int:
 
     files = FaceFiles(args.output, args.report, args.rendering)
     settings = _options.recon_settings(args)
-    frame = read_frame(args.input, args.frame, args.calibration)
+    frame = read_frame(args.input, args.frame, args.calibration,
+                       _options.service_settings(args).max_frame_pixels)
 
     from denseface.recon import reconstruct
 

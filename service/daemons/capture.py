@@ -20,9 +20,15 @@ from numpy.typing import NDArray
 from denseface.capture import CaptureError, RgbdFrame
 from denseface.capture.errors import SensorError
 from denseface.service.daemons.sensor import SensorReader
+from denseface.service.errors import FrameTooLargeError
 from denseface.service.log.output import exit_now
 from denseface.service.protocol import messages
-from denseface.service.protocol.payload import MAX_PREVIEW_SIDE, FrameHeader, PreviewHeader
+from denseface.service.protocol.payload import (
+    MAX_PREVIEW_SIDE,
+    FrameHeader,
+    PreviewHeader,
+    check_frame_size,
+)
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.failpoints import failpoint
@@ -158,24 +164,33 @@ class _Capture:
             return
         # A live sensor's frame that came after a press is the press's, for whatever it was taken.
         if self.presses and (not peeking or self.sensor.live):
-            capture_id = self.presses.popleft()
-            failpoint("capture.frame.taken")
-            _log.info("taken", capture_id=capture_id, skew_us=frame.skew_us)
-            self.unacknowledged[capture_id] = _UnacknowledgedFrame(frame, self.settings.resend_s)
-            self._transmit(capture_id)
+            self._taken(self.presses.popleft(), frame)
         if self.preview_due and not self.presses and (peeking or self.sensor.live):
             self.preview_due = False
             self._send_preview(frame)
+
+    def _taken(self, capture_id: str, frame: RgbdFrame) -> None:
+        failpoint("capture.frame.taken")
+        try:
+            check_frame_size(frame, self.settings.max_frame_pixels)
+        except FrameTooLargeError as error:
+            self._no_frame(capture_id, error)
+            return
+        _log.info("taken", capture_id=capture_id, skew_us=frame.skew_us)
+        self.unacknowledged[capture_id] = _UnacknowledgedFrame(frame, self.settings.resend_s)
+        self._transmit(capture_id)
+
+    def _no_frame(self, capture_id: str, error: Exception) -> None:
+        _log.error("no frame", capture_id=capture_id, reason=str(error))
+        self.connection.send(messages.FrameFailed(
+            capture_id=capture_id, message=str(error)[:4000]))
 
     def _call_failed(self, error: CaptureError, *, peeking: bool) -> None:
         if peeking:
             self.preview_due = False
             _log.warning("no preview", reason=str(error))
         else:
-            capture_id = self.presses.popleft()
-            _log.error("no frame", capture_id=capture_id, reason=str(error))
-            self.connection.send(messages.FrameFailed(
-                capture_id=capture_id, message=str(error)[:4000]))
+            self._no_frame(self.presses.popleft(), error)
         if isinstance(error, SensorError):
             raise error
 

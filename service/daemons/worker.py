@@ -17,7 +17,7 @@ from denseface.service.log.output import exit_now
 from denseface.service.protocol import messages
 from denseface.service.protocol.message_base import MAX_JOBS
 from denseface.service.protocol.packing import warm_packing
-from denseface.service.protocol.payload import Arrays, FaceHeader
+from denseface.service.protocol.payload import Arrays, FaceHeader, check_frame_size
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.failpoints import failpoint
@@ -32,6 +32,9 @@ __all__ = ["run", "warm"]
 
 _FINISH_S = 3.0
 """Time to finish the job under way when the process stops, seconds; below the supervisor's 5."""
+_OF_THE_FRAME = (ReconstructionError, ValueError, ArithmeticError, LookupError)
+"""What a frame's own numbers lead to, for the same frame each time: the first is no face, the
+others are for absurd calibrations that nobody has thought of."""
 _log = structlog.get_logger("worker")
 
 
@@ -138,7 +141,8 @@ class _Worker:
                 self.supervisor.beat(Beat.HOLDING)
                 failpoint("worker.job.received")
                 self.jobs.append(job)
-                self.compute.start(lambda: _reconstruct(job, packet.arrays))
+                self.compute.start(
+                    lambda: _reconstruct(job, packet.arrays, self.settings.max_frame_pixels))
                 if len(self.jobs) == 1:
                     self._ask_for_next()
 
@@ -163,8 +167,8 @@ class _Worker:
                 capture_id=job.capture_id, settings_hash=job.settings_hash,
                 frame_sha256=job.frame_sha256, face=header)
         except Exception as error:
-            final = isinstance(error, ReconstructionError)
-            say = _log.warning if final else _log.exception
+            final = _is_final(error)
+            say = _log.warning if isinstance(error, ReconstructionError) else _log.exception
             say("no face", capture_id=job.capture_id, error=type(error).__name__,
                 reason=str(error))
             failure = messages.JobFailed(
@@ -177,6 +181,14 @@ class _Worker:
         return lambda: self.connection.send(result, arrays)
 
 
-def _reconstruct(job: messages.Job, arrays: Arrays) -> Face:
+def _reconstruct(job: messages.Job, arrays: Arrays, max_pixels: int) -> Face:
     failpoint("worker.job.computing")
+    check_frame_size(job.frame, max_pixels)
     return reconstruct(job.frame.join(arrays), job.settings)
+
+
+def _is_final(error: Exception) -> bool:
+    """Say whether another attempt would end the same: by the frame's numbers, not the machine."""
+    if isinstance(error, cv2.error):
+        return bool(error.code != cv2.Error.StsNoMem)
+    return isinstance(error, _OF_THE_FRAME)

@@ -10,11 +10,12 @@ from typing import NamedTuple, TypeAlias
 import structlog
 
 from denseface.recon.settings import Settings
-from denseface.service.errors import ServiceError, StoreError
+from denseface.service.errors import FrameTooLargeError, ServiceError, StoreError
 from denseface.service.hub._common import LOCAL, Common
 from denseface.service.monitoring import Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
+from denseface.service.protocol.payload import check_frame_size
 from denseface.service.protocol.states import CaptureEvent, CaptureState
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.bounded_dict import BoundedDict
@@ -178,6 +179,12 @@ class Presses:
             self._not_asked(capture_id)
             yield send(peer, messages.FrameRefused(
                 capture_id=capture_id, message="another sensor was asked"))
+            return
+        try:
+            check_frame_size(message.frame, self._settings.max_frame_pixels)
+        except FrameTooLargeError as error:
+            yield send(peer, messages.FrameRefused(capture_id=capture_id, message=str(error)))
+            yield from self._refuse(capture_id, "sensor", str(error))
             return
         press.frame_sender, press.deadline = peer, now + self._settings.take_timeout_s
         self._captures.advance(capture_id, CaptureEvent.FRAME_RECEIVED)

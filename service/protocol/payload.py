@@ -14,7 +14,11 @@ from pydantic import BaseModel, ConfigDict, FailFast, Field, model_validator
 
 from denseface.capture import Calibration, CaptureError, RgbdFrame
 from denseface.recon.face import Face, PointCloud, Report
-from denseface.service.errors import LocalProtocolError, RemoteProtocolError
+from denseface.service.errors import (
+    FrameTooLargeError,
+    LocalProtocolError,
+    RemoteProtocolError,
+)
 from denseface.service.protocol.packing import PackedCloud, pack, unpack
 
 MAX_ARRAY_BYTES = 32 * 2**20
@@ -114,6 +118,24 @@ class FrameHeader(_PayloadHeader):
                 self.calibration, self.registered, calibration_origin=self.calibration_origin)
         except (CaptureError, KeyError) as error:
             raise RemoteProtocolError(f"frame: {error}") from error
+
+
+def check_frame_size(frame: RgbdFrame | FrameHeader, most: int) -> None:
+    """Check a frame before anything is made of it.
+
+    Its reconstruction takes time and memory in proportion to its pixels.
+
+    Raises
+    ------
+    FrameTooLargeError
+        Where its depth or colour image has more than `most` pixels.
+    """
+    cameras = frame.calibration
+    for name, camera in (("depth", cameras.depth), ("color", cameras.color)):
+        if camera.width * camera.height > most:
+            raise FrameTooLargeError(
+                f"{name} has {camera.width} x {camera.height} pixels, at most {most} allowed "
+                "(DENSEFACE_MAX_FRAME_PIXELS)")
 
 
 class FaceHeader(_PayloadHeader):

@@ -4,11 +4,14 @@ from pathlib import Path
 
 from denseface.capture import RgbdFrame, open_source
 from denseface.service.errors import UsageError
+from denseface.service.protocol.payload import check_frame_size
 
 __all__ = ["read_frame"]
 
 
-def read_frame(path: str, number: int, calibration: Path | None) -> RgbdFrame:
+def read_frame(
+    path: str, number: int, calibration: Path | None, max_pixels: int
+) -> RgbdFrame:
     """Read a frame of a `.npz` or `.oni` file by its number, from 0.
 
     Raises
@@ -17,6 +20,8 @@ def read_frame(path: str, number: int, calibration: Path | None) -> RgbdFrame:
         Where the path names a sensor, or there is no frame of that number.
     CaptureError
         Where the file cannot be read.
+    FrameTooLargeError
+        Where an image of the frame has more than `max_pixels`.
     """
     if path.startswith("openni2:"):
         raise UsageError(f"{path}: expected a .npz or .oni file; `denseface up` serves a sensor")
@@ -27,5 +32,6 @@ def read_frame(path: str, number: int, calibration: Path | None) -> RgbdFrame:
                              f"{number}")
         for index, frame in enumerate(source):
             if index == number:
+                check_frame_size(frame, max_pixels)
                 return frame
     raise UsageError(f"{path}: has fewer than {number + 1} pairs of depth and colour")

@@ -144,6 +144,18 @@ def test_any_calibration_that_is_accepted(small, data):
     outcome(small.with_calibration(calibration, "made up"))
 
 
+@pytest.mark.parametrize("translation", [(-1e9, 0.0, 1e300), (-1e300, 0.0, 0.0)])
+@pytest.mark.parametrize("focal_px", [300.0, 1e300])
+def test_depths_beyond_all_numbers_are_no_depth(small, translation, focal_px):
+    known = small.calibration
+    calibration = known.model_copy(update={
+        "color": known.color.model_copy(update={"fx": focal_px, "fy": focal_px}),
+        "depth_to_color": DepthToColor(translation_mm=translation)})
+    with np.errstate(all="ignore"):
+        assert outcome(small.with_calibration(calibration, "made up")) in {
+            "NoDepthError", "NoFaceError", "FaceWithoutDepthError"}
+
+
 @settings(deadline=None, max_examples=8,
           suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(seed=st.integers(0, 999), share=st.floats(0.05, 1 / 3))

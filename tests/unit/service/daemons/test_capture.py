@@ -180,3 +180,13 @@ def test_a_pixel_of_a_preview_is_the_mean_of_those_it_covers(factor):
     image.flags.writeable = False  # as those of a frame are
     means = image.reshape(240, factor, 320, factor, 3).mean((1, 3))
     assert np.abs(_preview_image(image) - means).max() <= 0.5
+
+
+def test_a_frame_larger_than_allowed_is_not_sent():
+    driver = Driver()
+    connection = Connection(driver, [take("a"), ENDED, 100.0])
+    settings = ServiceSettings(address="ipc:///unused", max_frame_pixels=69)
+    _Capture(settings, connection, FakeReader(live=False), driver).serve(None)
+    _, said = connection.sent
+    assert (said.kind, said.capture_id) == ("frame_failed", "a")
+    assert said.message.startswith("color has 10 x 7 pixels, at most 69 allowed")

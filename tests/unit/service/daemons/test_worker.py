@@ -2,6 +2,7 @@
 
 import threading
 
+import cv2
 import pytest
 
 from denseface.recon import NoFaceError
@@ -26,6 +27,12 @@ def job(capture_id: str) -> Packet:
     return Packet(messages.Job(
         capture_id=capture_id, attempt=1, settings=Settings(), settings_hash="0f",
         frame_sha256="0" * 64, frame=FRAME), ARRAYS)
+
+
+def cv2_error(code: int) -> cv2.error:
+    error = cv2.error("as OpenCV says it")
+    error.code = code
+    return error
 
 
 class Connection:
@@ -68,7 +75,7 @@ def run(monkeypatch):
     """Have a worker serve a script; give it, and its connection with what it sent."""
     gate = threading.Semaphore(0)
 
-    def reconstruct(job, _):
+    def reconstruct(job, *_):
         assert gate.acquire(timeout=LIMIT_S)
         if job.capture_id == "faceless":
             raise NoFaceError("none")
@@ -95,6 +102,36 @@ def test_it_asks_for_the_next_job_when_it_begins_one(run):
 def test_it_goes_on_after_a_frame_without_a_face(run):
     _, connection = run(job("faceless"), job("b"), DONE, DONE)
     assert connection.sent[1:] == [("worker_ready", 2), ("job_failed", "faceless"), ("result", "b")]
+
+
+@pytest.mark.parametrize(("error", "final"), [
+    (NoFaceError("none"), True), (ValueError("nan"), True), (ZeroDivisionError(), True),
+    (IndexError("empty"), True), (cv2_error(cv2.Error.StsAssert), True),
+    (cv2_error(cv2.Error.StsNoMem), False), (MemoryError(), False), (OSError("disk"), False)])
+def test_what_a_frame_s_own_numbers_lead_to_is_not_tried_again(monkeypatch, error, final):
+    def fails(*_):
+        raise error
+
+    monkeypatch.setattr(worker, "reconstruct", fails)
+    (said,) = failures_of(SETTINGS)
+    assert (said.error, said.final) == (type(error).__name__, final)
+
+
+def test_a_frame_larger_than_allowed_is_not_begun(monkeypatch):
+    monkeypatch.delattr(worker, "reconstruct")
+    (said,) = failures_of(SETTINGS.model_copy(update={"max_frame_pixels": 69}))
+    assert (said.error, said.final) == ("FrameTooLargeError", True)
+    assert said.message.startswith("color has 10 x 7 pixels, at most 69 allowed")
+
+
+def failures_of(settings):
+    """Give what a worker says that fails at its one job."""
+    with Background("recon") as compute:
+        connection = Connection(compute, (job("a"), DONE), threading.Semaphore(0))
+        said = []
+        connection.send = lambda message, *_: said.append(message) or True
+        _Worker(settings, connection, compute).serve(object())
+    return [one for one in said if isinstance(one, messages.JobFailed)]
 
 
 def test_a_third_job_is_dropped(run):

@@ -205,6 +205,18 @@ def test_a_late_report_is_checked_after_a_restart_too(bench):
     assert [one.kind for one in again.published] == ["face_done"]
 
 
+def test_a_frame_larger_than_allowed_is_refused(bench):
+    bench = Bench(Hub(bench.store, SETTINGS.model_copy(update={"max_frame_pixels": 69}),
+                      FACE.report.settings), bench.store)
+    bench.sensor()
+    bench.press()
+    sensor, presser = bench.frame()
+    assert (sensor[0], sensor[1].kind) == (SENSOR, "frame_refused")
+    assert (presser[1].kind, presser[1].reason) == ("press_refused", "sensor")
+    assert presser[1].message.startswith("color has 10 x 7 pixels, at most 69 allowed")
+    assert bench.store.find("a") is None
+
+
 @pytest.mark.parametrize("kind", [messages.WorkerReady, messages.SensorReady])
 def test_one_key_has_so_many_workers_and_sensors(bench, kind):
     message = kind(name="x", **({"credit": 0} if kind is messages.WorkerReady else {"source": ""}))
