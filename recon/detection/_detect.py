@@ -166,6 +166,8 @@ class _Search:
         gray = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY)
         shrink = min(1.0, _MAX_WIDTH_PX / color.shape[1])
         if shrink < 1:
+            if color.shape[0] * shrink < 1:
+                raise NoFaceError(f"no face found in a strip {color.shape[0]} pixels high")
             gray = cv2.resize(gray, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
         self.gray = np.asarray(gray, np.uint8)
         self.to_color = color.shape[1] / gray.shape[1]

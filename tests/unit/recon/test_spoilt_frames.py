@@ -144,6 +144,15 @@ def test_any_calibration_that_is_accepted(small, data):
     outcome(small.with_calibration(calibration, "made up"))
 
 
+@pytest.mark.parametrize(("width", "height"), [(1, 1), (1, 700), (700, 1), (4096, 5)])
+def test_colour_images_that_are_strips(small, width, height):
+    known = small.calibration.color
+    camera = known.model_copy(update={"width": width, "height": height})
+    frame = replace(small, color=np.zeros((height, width, 3), np.uint8),
+                    calibration=small.calibration.model_copy(update={"color": camera}))
+    assert outcome(frame) in {"NoFaceError", "FaceWithoutDepthError", "NoDepthError"}
+
+
 @pytest.mark.parametrize("translation", [(-1e9, 0.0, 1e300), (-1e300, 0.0, 0.0)])
 @pytest.mark.parametrize("focal_px", [300.0, 1e300])
 def test_depths_beyond_all_numbers_are_no_depth(small, translation, focal_px):
