@@ -14,6 +14,7 @@ from denseface.service.commands import COMMANDS, load
 from denseface.service.runtime.process import forbid_core_dumps
 from denseface.service.runtime.terminal import (
     complain,
+    complain_of,
     discard_unless_flushed,
     fill_standard_descriptors,
     reader_left,
@@ -48,6 +49,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(error, BrokenPipeError) and reader_left(sys.stdout):
             return _BROKEN_PIPE
         if args.debug:
+            if sys.excepthook is sys.__excepthook__:
+                sys.excepthook = complain_of
             raise
         line = " ".join(str(error).split()) or type(error).__name__
         if getattr(args, "log", "text") == "json":

@@ -4,7 +4,7 @@ import argparse
 import sys
 
 from denseface.service.commands import _options
-from denseface.service.runtime.terminal import say
+from denseface.service.runtime.terminal import printable, say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,7 +29,8 @@ def run(args: argparse.Namespace) -> int:
     if not args.yes:
         if not sys.stdin.isatty():
             raise UsageError("--yes: expected, as there is nobody to ask")
-        if input(f"Remove {chosen}, with frame, face and report? [y/N] ").strip().lower() != "y":
+        question = printable(f"Remove {chosen}, with frame, face and report? [y/N] ")
+        if input(question).strip().lower() != "y":
             say("nothing removed")
             return 1
     with _options.operator(args) as operator:

@@ -8,10 +8,13 @@ import os
 import select
 import sys
 from contextlib import suppress
+from types import TracebackType
 from typing import TextIO
 
-__all__ = ["complain", "discard_unless_flushed", "fill_standard_descriptors", "printable",
-           "reader_left", "say"]
+__all__ = [
+    "complain", "complain_of", "discard_unless_flushed", "fill_standard_descriptors", "printable",
+    "reader_left", "say",
+]
 
 
 def printable(text: str) -> str:
@@ -34,6 +37,17 @@ def complain(line: str) -> None:
     with suppress(OSError, ValueError):
         print(printable(line), file=sys.stderr)
     discard_unless_flushed(sys.stderr)
+
+
+def complain_of(
+    kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
+    """Print a traceback on stderr as `complain` does; for `sys.excepthook`."""
+    import traceback
+
+    for text in traceback.format_exception(kind, error, trace):
+        for line in text.rstrip("\n").split("\n"):
+            complain(line)
 
 
 def discard_unless_flushed(stream: TextIO | None) -> None:

@@ -111,6 +111,43 @@ def test_a_service_whose_log_is_broken_makes_faces_and_stops_in_order(how, tmp_p
             process.wait()
 
 
+EVIL = "\x1b[2J\x1b]0;owned\x07\x9b31m gpj.\u202eexe\r\n2026-01-01T00:00:00Z [info] all is well"
+
+
+def test_what_a_peer_says_is_obeyed_by_no_terminal(tmp_path):
+    with guarded_hub(tmp_path, DENSEFACE_ATTEMPTS="1") as hub:
+        sensor, worker, presser = (hub.peer(name) for name in ("sensor", "worker", "presser"))
+        try:
+            sensor.send(messages.SensorReady(name="s", source=EVIL))
+            until(lambda: hub.status().sensors)
+            for number, final in enumerate((True, False), 1):
+                worker.send(messages.WorkerReady(name="w", credit=number))
+                presser.send(messages.Press(request=number, capture_id=f"p{number}"))
+                sensor.receive("take")
+                sensor.send(messages.Frame(capture_id=f"p{number}", frame=FRAME), FRAME_ARRAYS)
+                job = worker.receive("job").message
+                worker.send(messages.JobFailed(
+                    capture_id=f"p{number}", settings_hash=job.settings_hash,
+                    frame_sha256=job.frame_sha256, error=EVIL, message=EVIL, final=final))
+            until(lambda: hub.status().dead == 1)
+            shown = [denseface(*command, "--address", hub.local) for command in (
+                ("subscribe", "--after", "0", "--count", "2"), ("dead", "list"), ("status",),
+                ("press", "--id", "p1"))]
+        finally:
+            for one in (sensor, worker, presser):
+                one.close()
+    texts = [text for one in shown for text in (one.stdout, one.stderr)]
+    assert "p1 failed" in texts[0]
+    assert r"\x1b[2J" in texts[0]
+    assert r"\x1b[2J" in texts[2]
+    assert r"\x1b[2J" in texts[-1]
+    logged = hub.log.read_bytes().decode()
+    assert r"\x1b[2J" in logged
+    for line in "".join([*texts, logged]).split("\n"):
+        assert line.isprintable()
+        assert not line.startswith("2026-01-01T")
+
+
 def _refused_for_want_of_a_sensor(presser: Peer) -> bool:
     """Press as long as the hub waits for the sensors that it may have had before it started."""
     presser.send(messages.Press(request=0, capture_id="p0"))

@@ -125,6 +125,15 @@ def test_debug_shows_the_traceback(tmp_path):
         main(["reconstruct", str(tmp_path / "no.npz"), "--debug"])
 
 
+def test_a_traceback_obeys_no_terminal(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "denseface", "reconstruct", tmp_path / "\x1b[2J.npz", "--debug"],
+        capture_output=True, text=True, check=False, timeout=LIMIT_S)
+    assert done.returncode == 1
+    assert r"\x1b[2J.npz" in done.stderr
+    assert all(line.isprintable() for line in done.stderr.split("\n"))
+
+
 def test_ctrl_c_is_status_130(room, monkeypatch, capfd):
     def interrupted(*_):
         raise KeyboardInterrupt
