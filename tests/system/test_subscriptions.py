@@ -15,6 +15,18 @@ _MOST_MORE_MB = 60
 """Memory that the hub may need beyond what it had."""
 
 
+def test_what_a_subscriber_may_say_goes_on_for_long(hub, connect):
+    """Whoever changes its subscriptions now and then is not cut off."""
+    peer = connect(*as_role(hub, "subscriber", zmq.SUB))
+    before = hub.refused("subscriptions")
+    for _ in range(8):
+        peer.socket.subscribe("status")
+        assert peer.socket.poll(LIMIT_MS)
+        peer.socket.recv_multipart()
+        peer.socket.unsubscribe("status")
+    assert hub.refused("subscriptions") == before
+
+
 def test_topics_without_end_cost_the_hub_nothing(hub, connect, refused):
     """In libzmq one call takes them, in which nothing of the hub's own runs."""
     other = connect(*as_role(hub, "subscriber", zmq.SUB))
@@ -37,18 +49,6 @@ def test_topics_without_end_cost_the_hub_nothing(hub, connect, refused):
     while other.socket.poll(0):
         other.socket.recv_multipart()
     assert other.socket.poll(LIMIT_MS)  # it goes on
-
-
-def test_what_a_subscriber_may_say_goes_on_for_long(hub, connect):
-    """Whoever changes its subscriptions now and then is not cut off."""
-    peer = connect(*as_role(hub, "subscriber", zmq.SUB))
-    before = hub.status().refused
-    for _ in range(8):
-        peer.socket.subscribe("status")
-        assert peer.socket.poll(LIMIT_MS)
-        peer.socket.recv_multipart()
-        peer.socket.unsubscribe("status")
-    assert hub.status().refused == before
 
 
 def _peak_mb(process: int) -> int:
