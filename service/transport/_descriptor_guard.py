@@ -5,24 +5,24 @@ socket file, or for a listener. The hub's own files need some too. Its loop look
 second, and a flood takes a thousand in less, so a thread of its own looks.
 """
 
+import ctypes
 import os
 import resource
 import socket
 import threading
-from contextlib import suppress
-
-from denseface.service.runtime.limits import OUT_OF_DESCRIPTORS
-from denseface.service.transport.handshakes import connection_of, end_connection
 
 _WANTED = 65_536
 """Descriptors that the system is asked for."""
 _MAX_USED = 4096
 """Descriptors from which on connections are ended; half of all where there are fewer than 8192.
 All others are there for what comes between two looks: libzmq takes some thirty a millisecond."""
-_LOOK_S, _LOOK_AGAIN_S = 0.02, 0.002
-"""Time between two looks, seconds: usually, and where half of what may be used is."""
+_LOOK_S, _LOOK_AGAIN_S = 0.01, 0.001
+"""Time between two looks, seconds: usually, and where a quarter of what may be used is."""
 _GAP = 64
 """Descriptors in a row that are no sockets, after which no more are looked for."""
+
+_libc = ctypes.PyDLL(None)
+"""Keeps Python's lock in its calls, which take microseconds: to get it back takes milliseconds."""
 
 
 class DescriptorGuard:
@@ -60,18 +60,15 @@ class DescriptorGuard:
         while not self._stop.wait(wait):
             limit, ceiling = _limit_and_ceiling()
             lowest = self._lowest_free(limit)
-            wait = _LOOK_S if lowest < ceiling // 2 else _LOOK_AGAIN_S
+            wait = _LOOK_S if lowest < ceiling // 4 else _LOOK_AGAIN_S
             if lowest >= ceiling:
                 self._ended += _end_from(ceiling, (ceiling + limit) // 2, limit)
 
     def _lowest_free(self, limit: int) -> int:
-        try:
-            number = os.dup(self._own)
-        except OSError as error:
-            if error.errno not in OUT_OF_DESCRIPTORS:
-                raise
+        number: int = _libc.dup(self._own)
+        if number == -1:
             return limit
-        os.close(number)
+        _libc.close(number)
         return number
 
 
@@ -90,10 +87,23 @@ def _end_from(first: int, first_local: int, limit: int) -> int:
     """
     ended = gap = 0
     for descriptor in range(first, limit):
-        with suppress(OSError), connection_of(descriptor) as connection:
-            gap = 0
-            if descriptor >= first_local or connection.family != socket.AF_UNIX:
-                ended += end_connection(descriptor)
-        if (gap := gap + 1) > _GAP:
-            break
+        listens = _option(descriptor, socket.SO_ACCEPTCONN)
+        if listens is None:
+            gap += 1
+            if gap > _GAP:
+                break
+            continue
+        gap = 0
+        local = _option(descriptor, socket.SO_DOMAIN) == socket.AF_UNIX
+        if not listens and (descriptor >= first_local or not local):
+            ended += _libc.shutdown(descriptor, socket.SHUT_RDWR) == 0
     return ended
+
+
+def _option(descriptor: int, name: int) -> int | None:
+    """Give an option of a socket; None where the descriptor is none."""
+    value = ctypes.c_int()
+    size = ctypes.c_uint(ctypes.sizeof(value))
+    failed = _libc.getsockopt(
+        descriptor, socket.SOL_SOCKET, name, ctypes.byref(value), ctypes.byref(size))
+    return None if failed else value.value

@@ -152,9 +152,9 @@ def address_of(descriptor: int) -> str:
     The descriptor may be another file's by now, or that of a socket of another kind.
     """
     with suppress(OSError), connection_of(descriptor) as connection:
-        if connection.family in (socket.AF_INET, socket.AF_INET6):
-            host, port, *_ = connection.getpeername()
-            return f"{host}:{port}"
+        name = connection.getpeername()
+        if isinstance(name, tuple):  # of the Internet: the descriptor may be another's meanwhile
+            return f"{name[0]}:{name[1]}"
     return "gone"
 
 
