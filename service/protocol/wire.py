@@ -92,32 +92,53 @@ def decode_stored(parts: Sequence[Buffer]) -> Packet:
     return _decode(parts, _TO_HUB, MAX_HEADER_BYTES)
 
 
+def decode_stored_header(header: Buffer, sizes: Sequence[int]) -> BaseMessage:
+    """Read the header alone of a message that was stored; otherwise as `decode_to_hub`.
+
+    Parameters
+    ----------
+    sizes : of the arrays that follow it, bytes
+    """
+    return _message(header, sizes, _TO_HUB, MAX_HEADER_BYTES)
+
+
 def decode_from_hub(parts: Sequence[Buffer]) -> Packet:
     """Read a message that only the hub may send; otherwise as `decode_to_hub`."""
     return _decode(parts, _FROM_HUB, MAX_HEADER_BYTES)
 
 
 def _decode(parts: Sequence[Buffer], reader: TypeAdapter[_MessageT], most: int) -> Packet:
-    if not 1 <= len(parts) <= MAX_PARTS:
-        raise RemoteProtocolError(f"message has {len(parts)} parts, 1 to {MAX_PARTS} expected",
-                                  "oversized" if parts else "truncated")
+    if not parts:
+        raise RemoteProtocolError(f"message has 0 parts, 1 to {MAX_PARTS} expected", "truncated")
     header, *buffers = parts
+    message = _message(header, [len(one) for one in buffers], reader, most)
+    infos = payload.arrays if (payload := message.payload) else ()
+    return Packet(message, {
+        info.name: np.frombuffer(memoryview(buffer).toreadonly(), info.dtype).reshape(info.shape)
+        for info, buffer in zip(infos, buffers, strict=True)})
+
+
+def _message(
+    header: Buffer, sizes: Sequence[int], reader: TypeAdapter[_MessageT], most: int
+) -> _MessageT:
+    """Read a header that says which arrays of these sizes, bytes, follow it."""
+    if len(sizes) >= MAX_PARTS:
+        raise RemoteProtocolError(
+            f"message has {1 + len(sizes)} parts, 1 to {MAX_PARTS} expected", "oversized")
     if len(header) > most:
         raise RemoteProtocolError(
             f"header has {len(header)} bytes, at most {most} allowed", "oversized")
     message = _header(bytes(header), reader)
     infos = payload.arrays if (payload := message.payload) else ()
-    if len(buffers) != len(infos):
+    if len(sizes) != len(infos):
         raise RemoteProtocolError(
-            f"{message.kind}: {len(buffers)} arrays follow, {len(infos)} announced", "truncated")
-    for info, buffer in zip(infos, buffers, strict=True):
-        if len(buffer) != info.nbytes:
+            f"{message.kind}: {len(sizes)} arrays follow, {len(infos)} announced", "truncated")
+    for info, size in zip(infos, sizes, strict=True):
+        if size != info.nbytes:
             raise RemoteProtocolError(
-                f"{message.kind}: {info.name} has {len(buffer)} bytes, {info.nbytes} announced",
+                f"{message.kind}: {info.name} has {size} bytes, {info.nbytes} announced",
                 "truncated")
-    return Packet(message, {
-        info.name: np.frombuffer(memoryview(buffer).toreadonly(), info.dtype).reshape(info.shape)
-        for info, buffer in zip(infos, buffers, strict=True)})
+    return message
 
 
 def _header(header: bytes, reader: TypeAdapter[_MessageT]) -> _MessageT:

@@ -1,8 +1,10 @@
 """Names and paths of the files in the data folder."""
 
+import os
 import re
-from collections.abc import Container, Iterator
+from collections.abc import Container
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from denseface.service.runtime.files import private_folder, sync_folder
@@ -17,6 +19,22 @@ _UNNAMED_FACE = re.compile(r"\.([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.[0-9a-f]{1,64}\
 """Capture id and settings hash."""
 _TEMPORARY_NAME = re.compile(r"\..*\.tmp")
 """As `write_atomically` and `unnamed_face` name it."""
+
+
+@dataclass(frozen=True)
+class Listing:
+    """What is in the folders of frames and faces, each listed once."""
+
+    frames: list[str]
+    """Capture ids, sorted as are all here."""
+    unnamed: list[str]
+    """Capture ids of frames that were not named when their hub ended."""
+    faces: list[tuple[str, str]]
+    """Capture id and name of the file."""
+    temporary: list[Path]
+    """Half-written files of a hub that was killed, those in quarantine too."""
+    unknown: list[Path]
+    """Not written by a hub, those in the data folder itself too."""
 
 
 class FolderLayout:
@@ -63,40 +81,37 @@ class FolderLayout:
         return [self.database.with_name(self.database.name + ending)
                 for ending in ("", "-wal", "-shm")]
 
-    def all_frames(self) -> Iterator[tuple[str, Path]]:
-        """Give capture id and path of each frame."""
-        return _matching(self.frames, _FRAME_NAME)
-
-    def unnamed_frames(self) -> Iterator[tuple[str, Path]]:
-        """Give capture id and path of each frame that was not named when its hub ended."""
-        return _matching(self.frames, _UNNAMED_FRAME)
-
-    def all_faces(self) -> Iterator[tuple[str, Path]]:
-        """Give capture id and path of each face."""
-        return _matching(self.faces, _FACE_NAME)
-
     def faces_of(self, capture_ids: Container[str]) -> list[tuple[str, Path]]:
         """Give capture id and path of the faces of some captures, whatever their settings."""
-        return [(capture_id, path) for name in (_FACE_NAME, _UNNAMED_FACE)
-                for capture_id, path in _matching(self.faces, name) if capture_id in capture_ids]
+        found = []
+        for name in os.listdir(self.faces):  # noqa: PTH208  a path for each takes longer
+            match = _FACE_NAME.fullmatch(name) or _UNNAMED_FACE.fullmatch(name)
+            if match and match.group(1) in capture_ids:
+                found.append((match.group(1), self.faces / name))
+        return found
 
-    def temporary_files(self) -> Iterator[Path]:
-        """Give half-written files of a hub that was killed."""
-        for folder in (self.frames, self.faces, self.quarantine):
-            yield from (path for path in folder.iterdir() if _TEMPORARY_NAME.fullmatch(path.name))
-
-    def unknown_files(self) -> Iterator[Path]:
-        """Give files that the hub did not write."""
+    def listing(self) -> Listing:
+        """List the folders; OSError where one cannot be."""
+        found = Listing([], [], [], [], [])
+        for name in sorted(os.listdir(self.frames)):  # noqa: PTH208
+            if match := _FRAME_NAME.fullmatch(name):
+                found.frames.append(match.group(1))
+            elif match := _UNNAMED_FRAME.fullmatch(name):
+                found.unnamed.append(match.group(1))
+            else:
+                _note_other(found, self.frames / name)
+        for name in sorted(os.listdir(self.faces)):  # noqa: PTH208
+            if match := _FACE_NAME.fullmatch(name):
+                found.faces.append((match.group(1), name))
+            else:
+                _note_other(found, self.faces / name)
+        found.temporary.extend(
+            path for path in self.quarantine.iterdir() if _TEMPORARY_NAME.fullmatch(path.name))
         ours = {self.frames, self.faces, self.quarantine, self.lock, self.disk_reserve,
                 *self.database_files()}
-        yield from (path for path in self.root.iterdir() if path not in ours)
-        for folder, names in (
-                (self.frames, (_FRAME_NAME, _UNNAMED_FRAME)), (self.faces, (_FACE_NAME,))):
-            yield from (path for path in folder.iterdir()
-                        if not any(name.fullmatch(path.name) for name in names))
+        found.unknown.extend(path for path in sorted(self.root.iterdir()) if path not in ours)
+        return found
 
 
-def _matching(folder: Path, name: re.Pattern[str]) -> Iterator[tuple[str, Path]]:
-    for path in sorted(folder.iterdir()):
-        if match := name.fullmatch(path.name):
-            yield match.group(1), path
+def _note_other(found: Listing, path: Path) -> None:
+    (found.temporary if _TEMPORARY_NAME.fullmatch(path.name) else found.unknown).append(path)

@@ -114,10 +114,9 @@ class Retention:
 
         It lists both folders.
         """
-        layout = self._layout
-        found = {capture_id: None
-                 for files in (layout.all_frames, layout.unnamed_frames, layout.all_faces)
-                 for capture_id, _ in files()}
+        listing = self._layout.listing()
+        found = dict.fromkeys(
+            [*listing.frames, *listing.unnamed, *(one for one, _ in listing.faces)])
         return [one for one in found if one not in self._erasing and self._hash_of(one) is None]
 
     def is_erasing(self, capture_id: str) -> bool:

@@ -24,7 +24,7 @@ from denseface.service.storage._folder_layout import FolderLayout
 from denseface.service.storage._folder_lock import lock
 from denseface.service.storage._frame_cache import FrameCache
 from denseface.service.storage._record_file import wrap_os_errors
-from denseface.service.storage._recovery import recover
+from denseface.service.storage._recovery import Progress, recover
 from denseface.service.storage._retention import Retention
 from denseface.service.storage._store_clock import Clock, SystemClock
 from denseface.service.storage.records import (
@@ -52,6 +52,7 @@ class FolderStore(CaptureRows, Closing):
     ----------
     folder : `frames/`, `faces/`, `quarantine/`, `captures.sqlite3`, `lock`; created where missing
     clock : tells how old things are
+    progress : is told how many files are read
 
     Raises
     ------
@@ -63,7 +64,9 @@ class FolderStore(CaptureRows, Closing):
         Where it cannot be read or written.
     """
 
-    def __init__(self, folder: Path, clock: Clock | None = None) -> None:
+    def __init__(
+        self, folder: Path, clock: Clock | None = None, progress: Progress | None = None,
+    ) -> None:
         with wrap_os_errors(folder):
             self._layout = FolderLayout(private_folder(folder))
         self._frame_cache = FrameCache()
@@ -74,7 +77,7 @@ class FolderStore(CaptureRows, Closing):
         self._lock = lock(self._layout.lock)
         try:
             database, store_clock, self._quarantine = recover(
-                self._layout, clock or SystemClock())
+                self._layout, clock or SystemClock(), progress or Progress())
             super().__init__(database, store_clock)
             self.epoch = database.meta("epoch") or ""
             """Name of this database; another one where it was rebuilt."""

@@ -3,6 +3,8 @@
 Part 0 of the file is the metadata, JSON; the other parts are the message as it arrived.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Generic, TypeAlias, TypeVar
@@ -10,11 +12,17 @@ from typing import Annotated, Generic, TypeAlias, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from denseface.service.errors import CorruptFileError, ProtocolError
+from denseface.service.protocol.message_base import BaseMessage
 from denseface.service.protocol.messages import Frame, Result
 from denseface.service.protocol.payload import Arrays
-from denseface.service.protocol.wire import Packet, decode_stored, encode
+from denseface.service.protocol.wire import Packet, decode_stored, decode_stored_header, encode
 from denseface.service.runtime.failpoints import failpoint
-from denseface.service.storage._record_file import read_parts, wrap_os_errors, write_parts
+from denseface.service.storage._record_file import (
+    read_head,
+    read_parts,
+    wrap_os_errors,
+    write_parts,
+)
 
 __all__ = [
     "FaceMetadata",
@@ -59,6 +67,15 @@ MetadataT = TypeVar("MetadataT", FrameMetadata, FaceMetadata)
 
 
 @dataclass(frozen=True)
+class Head(Generic[MessageT, MetadataT]):
+    """What the file of a frame or a face says before its arrays; only with them is it checked."""
+
+    message: MessageT
+    metadata: MetadataT
+    checksum: str
+
+
+@dataclass(frozen=True)
 class Record(Generic[MessageT, MetadataT]):
     """The file of a frame or a face."""
 
@@ -70,6 +87,8 @@ class Record(Generic[MessageT, MetadataT]):
 
 FrameRecord: TypeAlias = Record[Frame, FrameMetadata]
 FaceRecord: TypeAlias = Record[Result, FaceMetadata]
+FrameHead: TypeAlias = Head[Frame, FrameMetadata]
+FaceHead: TypeAlias = Head[Result, FaceMetadata]
 
 
 @dataclass(frozen=True)
@@ -127,17 +146,53 @@ def read_face(path: Path, checksum: str | None = None) -> FaceRecord:
     return _read(path, checksum, Result, FaceMetadata)
 
 
+def read_frame_head(path: Path) -> FrameHead:
+    """Read a frame's file up to its arrays.
+
+    Raises
+    ------
+    CorruptFileError, StoreError
+        As `read_head`; CorruptFileError also where the file holds something else.
+    """
+    return _read_head(path, Frame, FrameMetadata)
+
+
+def read_face_head(path: Path) -> FaceHead:
+    """Read a face's file up to its arrays; errors as `read_frame_head`."""
+    return _read_head(path, Result, FaceMetadata)
+
+
 def _read(
     path: Path, checksum: str | None, kind: type[MessageT], metadata_kind: type[MetadataT]
 ) -> Record[MessageT, MetadataT]:
     parts, found = read_parts(path, checksum)
-    try:
+    # Where that raises, the checksum is right: another version wrote it.
+    with _understood(path):
         metadata = metadata_kind.model_validate_json(bytes(parts[0]) if parts else b"")
         packet = decode_stored(parts[1:])
+    return Record(_expected(path, packet.message, kind), packet.arrays, metadata, found)
+
+
+def _read_head(
+    path: Path, kind: type[MessageT], metadata_kind: type[MetadataT]
+) -> Head[MessageT, MetadataT]:
+    head = read_head(path, 2)
+    with _understood(path):
+        metadata = metadata_kind.model_validate_json(bytes(head.parts[0]))
+        message = decode_stored_header(head.parts[1], head.sizes[2:])
+    return Head(_expected(path, message, kind), metadata, head.checksum)
+
+
+@contextmanager
+def _understood(path: Path) -> Iterator[None]:
+    try:
+        yield
     except (ProtocolError, ValidationError) as error:
-        # The checksum is right: another version wrote it.
         raise CorruptFileError(f"{path}: {error}") from error
-    if not isinstance(packet.message, kind):
+
+
+def _expected(path: Path, message: BaseMessage, kind: type[MessageT]) -> MessageT:
+    if not isinstance(message, kind):
         expected = kind.__name__.lower()
-        raise CorruptFileError(f"{path}: holds a {packet.message.kind}, a {expected} expected")
-    return Record(packet.message, packet.arrays, metadata, found)
+        raise CorruptFileError(f"{path}: holds a {message.kind}, a {expected} expected")
+    return message

@@ -4,11 +4,14 @@ import json
 import os
 import shutil
 import sqlite3
+from collections import Counter
+from pathlib import Path
 
 import pytest
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import (
+    CorruptFileError,
     DamagedDatabaseError,
     DamagedFaceError,
     DiskFullError,
@@ -16,6 +19,7 @@ from denseface.service.errors import (
 )
 from denseface.service.protocol.states import CaptureState
 from denseface.service.storage import FolderStore
+from denseface.service.storage._recovery import Progress
 from tests.unit.service.clocks import FakeClock
 from tests.unit.service.storage.test_folder_store import frame, result
 from tests.unit.service.storing import accept, finish
@@ -166,6 +170,91 @@ def test_a_damaged_frame_without_a_row_is_a_dead_letter(data):
     assert report["capture_id"] == "waits"
     with FolderStore(data, FakeClock()) as store:
         assert store.find("waits").state is CaptureState.DEAD
+
+
+def test_damage_behind_the_head_of_a_frame_without_a_row_is_found_when_it_is_needed(data):
+    _forget(data, "waits")
+    _flip(data / "frames" / "waits.frame", -1)
+    with FolderStore(data, FakeClock()) as store:
+        assert store.find("waits").state is CaptureState.ACCEPTED
+        with pytest.raises(CorruptFileError, match="checksum"):
+            store.frame("waits")
+    (report,) = reports(data)
+    assert report["capture_id"] == "waits"
+
+
+def test_a_frame_cut_short_without_a_row_is_a_dead_letter(data):
+    _forget(data, "waits")
+    path = data / "frames" / "waits.frame"
+    path.write_bytes(path.read_bytes()[:-1])
+    with FolderStore(data, FakeClock()) as store:
+        assert store.find("waits").state is CaptureState.DEAD
+
+
+def test_a_flipped_bit_in_a_head_costs_no_face(data):
+    """Each bit of the frame's head, while its row is lost and its face is not."""
+    path = data / "frames" / "done.frame"
+    content = path.read_bytes()
+    for position in (*range(18, 60), *range(60, content.index(b"calibration"), 41)):
+        (data / "captures.sqlite3").unlink()
+        _flip(path, position)
+        with FolderStore(data, FakeClock()) as store:
+            assert store.find("done").state is CaptureState.DONE, position
+            assert store.outcome("done").message.kind == "face_done", position
+        path.write_bytes(content)
+
+
+def test_a_rebuild_reads_the_head_of_each_file_once(data, monkeypatch):
+    read = Counter()
+    opened, pread = os.open, os.pread
+
+    def noted(path, *arguments, **more):
+        descriptor = opened(path, *arguments, **more)
+        if str(path).endswith((".frame", ".face")):
+            read[Path(path).name, "open"] += 1
+            names[descriptor] = Path(path).name
+        return descriptor
+
+    def counted(descriptor, size, offset):
+        found = pread(descriptor, size, offset)
+        read[names[descriptor], "read"] += 1
+        read["most"] = max(read["most"], len(found))
+        return found
+
+    names = {}
+    monkeypatch.setattr(os, "open", noted)
+    monkeypatch.setattr(os, "pread", counted)
+    monkeypatch.setattr("denseface.service.storage._record_file.read_bounded", None)
+    (data / "captures.sqlite3").unlink()
+    progress = Progress()
+    with FolderStore(data, FakeClock(), progress) as store:
+        assert states(store) == REBUILT
+    assert read.pop("most") <= 2**14
+    assert 5 == progress.read == progress.files == len(read) / 2
+    assert set(read.values()) == {1}
+
+
+def test_a_rebuild_can_be_stopped_and_begun_again(data):
+    (data / "captures.sqlite3").unlink()
+    with pytest.raises(StoreError, match="stopped"):
+        FolderStore(data, FakeClock(), Progress(cancelled=True))
+    with FolderStore(data, FakeClock()) as store:
+        assert states(store) == REBUILT
+
+
+def test_a_start_lists_each_folder_once_and_reads_no_file(data, monkeypatch):
+    listed = Counter()
+    listdir = os.listdir
+
+    def counted(path="."):
+        listed[Path(path).name] += 1
+        return listdir(path)
+
+    monkeypatch.setattr(os, "listdir", counted)
+    progress = Progress()
+    with FolderStore(data, FakeClock(), progress):
+        assert listed == {"frames": 1, "faces": 1, "quarantine": 1, "data": 1}
+        assert progress.files == progress.read == 0
 
 
 def test_a_damaged_face_names_its_capture(data):
