@@ -69,8 +69,14 @@ class Status(BaseAnswer):
     """Size of the files kept."""
     log_lines_lost: Number = 0
     """Lines of the hub's log that could not be written, since it started."""
+    state: Name = "serving"
+    """`opening` while the hub opens its data folder after a start, `rebuilding` while it makes rows
+    again from files: then nothing else is known, and requests wait."""
+    files_read: Number = 0
+    """While it is `rebuilding`."""
+    files_to_read: Number = 0
 
     @property
     def ready(self) -> bool:
         """A press now would become a face."""
-        return bool(self.sensors) and bool(self.workers)
+        return self.state == "serving" and bool(self.sensors) and bool(self.workers)

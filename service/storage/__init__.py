@@ -4,7 +4,8 @@ from denseface.service.storage._capture_rows import CaptureRow
 from denseface.service.storage._erasure import Erased, PendingErasure
 from denseface.service.storage._folder_layout import FolderLayout
 from denseface.service.storage._folder_lock import check_folder
-from denseface.service.storage.folder_store import FolderStore
+from denseface.service.storage._recovery import Progress
+from denseface.service.storage.folder_store import FolderStore, OpeningStore
 from denseface.service.storage.records import (
     FaceMetadata,
     FrameMetadata,
@@ -22,8 +23,10 @@ __all__ = [
     "FolderStore",
     "FrameMetadata",
     "InlineWriter",
+    "OpeningStore",
     "PendingErasure",
     "PendingWrite",
+    "Progress",
     "WriteResult",
     "Writer",
     "WriterThreads",

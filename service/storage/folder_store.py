@@ -16,12 +16,13 @@ from denseface.service.errors import CorruptFileError, DamagedFaceError, StoreEr
 from denseface.service.protocol.messages import CaptureFailed, FaceDone, Frame, Result
 from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet
+from denseface.service.runtime.background import Background
 from denseface.service.runtime.closing import Closing
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.files import private_folder
 from denseface.service.storage._capture_rows import CaptureRow, CaptureRows, NewOutcome
 from denseface.service.storage._folder_layout import FolderLayout
-from denseface.service.storage._folder_lock import lock
+from denseface.service.storage._folder_lock import check_folder, lock
 from denseface.service.storage._frame_cache import FrameCache
 from denseface.service.storage._record_file import wrap_os_errors
 from denseface.service.storage._recovery import Progress, recover
@@ -38,7 +39,7 @@ from denseface.service.storage.records import (
 )
 from denseface.service.storage.writer import WriteResult
 
-__all__ = ["FolderStore"]
+__all__ = ["FolderStore", "OpeningStore"]
 
 
 class FolderStore(CaptureRows, Closing):
@@ -239,3 +240,40 @@ class FolderStore(CaptureRows, Closing):
             self._quarantine.add(path, str(error), capture_id)
             raise DamagedFaceError(capture_id, str(error)) from error
         return Packet(FaceDone(**common, face=record.message.face), record.arrays)
+
+
+class OpeningStore(Closing):
+    """A `FolderStore` that a thread opens: it may have to read the head of every file.
+
+    Readable when `store` gives it. Raises as `check_folder`; what the store raises, `store` does.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        check_folder(folder)
+        self.progress = Progress()
+        self._store: FolderStore | None = None
+        self._opening = Background[FolderStore]("store")
+        self._opening.start(lambda: FolderStore(folder, progress=self.progress))
+
+    def fileno(self) -> int:
+        """Give the descriptor to poll for reading."""
+        return self._opening.fileno()
+
+    def store(self) -> FolderStore | None:
+        """Give the store, None while it is being opened; raises as `FolderStore`."""
+        if self._opening.done():
+            self._opening.drain()
+            self._store = self._opening.result()
+        return self._store
+
+    def close(self) -> None:
+        """Close the store, or stop opening it."""
+        self.progress.cancelled = True
+        try:
+            if self._opening:
+                with suppress(StoreError):
+                    self._store = self._opening.result()
+            if self._store:
+                self._store.close()
+        finally:
+            self._opening.close()
