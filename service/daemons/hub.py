@@ -13,6 +13,7 @@ import zmq
 
 from denseface.recon.numerics.malloc import keep_freed_memory
 from denseface.recon.settings import Settings
+from denseface.service.daemons.opening import Opening
 from denseface.service.errors import LocalProtocolError, RemoteProtocolError
 from denseface.service.hub import PREVIEW_PERIOD_S, Hub
 from denseface.service.monitoring import Observer, Rejections
@@ -27,7 +28,7 @@ from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.supervisor_link import SupervisorLink
 from denseface.service.security.permissions import missing_role
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage import FolderStore, WriterThreads
+from denseface.service.storage import OpeningStore, WriterThreads
 from denseface.service.transport.listener import Incoming
 from denseface.service.transport.listeners import Listeners
 
@@ -55,17 +56,21 @@ def run(settings: ServiceSettings, recon: Settings,
     """
     os.umask(0o077)  # SQLite's files too are for this user alone
     keep_freed_memory()  # fetching it anew for each face costs a third of the processor time
-    with StopSignal() as stop, FolderStore(settings.data) as store, WriterThreads() as writer, \
-            Observer(settings.data) as observer, zmq.Context() as context:
+    with StopSignal() as stop, OpeningStore(settings.data) as opening, \
+            WriterThreads() as writer, Observer(settings.data) as observer, \
+            zmq.Context() as context:
         rejections = Rejections(observer.figures.counters)
-        with closing(Listeners(context, settings, rejections, (stop, writer))) as listeners:
-            hub = Hub(store, settings, recon, observer.figures, rejections, writer,
-                      time.monotonic())
-            loop = _EventLoop(listeners, hub, rejections, observer, writer,
-                              supervisor or SupervisorLink())
+        supervisor = supervisor or SupervisorLink()
+        wakes = stop, opening, writer
+        with closing(Listeners(context, settings, rejections, wakes)) as listeners, \
+                _metrics_server(settings, observer):
             _log.info("listening", address=" ".join(listeners.addresses), data=str(settings.data))
-            with _metrics_server(settings, observer):
-                loop.serve(stop)
+            before = Opening(listeners, opening, rejections, supervisor)
+            if store := before.wait(stop):
+                hub = Hub(store, settings, recon, observer.figures, rejections, writer,
+                          time.monotonic())
+                _EventLoop(listeners, hub, rejections, observer, writer, supervisor).serve(
+                    stop, before.waiting())
         _log.info("stopped")
         return stop.exit_status
 
@@ -95,8 +100,11 @@ class _EventLoop:
     writer: WriterThreads
     supervisor: SupervisorLink
 
-    def serve(self, stop: StopSignal) -> None:
+    def serve(self, stop: StopSignal, waiting: Sequence[Incoming]) -> None:
+        """Serve until told to stop, first what has come before there was a hub."""
         due = time.monotonic()
+        for incoming in waiting:
+            self._receive(incoming)
         while not stop:
             if (now := time.monotonic()) >= due:
                 due = self._tick(now, due)

@@ -131,8 +131,7 @@ class _Face:
 
 @dataclass
 class _Files:
-    """The files of frames and faces; each is read once, and of what it says what rows need is kept.
-    """
+    """The files of frames and faces: each is read once, and what rows need of it is kept."""
 
     layout: FolderLayout
     clock: Clock

@@ -27,7 +27,8 @@ def ready_status(client: Client, timeout: float) -> Status:
     while not status.ready:
         left = deadline - time.monotonic()
         if left <= 0:
-            missing = "no sensor" if not status.sensors else "no worker"
+            missing = ("no hub" if status.state != "serving" else
+                       "no sensor" if not status.sensors else "no worker")
             raise ClientTimeoutError(f"{missing} is ready after {timeout:g} s")
         time.sleep(min(_POLL_S, left))
         status = client.status()
@@ -66,6 +67,9 @@ def as_text(address: str, status: Status) -> str:
         rows["restarts"] = ", ".join(
             f"{process} {reason} {count}" for process, counts in status.restarts.items()
             for reason, count in counts if count)
+    if status.state != "serving":
+        rows["hub"] += (f", {status.state}: {status.files_read} of {status.files_to_read} files "
+                        "read, all else is not known yet")
     if status.log_lines_lost:
         rows["log"] = f"{status.log_lines_lost} lines of the hub's lost"
     return "\n".join(f"{name:8} {printable(value)}" for name, value in rows.items())

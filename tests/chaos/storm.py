@@ -135,7 +135,9 @@ class Storm(threading.Thread):
         hub.end(signal.SIGKILL)
         try:
             layout = FolderLayout(self._scene.cluster.data)
-            files = [*layout.all_frames(), *layout.all_faces()]
+            listing = layout.listing()
+            files = [*((one, layout.frame(one)) for one in listing.frames),
+                     *((one, layout.faces / name) for one, name in listing.faces)]
             if files:
                 capture_id, path = self._random.choice(files)
                 self._scene.damaged.add(capture_id)

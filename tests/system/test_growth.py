@@ -1,4 +1,4 @@
-"""Purges of a real hub, by peers that speak no more than the wire format."""
+"""Purges and starts of a real hub with much to keep, by peers that speak the wire format alone."""
 
 import subprocess
 import sys
@@ -6,11 +6,12 @@ from contextlib import closing, contextmanager
 
 import pytest
 
+from bench.growth_captures import fill as fill_quickly
 from denseface.service.protocol import messages
 from denseface.service.protocol.wire import decode_from_hub
 from tests.system.guarded import Peer
 from tests.system.running import hub_alone
-from tests.system.test_keeping import address, files, fill
+from tests.system.test_keeping import FRAME, FRAME_ARRAYS, address, files, fill
 from tests.waiting import until
 
 __all__ = ["address"]
@@ -80,3 +81,41 @@ def test_what_could_not_be_emptied_is_emptied_after_a_restart(address, data):
     with hub_alone(address, data), closing(Peer(address)) as peer:
         until(lambda: not named(data))
         assert peer.status().done == 0
+
+
+def test_the_status_is_known_and_a_press_waits_while_the_database_is_made_again(
+        address, tmp_path):
+    data, kept = tmp_path / "data", 2000
+    fill_quickly(data, kept)
+    (data / "captures.sqlite3").unlink()
+    with closing(Peer(address)) as sensor, closing(Peer(address)) as presser, \
+            closing(Peer(address)) as watcher:
+        # Said once, to a hub that is not there yet: nothing of it is lost.
+        sensor.send(messages.SensorReady(name="s", source="x"))
+        presser.send(messages.Press(request=1, capture_id="press"))
+        with hub_alone(address, data):
+            seen = [watcher.status()]
+            while seen[-1].state != "serving":
+                seen.append(watcher.status())
+            assert {one.state for one in seen[:-1]} <= {"opening", "rebuilding"}
+            assert seen[0].state != "serving"
+            assert not seen[0].ready
+            read = [one.files_read for one in seen[:-1]]
+            assert read == sorted(read)
+            assert max(one.files_to_read for one in seen) in (0, kept + kept * 8 // 10)
+            take = sensor.receive("take").message
+            sensor.send(messages.Frame(capture_id=take.capture_id, frame=FRAME), FRAME_ARRAYS)
+            assert presser.receive("press_accepted").message.capture_id == "press"
+            assert watcher.status().done == kept * 8 // 10
+
+
+def test_a_hub_that_is_told_to_stop_while_it_reads_files_stops(address, tmp_path):
+    data = tmp_path / "data"
+    fill_quickly(data, 2000)
+    (data / "captures.sqlite3").unlink()
+    with closing(Peer(address)) as watcher:
+        with hub_alone(address, data):  # stopped in order, with status 0
+            assert watcher.status().state != "serving"
+        with hub_alone(address, data):
+            until(lambda: watcher.status().state == "serving")
+            assert watcher.status().done == 1600

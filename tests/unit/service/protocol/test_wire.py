@@ -95,7 +95,9 @@ from_hub = st.one_of(
               p99_s=st.floats(0, 1e6)), max_size=3),
           restarts=st.dictionaries(texts, st.builds(
               Restarts, exited=numbers, hung=numbers), max_size=3),
-          free_bytes=st.none() | numbers, kept_bytes=st.none() | numbers, log_lines_lost=numbers),
+          free_bytes=st.none() | numbers, kept_bytes=st.none() | numbers, log_lines_lost=numbers,
+          state=st.sampled_from(["serving", "rebuilding"]), files_read=numbers,
+          files_to_read=numbers),
     numbers.map(lambda number: Packet(messages.Preview(
         epoch="0f", sequence=number, preview=PREVIEW), PREVIEW_ARRAYS)),
     st.just(Packet(messages.TakePreview())),
