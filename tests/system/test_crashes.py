@@ -126,7 +126,7 @@ def test_a_full_disk_refuses_presses_and_keeps_what_was_accepted(scene):
         running.settle()
         assert running.pressers[-1].reasons == []
     check(running, done=8, dead=0)
-    assert not list(FolderLayout(running.cluster.data).temporary_files())
+    assert not FolderLayout(running.cluster.data).listing().temporary
 
 
 def test_spoiled_frames_end_as_dead_letters_and_the_rest_goes_on(scene):
