@@ -4,10 +4,12 @@ from pathlib import Path
 
 import zmq
 
+from denseface.service.protocol import messages
 from denseface.service.security import read_pair, read_public
 from denseface.service.transport.addresses import publications_of
-from tests.system.guarded import as_role
-from tests.waiting import LIMIT_MS
+from tests.system.guarded import as_role, leave
+from tests.waiting import LIMIT_MS, LIMIT_S, PATIENCE, until
+from tests.zmtp import RawSubscriber
 
 _TOPICS = 4000
 """Of 950 bytes, at 45 kB of libzmq's memory each: 180 MB."""
@@ -49,6 +51,38 @@ def test_topics_without_end_cost_the_hub_nothing(hub, connect, refused):
     while other.socket.poll(0):
         other.socket.recv_multipart()
     assert other.socket.poll(LIMIT_MS)  # it goes on
+
+
+def test_previews_are_asked_for_as_long_as_somebody_watches(hub, connect):
+    """Once they ended for all by one word, or never, after a topic named three times."""
+    def asked():
+        """Wait for the hub to ask, and give nothing: it asks again a heartbeat later."""
+        return bool(sensor.receive("take_preview"))
+
+    def left_alone():
+        while sensor.socket.poll(0):
+            sensor.socket.recv_multipart()
+        return sensor.silent(round(5000 * 0.2 * PATIENCE))  # five heartbeats
+
+    sensor = connect(*as_role(hub, "sensor"))
+    sensor.send(messages.SensorReady(name="s", source="x"))
+    publications = Path(publications_of(hub.local).removeprefix("ipc://"))
+    greedy, watcher, foe = (RawSubscriber(publications, LIMIT_S) for _ in range(3))
+    for _ in range(3):
+        greedy.send(b"\1preview")
+    assert asked()
+    watcher.send(b"\1preview")
+    foe.send(b"\1status")
+    for _ in range(5):
+        foe.send(b"\0preview")
+    assert foe.socket.recv(1)  # a status, after all that it said
+    greedy.close()
+    for _ in range(5):
+        assert asked()
+    watcher.close()
+    until(left_alone)
+    foe.close()
+    leave(hub, sensor)
 
 
 def _peak_mb(process: int) -> int:
