@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.chaos.cluster import PACE, Nursery
-from tests.chaos.disk import compile_faults, sweep_all
+from tests.chaos.disk import compile_faults, memory_folder, sweep_all
 from tests.chaos.rounds import Outcome, is_supervised, play
 from tests.chaos.source import write_small_frame
 
@@ -69,7 +69,7 @@ def main() -> int:
 
 
 def _sweep_disk() -> int:
-    with tempfile.TemporaryDirectory(prefix="chaos-") as temporary:
+    with memory_folder() as temporary:
         folder = Path(temporary)
         found = sweep_all(compile_faults(folder), folder, _say)
     for one in found:

@@ -7,9 +7,11 @@ and the system.
 import errno
 import json
 import os
+import random
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,13 +19,21 @@ from typing import Any
 
 from tests.chaos.power_cut import VARIANTS, Disk, read_log
 
-__all__ = ["FOREVER", "Finding", "Sweep", "compile_faults", "sweep_all"]
+__all__ = ["FOREVER", "Finding", "Sweep", "compile_faults", "memory_folder",
+           "sweep_all"]
 
 FOREVER = 10**9
 """Number of operations that fail: from one on, all."""
 _RUNS = (1, 2, 3, 4, 6, FOREVER)
 """Numbers of operations that fail one after another: a write, then what is to mend it."""
 _ERRORS = {"EIO": errno.EIO, "ENOSPC": errno.ENOSPC}
+
+
+def memory_folder() -> tempfile.TemporaryDirectory[str]:
+    """Make a folder whose disk is memory, where there is one: its syncs take no time."""
+    memory = Path("/dev/shm")  # noqa: S108
+    return tempfile.TemporaryDirectory(
+        prefix="disk-faults-", dir=memory if os.access(memory, os.W_OK) else None)
 
 
 def compile_faults(folder: Path) -> Path:
@@ -66,31 +76,48 @@ class Sweep:
         """End the process."""
         self._child.communicate()
 
-    def operations(self) -> int:
-        """Give the number of file operations where none fails."""
-        result = self._play(log=str(self._log))
+    def operations(self, hub: int = 0) -> int:
+        """Give the number of file operations of the first or second hub where none fails."""
+        result = self._play(hubs=[{} for _ in range(hub + 1)])
         if result["violations"]:
             raise RuntimeError(f"on a sound disk: {result['violations']}")
         return int(result["operations"])
 
     def syncs(self) -> list[int]:
-        """Give the positions of those that sync a file or folder."""
-        self._play(log=str(self._log))
+        """Give the positions of those of the first hub that sync a file or folder."""
+        self._play(hubs=[{"log": str(self._log)}])
         return [one.position for one in read_log(self._log, self._data) if one.kind == "sync"]
 
-    def failing(self, error: str, count: int, positions: Iterable[int]) -> list[Finding]:
-        """Let `count` operations fail, from each of the positions on."""
+    def failing(
+        self, error: str, count: int, positions: Iterable[int], hub: int = 0
+    ) -> list[Finding]:
+        """Let `count` operations of the first or second hub fail, from each of the positions on.
+
+        The first is killed before the second.
+        """
         found = []
         for position in positions:
-            result = self._play(first=position, count=count, error=_ERRORS[error])
+            faults = {"first": position, "count": count, "error": _ERRORS[error]}
+            result = self._play(hubs=[{} for _ in range(hub)] + [faults])
             often = "from then on" if count == FOREVER else f"{count} times"
-            found += [Finding(f"{error} at operation {position}, {often}", one)
+            found += [Finding(f"{error} at operation {position} of hub {hub}, {often}", one)
                       for one in result["violations"]]
+        return found
+
+    def failing_twice(self, seed: int, cases: int) -> list[Finding]:
+        """Let operations of both hubs fail, drawn from a seed."""
+        chance = random.Random(seed)
+        operations, found = [self.operations(hub) for hub in range(2)], []
+        for _ in range(cases):
+            hubs = [{"first": chance.randrange(most), "count": chance.choice(_RUNS),
+                     "error": chance.choice(list(_ERRORS.values()))} for most in operations]
+            found += [Finding(f"{hubs}", one) for one in self._play(hubs=hubs)["violations"]]
         return found
 
     def power_cuts(self, every: int = 1, failing: int = -1) -> list[Finding]:
         """Cut the power after each or each `every`-th operation; `failing` fails before, by EIO."""
-        self._play(log=str(self._log), first=failing, count=int(failing >= 0), error=errno.EIO)
+        self._play(hubs=[{"log": str(self._log), "first": failing, "count": int(failing >= 0),
+                          "error": errno.EIO}])
         disk, told, found = Disk(), [], []
         for record in read_log(self._log, self._data):
             if record.kind == "mark":
@@ -123,14 +150,16 @@ class Sweep:
 def sweep_all(library: Path, folder: Path, say: Callable[[str], None]) -> list[Finding]:
     """Play all cases: each error at each operation, a power cut after each; minutes."""
     sweep = Sweep(library, folder)
-    operations = sweep.operations()
-    say(f"{operations} file operations")
     found = []
-    for error in _ERRORS:
-        for count in _RUNS:
-            found += sweep.failing(error, count, range(operations))
-            often = "from then on" if count == FOREVER else f"{count} times"
-            say(f"{error} {often}: {sweep.cases} cases, {len(found)} promises broken")
+    for hub in range(2):
+        for error in _ERRORS:
+            for count in _RUNS:
+                found += sweep.failing(error, count, range(sweep.operations(hub)), hub)
+                often = "from then on" if count == FOREVER else f"{count} times"
+                say(f"hub {hub}, {error} {often}: {sweep.cases} cases, "
+                    f"{len(found)} promises broken")
+    found += sweep.failing_twice(1, 1000)
+    say(f"both hubs: {sweep.cases} cases, {len(found)} promises broken")
     found += sweep.power_cuts()
     say(f"power cuts: {sweep.cases} cases, {len(found)} promises broken")
     for position in sweep.syncs():

@@ -27,17 +27,27 @@ def main() -> None:
     shim = ctypes.CDLL(os.environ["LD_PRELOAD"])
     shim.disk_faults_disarm.restype = ctypes.c_long
     for line in sys.stdin:
-        case = json.loads(line)
-        folder, result = Path(case["folder"]), {"told": case.get("told"), "operations": 0}
-        if result["told"] is None:
-            result = _in_fork(lambda: _before(shim, folder, case))  # noqa: B023
-        result |= _in_fork(lambda: _after(folder, result["told"]))  # noqa: B023
-        print(json.dumps(result), flush=True)
+        print(json.dumps(_play(shim, json.loads(line))), flush=True)
 
 
-def _before(shim: ctypes.CDLL, folder: Path, case: dict[str, Any]) -> dict[str, Any]:
-    events, told = Events(), []
-    log = os.open(case.get("log", os.devnull), os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+def _play(shim: ctypes.CDLL, case: dict[str, Any]) -> dict[str, Any]:
+    """Let one hub after the other live on its disk, and then one on a sound disk."""
+    folder, told, found, operations = Path(case["folder"]), case.get("told", []), [], 0
+    hubs = case.get("hubs", [])
+    for number, faults in enumerate(hubs):
+        stops = number == len(hubs) - 1
+        result = _in_fork(lambda: _before(shim, folder, told, faults, number, stops))  # noqa: B023
+        told, operations = result["told"], result["operations"]
+        found += result["violations"]
+    found += _in_fork(lambda: _after(folder, told))["violations"]
+    return {"operations": operations, "violations": found}
+
+
+def _before(
+    shim: ctypes.CDLL, folder: Path, told: list[str], faults: dict[str, Any], hub: int, stops: bool
+) -> dict[str, Any]:
+    events = Events.of(told)
+    log = os.open(faults.get("log", os.devnull), os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
 
     def tell(text: str) -> None:
         told.append(text)
@@ -45,9 +55,9 @@ def _before(shim: ctypes.CDLL, folder: Path, case: dict[str, Any]) -> dict[str, 
 
     events.tell = tell
     shim.disk_faults_arm(
-        os.fsencode(folder), ctypes.c_long(case.get("first", -1)),
-        ctypes.c_long(case.get("count", 0)), case.get("error", 0), log)
-    before(folder, events)
+        os.fsencode(folder), ctypes.c_long(faults.get("first", -1)),
+        ctypes.c_long(faults.get("count", 0)), faults.get("error", 0), log)
+    before(folder, events, hub, stops=stops)
     operations = shim.disk_faults_disarm()
     return {"told": told, "operations": operations, "violations": events.faults}
 
@@ -74,7 +84,7 @@ def _in_fork(action: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         text = file.read()
     _, status = os.waitpid(child, 0)
     if not text:
-        return {"told": [], "violations": [f"the process ended with {status}"]}
+        return {"told": [], "operations": 0, "violations": [f"a hub's process ended: {status}"]}
     result: dict[str, Any] = json.loads(text)
     return result
 

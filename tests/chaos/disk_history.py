@@ -44,6 +44,8 @@ class Events:
     """Is told each answer when it is given."""
     pressed: dict[str, Answer] = field(default_factory=dict)
     published: list[Seen] = field(default_factory=list)
+    followed: list[Seen] = field(default_factory=list)
+    """As `published`, by somebody who asks for what comes after the last that he knows."""
     lives: dict[str, int] = field(default_factory=dict)
     """How often an id was pressed."""
     faults: list[str] = field(default_factory=list)
@@ -55,8 +57,10 @@ class Events:
         events = cls()
         for text in told:
             kind, *rest = json.loads(text)
-            if kind == "seen":
+            if kind == "published":
                 events.published.append(Seen(*rest))
+            elif kind == "followed":
+                events.followed.append(Seen(*rest))
             else:
                 name, answer = rest
                 events.pressed[name] = Answer(answer)
@@ -70,6 +74,10 @@ class Events:
     def answer(self, capture_id: str, answer: Answer) -> None:
         self.pressed[self.name(capture_id)] = answer
         self.tell(json.dumps(["answer", self.name(capture_id), answer]))
+
+    def answer_to(self, capture_id: str) -> Answer | None:
+        """Give what was said of an id last."""
+        return self.pressed.get(self.name(capture_id))
 
     def begin(self, capture_id: str) -> None:
         self.lives[capture_id] = self.lives.get(capture_id, 0) + 1
@@ -114,9 +122,7 @@ class _Play:
             message = one.packet.message
             if isinstance(one, Publish):
                 if one.topic is Topic.FACES:
-                    seen = self.events.seen(message)
-                    self.events.published.append(seen)
-                    self.events.tell(json.dumps(["seen", *astuple(seen)]))
+                    self._see("published", message)
             elif isinstance(one, Send) and one.peer == _CLIENT:
                 answers.append(message)
             elif isinstance(message, messages.Take):
@@ -147,11 +153,24 @@ class _Play:
             case messages.PressRefused():
                 self.events.answer(capture_id, Answer.REFUSED)
 
-    def next(self, last: int) -> BaseMessage | None:
-        return self.ask(lambda request: messages.GetNext(request=request, after=last))
+    def _see(self, how: str, message: BaseMessage) -> None:
+        seen = self.events.seen(message)
+        getattr(self.events, how).append(seen)
+        self.events.tell(json.dumps([how, *astuple(seen)]))
+
+    def follow(self) -> None:
+        """Ask for all outcomes that are new."""
+        while True:
+            last = self.events.followed[-1:]
+            after = last[0].sequence if last and last[0].epoch == self.store.epoch else 0
+            answer = self.ask(
+                lambda request: messages.GetNext(request=request, after=after))  # noqa: B023
+            if not isinstance(answer, messages.FaceDone | messages.CaptureFailed):
+                return
+            self._see("followed", answer)
 
     def purge(self, capture_id: str) -> None:
-        refused = self.events.pressed[self.events.name(capture_id)] is Answer.REFUSED
+        refused = self.events.answer_to(capture_id) is Answer.REFUSED
         if not refused:
             self.events.answer(capture_id, Answer.WITHDRAWN)
         answer = self.ask(lambda request: messages.Purge(request=request, capture_id=capture_id))
@@ -174,49 +193,57 @@ class _Play:
                     **common, error="Error", message="why", final=False))
             else:
                 self.say(_WORKER, messages.Result(**common, face=_FACE), _FACE_ARRAYS)
+        self.follow()
 
 
-def before(folder: Path, events: Events) -> None:
-    """Live as long as the disk lets the hub."""
+def before(folder: Path, events: Events, hub: int, *, stops: bool) -> None:
+    """Let the first or second hub (0 or 1) live as long as its disk lets it.
+
+    It stops in order where it `stops`, else it is killed.
+    """
     try:
-        _live(folder, events)
+        play = _Play(folder, events)
+        _first(play) if hub == 0 else _second(play)
+        if stops:
+            play.store.close()
     except ServiceError:
         pass  # the hub ends, for a reason that has a name
     except Exception as error:
         events.faults.append(f"the hub ended without a reason: {error!r}")
 
 
-def _live(folder: Path, events: Events) -> None:
-    play = _Play(folder, events)
+def _first(play: _Play) -> None:
     play.press("face")
     play.work()
     play.press("dead")
     play.work(fail="dead")
     play.purge("face")
-    if events.pressed[events.name("face")] is not Answer.WITHDRAWN:  # whose is it then?
+    if play.events.answer_to("face") is not Answer.WITHDRAWN:  # whose is it then?
         play.press("face")
     play.press("gone")
     play.purge("gone")
     play.press("waits")
     play.tick()
-    play.store.close()
+
+
+def _second(play: _Play) -> None:
+    play.work()
+    play.press("more")
+    play.purge("waits")
+    play.work()
+    play.tick()
 
 
 def after(folder: Path, events: Events) -> History:
     """Let another hub, on a sound disk, go on to the end; everything is followed."""
-    followed = list(events.published)
     play = _Play(folder, events)
-    last = followed[-1].sequence if followed and followed[-1].epoch == play.store.epoch else 0
     for _ in range(8):
         play.work()
         play.tick()
-    while isinstance(answer := play.next(last), messages.FaceDone | messages.CaptureFailed):
-        followed.append(events.seen(answer))
-        last = answer.sequence
     play.store.close()
     kept = [Kept(events.name(one.capture_id), one.state, one.sequence, one.sound)
             for one in read_kept(folder)]
-    history = History(dict(events.pressed), followed, list(events.published), kept)
+    history = History(events.pressed, events.followed, events.published, kept)
     events.faults += _left_behind(folder, {one.capture_id for one in kept}, events)
     return history
 

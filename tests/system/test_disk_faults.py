@@ -4,21 +4,18 @@ A part of what `script/chaos --disk` plays in full.
 """
 
 import shutil
-import tempfile
 from pathlib import Path
 
 import pytest
 
-from tests.chaos.disk import FOREVER, Sweep, compile_faults
-
-_IN_MEMORY = Path("/dev/shm")  # noqa: S108
+from tests.chaos.disk import FOREVER, Sweep, compile_faults, memory_folder
 
 
 @pytest.fixture(scope="module")
 def sweep():
     if shutil.which("cc") is None:
         pytest.skip("there is no C compiler (cc) to build the library that makes operations fail")
-    with tempfile.TemporaryDirectory(dir=_IN_MEMORY if _IN_MEMORY.is_dir() else None) as folder:
+    with memory_folder() as folder:
         one = Sweep(compile_faults(Path(folder)), Path(folder))
         yield one
         one.close()
@@ -30,6 +27,11 @@ def test_whatever_operation_fails_what_was_said_stays_true(sweep, error, count, 
     operations = sweep.operations()
     assert operations > 100
     assert sweep.failing(error, count, range(first, operations, 10)) == []
+
+
+@pytest.mark.parametrize(("error", "count", "first"), [("EIO", 1, 0), ("EIO", FOREVER, 5)])
+def test_a_start_on_a_disk_that_fails_loses_nothing(sweep, error, count, first):
+    assert sweep.failing(error, count, range(first, sweep.operations(1), 10), hub=1) == []
 
 
 def test_whenever_the_power_is_cut_what_was_said_stays_true(sweep):

@@ -1,11 +1,15 @@
 """The hub on a disk that is full or fails."""
 
+import errno
+import os
+import sqlite3
+from pathlib import Path
 
 from denseface.recon.settings import Settings
-from denseface.service.errors import StoreError
+from denseface.service.errors import DiskFullError, StoreError
 from denseface.service.hub import Hub
 from denseface.service.protocol import messages
-from tests.unit.service.hub.bench import CLIENT, SETTINGS, WORKER, Bench, kinds
+from tests.unit.service.hub.bench import CLIENT, OTHER, SENSOR, SETTINGS, WORKER, Bench, kinds
 
 
 def test_a_store_that_fails_answers_the_request(bench, monkeypatch):
@@ -96,3 +100,71 @@ def test_a_face_that_was_read_once_and_then_damaged_has_all_attempts_again(bench
         path.write_bytes(b"damaged")
     bench.say(CLIENT, ask)
     assert bench.store.find("a").attempts == 0
+
+
+class _FailingDatabase:
+    """A connection whose commits fail after all was written, while `fails`; SQLite rolls back."""
+
+    def __init__(self, connection):
+        self._connection = connection
+        self.fails = True
+
+    def __getattr__(self, name):
+        return getattr(self._connection, name)
+
+    def execute(self, statement, *values):
+        if statement == "COMMIT" and self.fails:
+            error = sqlite3.OperationalError("disk I/O error")
+            error.sqlite_errorcode = sqlite3.SQLITE_IOERR_FSYNC
+            raise error
+        return self._connection.execute(statement, *values)
+
+
+def test_nothing_is_refused_while_a_later_hub_might_find_it_accepted(bench, monkeypatch):
+    database = _FailingDatabase(bench.store._database._connection)
+    monkeypatch.setattr(bench.store._database, "_connection", database)
+    bench.sensor()
+    bench.press("a")
+    assert bench.frame("a") == []
+    assert bench.wait(0.1) == []
+    # Others have an answer at once: of them nothing was written.
+    ((peer, refused),) = bench.press("b", request=8, peer=OTHER)
+    assert (peer, refused.kind, refused.reason) == (OTHER, "press_refused", "disk")
+    ((_, failed),) = bench.say(OTHER, messages.Purge(request=9, capture_id="a"))
+    assert failed.kind == "request_failed"
+    assert bench.store._layout.unnamed_frame("a").exists()
+    database.fails = False
+    assert kinds(bench.wait(0.1)) == [(SENSOR, "frame_refused"), (CLIENT, "press_refused")]
+    assert not bench.store._layout.unnamed_frame("a").exists()
+    assert bench.store.find("a") is None
+    assert kinds(bench.press("a", request=10)) == [(SENSOR, "take")]
+    assert kinds(bench.frame("a")) == [(SENSOR, "frame_accepted"), (CLIENT, "press_accepted")]
+
+
+def test_what_was_refused_and_cannot_be_removed_is_removed_later(bench, monkeypatch):
+    unlink = Path.unlink
+
+    def fails(path, *arguments, **named):
+        if path.suffix == ".pending" and path.exists():
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        unlink(path, *arguments, **named)
+
+    def full(*_):
+        raise DiskFullError("no room on the disk")
+
+    bench.sensor()
+    with monkeypatch.context() as patch:
+        patch.setattr(bench.store, "accept", full)
+        patch.setattr(Path, "unlink", fails)
+        for name in ("a", "b"):
+            bench.press(name)
+            assert (CLIENT, "press_refused") in kinds(bench.frame(name))
+        ((_, failed),) = bench.say(OTHER, messages.Purge(request=9, capture_id="a"))
+        assert failed.kind == "request_failed"
+    frames = bench.store._layout.frames
+    assert sorted(path.name for path in frames.iterdir()) == ["a.pending", "b.pending"]
+    bench.press("a", request=10)  # anew: nothing removes it any more
+    assert (CLIENT, "press_accepted") in kinds(bench.frame("a"))
+    bench.wait(700)  # longer than between two sweeps
+    assert [path.name for path in frames.iterdir()] == ["a.frame"]
+    bench.store.frame("a")

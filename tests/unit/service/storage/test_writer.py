@@ -9,6 +9,7 @@ import pytest
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import DiskFullError
+from denseface.service.protocol.states import CaptureState
 from denseface.service.storage import FolderStore, WriterThreads, write
 from tests.unit.service.storage.test_folder_store import frame, result
 from tests.unit.service.storing import accept
@@ -139,3 +140,20 @@ def test_what_nobody_expected_is_told_too(store, monkeypatch):
         writer.start(one)
         writer.wait()
     assert isinstance(writer.take_results()[0].error, RuntimeError)
+
+
+def test_what_an_earlier_write_left_is_in_no_later_one_s_way(store):
+    accept(store, frame("z"), Settings(), "0f")
+    for one in (pending(store, "a"), store.prepare_face(result("z", store))):
+        one.unnamed.write_bytes(b"left by a disk that failed")
+        (written,) = write([one])
+        assert written.error is None
+
+
+def test_a_purge_takes_what_a_write_left(store):
+    accept(store, frame("z"), Settings(), "0f")
+    left = store.prepare_face(result("z", store)).unnamed
+    left.write_bytes(b"half a face")
+    store.retention.remove(["z"], CaptureState.REMOVED)
+    store.retention.erase(["z"])
+    assert not left.exists()
