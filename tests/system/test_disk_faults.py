@@ -39,5 +39,5 @@ def test_whenever_the_power_is_cut_what_was_said_stays_true(sweep):
 
 
 def test_a_sync_that_failed_is_not_relied_upon_when_the_power_is_cut(sweep):
-    for failing in sweep.syncs()[10::3]:
-        assert sweep.power_cuts(every=70, failing=failing) == []
+    for failing in sweep.syncs()[10::5]:
+        assert sweep.power_cuts(every=90, failing=failing) == []
