@@ -4,8 +4,10 @@ The camera frame is OpenCV's: x right, y down, z forward; lengths in millimetres
 in pixels with (0, 0) the centre of the top left pixel.
 """
 
+from collections import OrderedDict
 from functools import lru_cache
 from pathlib import Path
+from threading import Lock
 from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
@@ -27,8 +29,21 @@ _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Side = Annotated[int, Field(gt=0, le=MAX_SIDE)]
 _Row = tuple[_Finite, _Finite, _Finite]
+_Shift = Annotated[float, Field(ge=-1e4, le=1e4, allow_inf_nan=False)]
+"""mm between both cameras, along an axis."""
 _Array = NDArray[np.float64]
 
+_FOCAL_PER_SIDE = (1e-2, 1e3)
+"""Focal length by the longer side: fields of view of 179 to 0.06 degrees."""
+_MAX_ASPECT = 10.0
+"""Of a pixel; of a sensor's, binned or not, it is 0.5 to 2."""
+_CENTER_PER_SIDE = 1e3
+"""How far the principal point may be off by the longer side: a small part of a large image."""
+_RAYS_BYTES = 64 * 2**20
+"""Of the maps of rays that are kept: of thirteen cameras with 640x480 pixels, of none with
+4096x4096."""
+_RAYS_AT_ONCE = 2**20
+"""Pixels whose rays are computed at once; each takes some two hundred bytes meanwhile."""
 _UNDISTORT_ITERATIONS = 20
 """Newton steps, at most."""
 _UNDISTORT_TOLERANCE = 1e-12
@@ -101,9 +116,9 @@ class CameraModel(_Model):
     def rays(self) -> _Array:
         """Give the point at z = 1 that each pixel's centre sees: (height, width, 2) float64.
 
-        The array is computed once for each camera and is read-only.
+        The array is read-only. Those of the last cameras are kept, as many as 64 MiB hold.
         """
-        return _rays(self)
+        return _RAY_MAPS.of(self)
 
     def scaled(self, factor: float) -> Self:
         """Give the same camera at another resolution."""
@@ -145,6 +160,24 @@ class CameraModel(_Model):
         return x, y
 
     @model_validator(mode="after")
+    def _possible(self) -> Self:
+        """Refuse what no camera is, before its numbers overflow in what is computed from them."""
+        side = max(self.width, self.height)
+        least, most = (side * factor for factor in _FOCAL_PER_SIDE)
+        for name, focal in (("fx", self.fx), ("fy", self.fy)):
+            if not least <= focal <= most:
+                raise ValueError(f"{name} is {focal:.6g} pixels, expected {least:g} to {most:g} of "
+                                 f"a camera of {self.width}x{self.height}")
+        if not 1 / _MAX_ASPECT <= self.fx / self.fy <= _MAX_ASPECT:
+            raise ValueError(f"fx is {self.fx:.6g} and fy {self.fy:.6g}: no pixel is "
+                             f"{_MAX_ASPECT:g} times as long as wide")
+        for name, center in (("cx", self.cx), ("cy", self.cy)):
+            if abs(center) > _CENTER_PER_SIDE * side:
+                raise ValueError(f"{name} is {center:.6g}, more than {_CENTER_PER_SIDE:g} times "
+                                 "as far off as the image is wide or high")
+        return self
+
+    @model_validator(mode="after")
     def _invertible(self) -> Self:
         """Refuse a distortion that folds the image over itself: its pixels have no one ray."""
         if _folds(self):
@@ -161,10 +194,41 @@ def _folds(camera: CameraModel) -> bool:
     return not (off < _INVERTIBLE_PX).all()
 
 
-@lru_cache(maxsize=8)
+class _RayMaps:
+    """The maps of rays of the last cameras, as many as `max_bytes` hold; for any thread."""
+
+    def __init__(self, max_bytes: int) -> None:
+        self._max_bytes = max_bytes
+        self._maps: OrderedDict[CameraModel, _Array] = OrderedDict()
+        self._lock = Lock()
+
+    def of(self, camera: CameraModel) -> _Array:
+        with self._lock:
+            if camera in self._maps:
+                self._maps.move_to_end(camera)
+                return self._maps[camera]
+        rays = _rays(camera)
+        if rays.nbytes <= self._max_bytes:
+            with self._lock:
+                self._maps[camera] = rays
+                while self.nbytes > self._max_bytes:
+                    self._maps.popitem(last=False)
+        return rays
+
+    @property
+    def nbytes(self) -> int:
+        return sum(rays.nbytes for rays in self._maps.values())
+
+
+_RAY_MAPS = _RayMaps(_RAYS_BYTES)
+
+
 def _rays(camera: CameraModel) -> _Array:
-    v, u = np.mgrid[:camera.height, :camera.width]
-    rays = camera.back_project(np.stack([u, v], axis=-1), 1.0)[..., :2].copy()
+    rays = np.empty((camera.height, camera.width, 2))
+    every = max(1, _RAYS_AT_ONCE // camera.width)
+    for top in range(0, camera.height, every):
+        v, u = np.mgrid[top:min(top + every, camera.height), :camera.width]
+        rays[top:top + every] = camera.back_project(np.stack([u, v], axis=-1), 1.0)[..., :2]
     rays.setflags(write=False)
     return rays
 
@@ -173,7 +237,7 @@ class DepthToColor(_Model):
     """The rigid transform X_color = rotation @ X_depth + translation."""
 
     rotation: tuple[_Row, _Row, _Row] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
-    translation_mm: _Row = (0, 0, 0)
+    translation_mm: tuple[_Shift, _Shift, _Shift] = (0, 0, 0)
 
     @field_validator("rotation")
     @classmethod

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from denseface.recon.errors import (
     FaceWithoutDepthError,
+    ImpossibleFrameError,
     NoDepthError,
     NoFaceError,
     ReconstructionError,
@@ -18,9 +19,9 @@ if TYPE_CHECKING:
     from denseface.recon.warmup import warm
 
 __all__ = [
-    "DenseCloud", "Face", "FaceWithoutDepthError", "Neighbors", "NoDepthError", "NoFaceError",
-    "PointCloud", "Preset", "ReconstructionError", "Report", "Settings", "TooLittleDepthError",
-    "reconstruct", "warm",
+    "DenseCloud", "Face", "FaceWithoutDepthError", "ImpossibleFrameError", "Neighbors",
+    "NoDepthError", "NoFaceError", "PointCloud", "Preset", "ReconstructionError", "Report",
+    "Settings", "TooLittleDepthError", "reconstruct", "warm",
 ]
 
 _MODULES = {"reconstruct": "denseface.recon.pipeline", "warm": "denseface.recon.warmup"}

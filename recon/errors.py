@@ -1,7 +1,7 @@
 """Why a frame did not become a face: always one of these, never a bad cloud."""
 
-__all__ = ["FaceWithoutDepthError", "NoDepthError", "NoFaceError", "ReconstructionError",
-           "TooLittleDepthError"]
+__all__ = ["FaceWithoutDepthError", "ImpossibleFrameError", "NoDepthError", "NoFaceError",
+           "ReconstructionError", "TooLittleDepthError"]
 
 
 class ReconstructionError(Exception):
@@ -22,3 +22,7 @@ class FaceWithoutDepthError(ReconstructionError):
 
 class TooLittleDepthError(ReconstructionError):
     """Fewer seeds on the face than a fit needs."""
+
+
+class ImpossibleFrameError(ReconstructionError):
+    """The frame's numbers lead where no face can be: its calibration is not that of its images."""

@@ -8,11 +8,14 @@ import time
 from functools import cache, partial
 from importlib.metadata import version
 
+import cv2
+import numpy as np
+
 from denseface.capture.frame import RgbdFrame
 from denseface.recon.arrays import Floats
 from denseface.recon.detail import add_detail
 from denseface.recon.detection import detect_face
-from denseface.recon.errors import NoDepthError, TooLittleDepthError
+from denseface.recon.errors import ImpossibleFrameError, NoDepthError, TooLittleDepthError
 from denseface.recon.face import Face, PointCloud, Report
 from denseface.recon.intermediate import ColorSampler, Registration, SurfaceGrid
 from denseface.recon.numerics.threads import one_blas_thread
@@ -27,10 +30,16 @@ __all__ = ["reconstruct", "surface_of"]
 
 _FEW_SEEDS = 2000
 """With fewer seeds, the report warns."""
+_MOST_MM = 1000.0
+"""Seeds farther apart, along x or y, are not on a face."""
 _SPARSE = 4
 """Every so many pixels are enough to find a face and weigh its depth."""
 _MUCH_SKEW_US = 33_000
 """A whole frame at 30 frames a second: the face may have moved in between."""
+
+_OF_THE_NUMBERS = (ArithmeticError, LookupError, ValueError, cv2.error)
+"""What the numbers of a frame can lead to, where nothing sees to it beforehand. Not lack of memory,
+which another attempt may have."""
 
 
 @one_blas_thread
@@ -50,11 +59,23 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     Raises
     ------
     ReconstructionError
-        `NoDepthError`, `NoFaceError`, `FaceWithoutDepthError` or `TooLittleDepthError`.
+        `NoDepthError`, `NoFaceError`, `FaceWithoutDepthError`, `TooLittleDepthError` or
+        `ImpossibleFrameError`: the same for the same frame, so trying it again does not help.
     """
-    settings = settings or Settings()
-    focal_px = frame.calibration.color.fx
     clock = _Stopwatch()
+    try:
+        return _reconstruct(frame, settings or Settings(), clock)
+    except _OF_THE_NUMBERS as error:
+        if isinstance(error, cv2.error) and error.code == cv2.Error.StsNoMem:
+            raise
+        reason = " ".join(str(error).split())[:200]
+        raise ImpossibleFrameError(
+            f"after {clock.last}: {type(error).__name__}: {reason}: is the calibration right?"
+        ) from error
+
+
+def _reconstruct(frame: RgbdFrame, settings: Settings, clock: "_Stopwatch") -> Face:
+    focal_px = frame.calibration.color.fx
     overview = _overview(frame, settings.depth_offset_mm)
     clock.lap("overview")
     found = detect_face(frame.color, overview, focal_px)
@@ -62,9 +83,7 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     registered = register(frame, settings.depth_offset_mm, *box_window(overview, found.box))
     clock.lap("registration")
     seeds = segment_face(registered, found.box, focal_px)
-    if len(seeds.points) < MIN_SEEDS:
-        raise TooLittleDepthError(
-            f"{len(seeds.points)} depth readings on the face, a fit needs at least {MIN_SEEDS}")
+    _check_seeds(seeds.points)
     clock.lap("segmentation")
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     clock.lap("neighbors")
@@ -83,6 +102,17 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
         version=_version(), warnings=_warnings(frame, len(initial)),
     )
     return Face(initial, dense, report)
+
+
+def _check_seeds(points: Floats) -> None:
+    """See to it that there are enough, and no farther apart than on a face."""
+    if len(points) < MIN_SEEDS:
+        raise TooLittleDepthError(
+            f"{len(points)} depth readings on the face, a fit needs at least {MIN_SEEDS}")
+    width, height, _ = np.ptp(points, axis=0)
+    if not max(width, height) <= _MOST_MM:
+        raise ImpossibleFrameError(f"the readings on the face are {width:.6g} x {height:.6g} mm "
+                                   "across: is the calibration right?")
 
 
 def _overview(frame: RgbdFrame, depth_offset_mm: float) -> Registration:
@@ -138,6 +168,11 @@ class _Stopwatch:
     def __init__(self) -> None:
         self._start = self._last = time.perf_counter()
         self._laps: dict[str, float] = {}
+
+    @property
+    def last(self) -> str:
+        """Name of the last lap."""
+        return next(reversed(self._laps), "nothing")
 
     def lap(self, name: str) -> None:
         now = time.perf_counter()

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from denseface.recon.arrays import Bools, Bytes, Doubles, Floats
+from denseface.recon.errors import ImpossibleFrameError
 from denseface.recon.numerics.bilinear import exceeds
 from denseface.recon.numerics.filters import blurred
 from denseface.recon.numerics.jit import compiled
@@ -32,6 +33,9 @@ _EVEN_PX = 3
 _GROWTH = 1.0
 """How far the support may grow into bays of the outline, mean spacings."""
 
+_MAX_PLACES = 2**25
+"""Of a grid; a face of a million seeds has a third of it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Support:
@@ -55,12 +59,14 @@ class Support:
 
     @classmethod
     def of(cls, points: Floats, spacing: float) -> Self:
-        """Find where seeds, (n, 3) float32, mm, of a mean spacing, mm, support a surface."""
+        """Find where seeds, (n, 3) float32, mm, of a mean spacing, mm, support a surface.
+
+        ImpossibleFrameError where that is larger than any face by far.
+        """
         step = spacing / _FINENESS
         reach = (_CLOSING + _GROWTH) * spacing
         left, right, top, bottom = xy_bounds(points)
-        xs, ys = (_axis(low - reach, high + reach, step)
-                  for low, high in ((left, right), (top, bottom)))
+        xs, ys = _axes((left - reach, right + reach), (top - reach, bottom + reach), step)
         seeded = occupancy(points, (xs[0], ys[0]), step, len(ys), len(xs))
         around = disc(_CLOSING * _FINENESS)
         closed = binary_fill_holes(np.asarray(cv2.dilate(seeded, around), np.uint8))
@@ -103,7 +109,7 @@ class Support:
 
         Returns xs, ys, (columns,), (rows,) float64, mm, and the support, (rows, columns) bool.
         """
-        xs, ys = (_axis(own[0], own[-1], step) for own in (self.xs, self.ys))
+        xs, ys = _axes((self.xs[0], self.xs[-1]), (self.ys[0], self.ys[-1]), step)
         columns, rows = self.coordinates(xs, ys)
         return xs, ys, exceeds(self.margin, rows, columns, self.level)
 
@@ -122,9 +128,18 @@ def _broadly_blurred(image: Bytes, sigma: float) -> Floats:
                       np.float32)[:image.shape[0], :image.shape[1]]
 
 
-def _axis(low: float, high: float, step: float) -> Doubles:
-    """Points from `low` to beyond `high`, an even number."""
-    return low + step * np.arange(2 * (int((high - low) / step) // 2 + 1), dtype=np.float64)
+def _axes(
+    x_range: tuple[float, float], y_range: tuple[float, float], step: float
+) -> tuple[Doubles, Doubles]:
+    """Points along x and y from the low ends to beyond the high ones, of an even number each."""
+    width, height = x_range[1] - x_range[0], y_range[1] - y_range[0]
+    if not (step > 0 and (width / step) * (height / step) <= _MAX_PLACES):
+        raise ImpossibleFrameError(
+            f"the face is {width:.6g} x {height:.6g} mm with points every {step:.6g} mm: more than "
+            f"{_MAX_PLACES} points: is the calibration right?")
+    xs, ys = (low + step * np.arange(2 * (int(side / step) // 2 + 1), dtype=np.float64)
+              for low, side in ((x_range[0], width), (y_range[0], height)))
+    return xs, ys
 
 
 @compiled

@@ -1,7 +1,5 @@
 """Stage 1: every depth pixel as a 3D point, and where the colour camera sees it."""
 
-from functools import lru_cache
-
 import cv2
 import numpy as np
 
@@ -89,17 +87,19 @@ def sample_colors(
     return kernels.sample_image(out.pixels, visible, _read_only(frame.color))[0], visible[0]
 
 
-@lru_cache(maxsize=8)
 def _rays(camera: CameraModel) -> tuple[Doubles, Doubles]:
     """Give x and y at z = 1 of each pixel, read-only.
 
     Without distortion they are broadcast from one row and one column, which stay in the cache.
     """
-    rays = camera.rays()
     if any(camera.distortion):
+        rays = camera.rays()
         return rays[..., 0], rays[..., 1]
-    return (np.broadcast_to(rays[0, :, 0].copy(), rays.shape[:2]),
-            np.broadcast_to(rays[:, :1, 1].copy(), rays.shape[:2]))
+    columns, rows = np.arange(camera.width), np.arange(camera.height)
+    x = camera.back_project(np.stack([columns, np.zeros_like(columns)], axis=-1), 1.0)[:, 0]
+    y = camera.back_project(np.stack([np.zeros_like(rows), rows], axis=-1), 1.0)[:, 1:2]
+    shape = camera.height, camera.width
+    return np.broadcast_to(x.copy(), shape), np.broadcast_to(y, shape)
 
 
 def _color_camera(frame: RgbdFrame) -> ColorCamera:

@@ -168,7 +168,9 @@ class _Worker:
                 frame_sha256=job.frame_sha256, face=header)
         except Exception as error:
             final = _is_final(error)
-            say = _log.warning if isinstance(error, ReconstructionError) else _log.exception
+            # One with a cause may be a fault of ours, though another attempt ends the same.
+            named = isinstance(error, ReconstructionError) and error.__cause__ is None
+            say = _log.warning if named else _log.exception
             say("no face", capture_id=job.capture_id, error=type(error).__name__,
                 reason=str(error))
             failure = messages.JobFailed(

@@ -111,8 +111,8 @@ def _another_size(rng: Random, tree: Any, corpus: Sequence[Parts]) -> bytes:
         face.pop("arrays", None)
     if isinstance(frame, dict) and isinstance(frame.get("calibration"), dict):
         frame["calibration"][rng.choice(("depth", "color"))] = {
-            "width": size, "height": rng.choice((1, size)), "fx": 9.0, "fy": 9.0, "cx": 0.0,
-            "cy": 0.0}
+            "width": size, "height": rng.choice((1, size)), "fx": 1.0 * size,
+            "fy": 1.0 * size, "cx": 0.0, "cy": 0.0}
         frame.pop("arrays", None)
     return b""
 

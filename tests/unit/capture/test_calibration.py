@@ -7,7 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
+from denseface.capture.calibration import (
+    Calibration,
+    CameraModel,
+    DepthToColor,
+    _RayMaps,
+    _rays,
+)
 from denseface.capture.errors import CalibrationError
 from tests.unit.frames import calibration, camera, cameras, poses
 
@@ -45,6 +51,26 @@ def test_rays_are_every_pixels_own():
     assert not rays.flags.writeable
     np.testing.assert_allclose(
         cam.project(np.array([*rays[7, 130], 1.0])), (130, 7), atol=1e-8)
+
+
+def test_the_maps_of_rays_that_are_kept_have_a_limit():
+    cams = [camera(cx=float(cx), distortion=(0.01, 0, 0, 0, 0)) for cx in range(70, 80)]
+    size = cams[0].rays().nbytes
+    maps = _RayMaps(3 * size)
+    rays = {cam: maps.of(cam) for cam in cams}
+    assert maps.nbytes == 3 * size
+    assert maps.of(cams[-1]) is rays[cams[-1]]
+    assert maps.of(cams[0]) is not rays[cams[0]]
+    none = _RayMaps(size - 1)
+    np.testing.assert_array_equal(none.of(cams[3]), rays[cams[3]])
+    assert none.nbytes == 0
+
+
+def test_rays_are_the_same_however_many_are_computed_at_once(monkeypatch):
+    cam = camera(distortion=(0.1, -0.05, 0.001, -0.002, 0.01))
+    whole = _rays(cam)
+    monkeypatch.setattr("denseface.capture.calibration._RAYS_AT_ONCE", 1000)
+    np.testing.assert_allclose(_rays(cam), whole, rtol=0, atol=1e-11)
 
 
 @settings(deadline=None)
@@ -89,12 +115,23 @@ def _broken(path: str, value: object) -> str:
     ("depth.cx", "left"), ("depth.distortion", [0, 0]), ("depth.lens", 1),
     ("depth_to_color.rotation", [[1, 0, 0], [0, 1, 0], [0, 0, -1]]),
     ("depth_to_color.rotation", [[2, 0, 0], [0, 1, 0], [0, 0, 1]]),
-    ("depth_to_color.translation_mm", [0, 0]),
+    ("depth_to_color.translation_mm", [0, 0]), ("depth_to_color.translation_mm", [0, 1e5, 0]),
 ])
 def test_bad_calibration_is_named_in_one_line(path, value):
     with pytest.raises(CalibrationError) as caught:
         Calibration.from_json(_broken(path, value), name="x.calibration.json")
     assert str(caught.value).startswith(f"x.calibration.json: {path}")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("path", "value"), [
+    ("depth.fx", 1e9), ("color.fy", 1e-300), ("color.cx", 1e300), ("depth.cy", -1e9),
+    ("depth.fx", 1600.0)])
+def test_a_camera_that_cannot_be_is_named_in_one_line(path, value):
+    with pytest.raises(CalibrationError) as caught:
+        Calibration.from_json(_broken(path, value), name="x.calibration.json")
+    where, name = path.split(".")
+    assert str(caught.value).startswith(f"x.calibration.json: {where}: Value error, {name} is ")
     assert "\n" not in str(caught.value)
 
 

@@ -233,7 +233,8 @@ def test_what_is_wrong_is_named(parts, message):
 
 def test_an_oversized_claim_is_refused_by_its_header_alone():
     frame = json.loads(WIRES[1][0])["frame"]
-    frame["calibration"]["color"] |= {"width": 16384, "height": 16384}
+    frame["calibration"]["color"] |= {
+        "width": 16384, "height": 16384, "fx": 16384.0, "fy": 16384.0}
     frame["arrays"][1]["shape"] = [16384, 16384, 3]
     with pytest.raises(RemoteProtocolError, match=f"at most {MAX_ARRAY_BYTES}"):
         decode_to_hub([header(frame=frame), WIRES[1][1], WIRES[1][2]])
