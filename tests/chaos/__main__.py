@@ -37,7 +37,8 @@ def main() -> int:
     os.environ |= PACE  # of our own clients
     began = time.monotonic()
     total, rounds, left = Outcome(), 0, args.presses
-    with tempfile.TemporaryDirectory(prefix="chaos-") as temporary, Nursery() as nursery:
+    with tempfile.TemporaryDirectory(prefix="chaos-") as temporary, Nursery(
+            compile_faults(Path(temporary))) as nursery:
         frame = Path(temporary) / "frame.npz"
         write_small_frame(frame)
         while left > 0:

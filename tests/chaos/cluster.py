@@ -51,13 +51,21 @@ def until(true: Callable[[], bool], what: str, within_s: float = LIMIT_S) -> Non
 
 
 class Nursery:
-    """Forks processes; see `tests.chaos.nursery`."""
+    """Forks processes; see `tests.chaos.nursery`.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    faults : library that makes file operations fail, see `Cluster.fail_disk`
+    """
+
+    def __init__(self, faults: Path | None = None) -> None:
+        preloaded = {"LD_PRELOAD": str(faults)} if faults else {}
+        self.disk_faults = faults is not None
+        """Whether file operations can be made to fail."""
         self._process = subprocess.Popen(
             [sys.executable, "-m", "tests.chaos.nursery"], cwd=_REPOSITORY, text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
-            env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
+            env=os.environ | preloaded | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
         self._lock = threading.Lock()
         self._answer()
 
@@ -183,6 +191,8 @@ class Cluster:
         self.logs = folder
         self._tokens = folder / "tokens"
         self._tokens.mkdir(parents=True)
+        self.disk_order = folder / "disk-order" if nursery.disk_faults else None
+        """Is there while `fail_disk` has not begun; None where nothing can be made to fail."""
         self._sockets = tempfile.TemporaryDirectory(prefix="df-")  # their paths must be short
         self.address = f"ipc://{self._sockets.name}/hub"
         self.fired: Counter[str] = Counter()
@@ -190,6 +200,9 @@ class Cluster:
         settings = PACE | (environment or {}) | {
             FAILPOINTS_VARIABLE: ",".join(f"{name}={action}" for name, action in points.items()),
             TOKENS_VARIABLE: str(self._tokens)}
+        if self.disk_order:
+            settings |= {"DISK_FAULTS_FOLDER": str(self.data),
+                         "DISK_FAULTS_ORDER": str(self.disk_order)}
 
         def part(name: str, command: str, address: str, *arguments: str) -> Part:
             return Part(nursery, name, [command, "--address", address, *arguments],
@@ -295,6 +308,14 @@ class Cluster:
         """Let a failpoint act the next time that it is passed."""
         self.token(failpoint).touch()
         self.fired[failpoint] += 1
+
+    def fail_disk(self, error: int, count: int) -> None:
+        """Let the hub's next `count` file operations fail with an error number."""
+        if self.disk_order is None:
+            raise RuntimeError("this nursery cannot make file operations fail")
+        beside = self.disk_order.with_suffix(".new")
+        beside.write_text(f"{error} {count}")
+        beside.replace(self.disk_order)
 
     def restarts(self) -> int:
         """Give how often a part was started again."""

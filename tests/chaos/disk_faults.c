@@ -1,6 +1,8 @@
 /* Makes file operations below one folder fail when a test says so, and writes down those that do
  * not, so that a power cut can be played. Preloaded into a process (LD_PRELOAD), which calls
- * disk_faults_arm by ctypes. Reading never fails. Linux, one thread. */
+ * disk_faults_arm by ctypes, or is told by a file: the environment's DISK_FAULTS_FOLDER names the
+ * folder, DISK_FAULTS_ORDER a file. Where that appears with an error number and a count, so many
+ * operations fail, and it is removed. Reading never fails. Linux. */
 
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -9,6 +11,7 @@
 #include <limits.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <sys/types.h>
@@ -25,6 +28,7 @@
 
 static char folder[PATH_MAX];
 static size_t folder_length; /* 0: not armed */
+static char order[PATH_MAX];  /* empty: there is none */
 static long position, first, count;
 static int error, journal = -1;
 static char ours[MAX_DESCRIPTORS];
@@ -40,6 +44,16 @@ void disk_faults_arm(const char *path, long from, long many, int number, int log
     count = many;
     error = number;
     journal = log;
+}
+
+/* Do as the environment says. */
+__attribute__((constructor)) void disk_faults_follow(void)
+{
+    const char *path = getenv("DISK_FAULTS_FOLDER"), *file = getenv("DISK_FAULTS_ORDER");
+    if (path != NULL && file != NULL) {
+        disk_faults_arm(path, -1, 0, 0, -1);
+        snprintf(order, sizeof order, "%s", file);
+    }
 }
 
 long disk_faults_disarm(void)
@@ -92,10 +106,27 @@ static int known(int descriptor)
     return folder_length && descriptor >= 0 && descriptor < MAX_DESCRIPTORS && ours[descriptor];
 }
 
+static void take_order(long now)
+{
+    FILE *file = fopen(order, "re");
+    int number;
+    long many;
+    if (file == NULL)
+        return;
+    if (fscanf(file, "%d %ld", &number, &many) == 2 && unlink(order) == 0) {
+        error = number;
+        first = now;
+        count = many;
+    }
+    fclose(file);
+}
+
 /* Whether this operation is to fail. */
 static int fails(const char *what, long descriptor, const char *path)
 {
-    long now = position++;
+    long now = __atomic_fetch_add(&position, 1, __ATOMIC_RELAXED);
+    if (order[0] != '\0')
+        take_order(now);
     if (now < first || now - first >= count)
         return 0;
     note("failed", descriptor, 0, what, path, "", 0);

@@ -59,6 +59,8 @@ def _become(wanted: dict[str, object]) -> NoReturn:
         if not isinstance(environment, dict) or not isinstance(arguments, list):
             raise TypeError("expected environment and arguments")  # noqa: TRY301
         os.environ.update(environment)
+        if library := os.environ.get("LD_PRELOAD"):
+            ctypes.CDLL(library).disk_faults_follow()
         from denseface.service.cli import main
 
         status = main(arguments)

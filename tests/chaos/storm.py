@@ -1,5 +1,6 @@
 """Random faults, one after the other, from a seed."""
 
+import errno
 import random
 import signal
 import threading
@@ -20,6 +21,8 @@ _SUPERVISED_PAUSE_S = 1.5
 _LONGEST_STOP_S = 1.5
 """Beyond the liveness of `tests.chaos.cluster.PACE`."""
 _LONGEST_STALL_S = 3.0
+_DISK_RUNS = (1, 2, 3, 4, 6, 20)
+"""Numbers of file operations that fail one after another."""
 _DISK = ("written", "synced", "renamed")
 
 
@@ -63,6 +66,8 @@ class Storm(threading.Thread):
             self._harms.append(self._spoil)
         if scene.cluster.supervised:
             self._harms += [self._hang, self._hang]
+        if scene.cluster.disk_order:
+            self._harms += [self._fail_disk, self._fail_disk]
         self._pause_s = _SUPERVISED_PAUSE_S if scene.cluster.supervised else _MEAN_PAUSE_S
 
     def run(self) -> None:
@@ -81,6 +86,8 @@ class Storm(threading.Thread):
         self._count_failpoints()
         for name in self._asked:
             self._scene.cluster.token(name).unlink(missing_ok=True)
+        if self._scene.cluster.disk_order:
+            self._scene.cluster.disk_order.unlink(missing_ok=True)
         for part in self._scene.cluster.parts:
             part.send(signal.SIGCONT)
         if self.error:
@@ -117,6 +124,14 @@ class Storm(threading.Thread):
         if name not in self._asked:
             self._asked.add(name)
             self._scene.cluster.let_fail(name)
+
+    def _fail_disk(self) -> None:
+        """Let the hub's next file operations fail, SQLite's too."""
+        order = self._scene.cluster.disk_order
+        if order and not order.exists():
+            error = self._random.choice((errno.EIO, errno.ENOSPC))
+            self._scene.cluster.fail_disk(error, self._random.choice(_DISK_RUNS))
+            self.counts[f"disk: a run of {errno.errorcode[error]}"] += 1
 
     def _stall_log(self) -> None:
         """Stop reading what the hub logs, longer than its few lines last in the pipe."""

@@ -1,5 +1,7 @@
 """Processes are killed, stopped, cut off and lied to; the history of each run is checked."""
 
+import errno
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +16,7 @@ from denseface.service.runtime.failpoints import FAILPOINT_NAMES
 from denseface.service.storage import FolderLayout
 from denseface.service.transport.addresses import publications_of
 from tests.chaos.cluster import Nursery, Part, until
+from tests.chaos.disk import compile_faults
 from tests.chaos.history import Answer, violations
 from tests.chaos.proxy import Proxy
 from tests.chaos.scene import Scene
@@ -34,8 +37,10 @@ def quick_client():
 
 
 @pytest.fixture(scope="module")
-def nursery():
-    with Nursery() as one:
+def nursery(tmp_path_factory):
+    # Without a C compiler no file operation can be made to fail.
+    faults = compile_faults(tmp_path_factory.mktemp("faults")) if shutil.which("cc") else None
+    with Nursery(faults) as one:
         yield one
 
 
@@ -127,6 +132,21 @@ def test_a_full_disk_refuses_presses_and_keeps_what_was_accepted(scene):
         assert running.pressers[-1].reasons == []
     check(running, done=8, dead=0)
     assert not FolderLayout(running.cluster.data).listing().temporary
+
+
+def test_a_disk_that_fails_in_runs_breaks_no_promise(scene, nursery):
+    if not nursery.disk_faults:
+        pytest.skip("there is no C compiler (cc) to build the library that makes operations fail")
+    running = scene(environment=PATIENT)
+    for number, (error, count) in enumerate((
+            (errno.EIO, 2), (errno.EIO, 4), (errno.ENOSPC, 3), (errno.EIO, 12))):
+        running.cluster.fail_disk(error, count)
+        running.press(f"run{number}", 2)
+        until(lambda: not running.cluster.disk_order.exists(), "a file operation")
+        running.settle()
+        running.cluster.hub.end(signal.SIGKILL)
+        running.cluster.hub.wanted = True
+    check(running)
 
 
 def test_spoiled_frames_end_as_dead_letters_and_the_rest_goes_on(scene):
