@@ -10,7 +10,7 @@ from ipaddress import ip_address
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from denseface.service.errors import AddressError, HubRunningError
+from denseface.service.errors import AddressError, HubRunningError, reason_of
 from denseface.service.runtime.files import check_unwritable, socket_folder
 from denseface.service.settings import runtime_folder
 
@@ -54,25 +54,39 @@ def is_local(address: str) -> bool:
 def check_bindable(address: str) -> None:
     """Make the folder of an `ipc` address, or check that nobody else may put a socket there.
 
-    SettingsError where somebody may; HubRunningError where another hub answers there: binding would
-    silently take its place.
+    SettingsError where somebody may, or where something else has its name; HubRunningError where
+    another hub answers there: binding would silently take its place.
     """
     if path := socket_file(address):
         check_socket_file(path)
+        _check_replaceable(path.with_name(path.name + _PUBLICATIONS))
 
 
 def check_socket_file(path: Path) -> None:
     """Make the folder of a socket's file; HubRunningError where another hub answers there.
 
-    SettingsError where the folder cannot be had.
+    SettingsError where the folder cannot be had, or something else has that name.
     """
     socket_folder(path.parent)
+    _check_replaceable(path)
     with socket.socket(socket.AF_UNIX) as probe:
         try:
             probe.connect(str(path))
         except OSError:
             return
     raise HubRunningError(f"ipc://{path}: another hub is listening there")
+
+
+def _check_replaceable(path: Path) -> None:
+    """Refuse a name that something else than a socket has: libzmq would remove that."""
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise AddressError(f"ipc://{path}: {reason_of(error)}") from error
+    if not stat.S_ISSOCK(mode):
+        raise AddressError(f"ipc://{path}: there is a file of that name, and it is no socket")
 
 
 def check_connectable(address: str) -> None:

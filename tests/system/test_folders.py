@@ -52,6 +52,26 @@ def test_a_socket_in_a_folder_that_others_read_is_its_user_s_alone(tmp_path):
     assert mode_of(folder) == 0o755
 
 
+@pytest.mark.parametrize("name", ["hub", "hub.publications"])
+@pytest.mark.parametrize("kind", ["file", "folder", "link"])
+def test_a_file_in_the_socket_s_place_is_not_removed(tmp_path, name, kind):
+    """Before it binds, libzmq removes whatever has the name."""
+    path = tmp_path / name
+    (tmp_path / "precious").write_text("somebody's")
+    match kind:
+        case "file":
+            path.write_text("somebody's")
+        case "folder":
+            path.mkdir()
+        case "link":
+            path.symlink_to("precious")
+    before = path.lstat()
+    done = denseface("hub", "--address", f"ipc://{tmp_path}/hub", "--data", tmp_path / "data")
+    assert done.returncode == 2
+    assert f"ipc://{path}: there is a file of that name" in done.stderr
+    assert path.lstat() == before
+
+
 @pytest.mark.parametrize("mode", [0o755, 0o1777, 0o770, 0o701])
 @pytest.mark.parametrize("what", ["data", "keys"])
 def test_an_open_folder_is_refused_for_faces_and_for_keys(shared, tmp_path, what, mode):
