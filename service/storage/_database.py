@@ -21,6 +21,8 @@ MAX_ERROR, MAX_MESSAGE = 200, 4000
 """Characters of an outcome's error and its reason, as `CaptureFailed` allows."""
 _BUSY_S = 1.0
 """Longest wait for another program that has the database open, seconds."""
+_LOG_PAGES = 1000
+"""Pages of the write-ahead log beyond which SQLite copies them into the database; its default."""
 _LOG_TRIES, _LOG_PAUSE_S = 10, 0.005
 """Another thread's read of the database is over by the last try; seconds between them."""
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_IOERR_READ,
@@ -259,11 +261,14 @@ class Database:
         if synced:  # FULL, as set by `_open`
             yield
             return
-        self._connection.execute("PRAGMA synchronous=NORMAL")
+        # SQLite copies a long log into the database after a commit and does not say where that
+        # fails: a sync that failed, of what was not synced before, would go unseen.
+        self._connection.executescript("PRAGMA synchronous=NORMAL; PRAGMA wal_autocheckpoint=0")
         try:
             yield
         finally:
-            self._connection.execute("PRAGMA synchronous=FULL")
+            self._connection.executescript(
+                f"PRAGMA synchronous=FULL; PRAGMA wal_autocheckpoint={_LOG_PAGES}")
 
     def execute(
         self, statement: str, *values: str | float | None, synced: bool = True

@@ -115,24 +115,29 @@ class Sweep:
         return found
 
     def power_cuts(self, every: int = 1, failing: int = -1) -> list[Finding]:
-        """Cut the power after each or each `every`-th operation; `failing` fails before, by EIO."""
-        self._play(hubs=[{"log": str(self._log), "first": failing, "count": int(failing >= 0),
-                          "error": errno.EIO}])
+        """Cut the power after each or each `every`-th operation of both hubs.
+
+        The operation `failing` of the first fails with EIO before; the first is killed.
+        """
+        logs = [self._log.with_suffix(f".{hub}") for hub in range(2)]
+        faults = {"first": failing, "count": int(failing >= 0), "error": errno.EIO}
+        self._play(hubs=[{"log": str(logs[0]), **faults}, {"log": str(logs[1])}])
         disk, told, found = Disk(), [], []
-        for record in read_log(self._log, self._data):
+        records = [(hub, one) for hub, log in enumerate(logs) for one in read_log(log, self._data)]
+        for hub, record in records:
             if record.kind == "mark":
                 told.append(record.path)
                 continue
             disk.do(record)
-            if record.position % every or record.position < failing:
+            if record.position % every or (hub == 0 and record.position < failing):
                 continue
             for variant in VARIANTS:
                 shutil.rmtree(self._data, ignore_errors=True)
                 disk.write_to(self._data, variant)
                 result = self._play(told=list(told))
-                when = f"{record.position} ({record})"
+                when = f"operation {record.position} of hub {hub} ({record})"
                 when += f", {failing} failed" if failing >= 0 else ""
-                found += [Finding(f"power cut after operation {when}, {variant}", one)
+                found += [Finding(f"power cut after {when}, {variant}", one)
                           for one in result["violations"]]
         return found
 

@@ -35,9 +35,9 @@ def test_a_start_on_a_disk_that_fails_loses_nothing(sweep, error, count, first):
 
 
 def test_whenever_the_power_is_cut_what_was_said_stays_true(sweep):
-    assert sweep.power_cuts(every=13) == []
+    assert sweep.power_cuts(every=31) == []
 
 
 def test_a_sync_that_failed_is_not_relied_upon_when_the_power_is_cut(sweep):
-    for failing in sweep.syncs()[10::5]:
-        assert sweep.power_cuts(every=90, failing=failing) == []
+    for failing in sweep.syncs()[10::6]:
+        assert sweep.power_cuts(every=130, failing=failing) == []

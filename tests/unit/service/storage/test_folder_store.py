@@ -14,7 +14,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet
-from denseface.service.storage import FolderStore, write
+from denseface.service.storage import FolderStore, _database, write
 from denseface.service.storage._frame_cache import FrameCache
 from denseface.service.storage._record_file import read_parts, write_parts
 from tests.unit.service.faces import small_face, small_frame
@@ -241,3 +241,17 @@ def test_an_older_database_gets_its_indexes(tmp_path):
         assert names
         assert store._database.select(
             "SELECT name FROM sqlite_master WHERE sql LIKE '% INDEX %'") == names
+
+
+def test_the_log_is_copied_into_the_database_by_what_is_synced_alone(store, tmp_path):
+    accept(store, frame("a"), Settings(), "0f")
+    log = tmp_path / "data" / "captures.sqlite3-wal"
+    pages = _database._LOG_PAGES
+    before = log.stat().st_size // 4096
+    for _ in range(pages):
+        store.start_attempt("a")
+    assert log.stat().st_size // 4096 >= before + pages
+    accept(store, frame("b"), Settings(), "0f")
+    size = log.stat().st_size
+    store.start_attempt("a")
+    assert log.stat().st_size == size  # begun anew from its start
