@@ -18,6 +18,9 @@ from denseface.service.transport.sockets import Socket
 
 _HANDSHAKE_MS = 10_000
 """Longest time for a handshake, milliseconds; then libzmq closes the connection."""
+_SILENT_S = 20.0
+"""Time after which a connection by which nothing was said counts as silent, seconds: its handshake
+is over."""
 _MAX_SILENT = 64
 """Connections that may stay open though nobody has said anything by them: clients in waiting."""
 
@@ -110,8 +113,7 @@ class BoundSocket:
 
     def limit_silent(self) -> None:
         """End the oldest connections that say nothing, where they are many."""
-        # Those who are not through their handshake are ended by libzmq.
-        for descriptor in self.monitor.silent(2e-3 * _HANDSHAKE_MS)[:-_MAX_SILENT]:
+        for descriptor in self.monitor.silent(_SILENT_S)[:-_MAX_SILENT]:
             end_connection(descriptor)
 
     def close(self) -> None:

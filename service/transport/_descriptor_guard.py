@@ -11,6 +11,8 @@ import resource
 import socket
 import threading
 
+import structlog
+
 _WANTED = 65_536
 """Descriptors that the system is asked for."""
 _MAX_USED = 4096
@@ -20,6 +22,8 @@ _LOOK_S, _LOOK_AGAIN_S = 0.01, 0.001
 """Time between two looks, seconds: usually, and where a quarter of what may be used is."""
 _GAP = 64
 """Descriptors in a row that are no sockets, after which no more are looked for."""
+_MOST = 500
+"""Descriptors that are looked at in one go, in a millisecond or two."""
 
 _libc = ctypes.PyDLL(None)
 """Keeps Python's lock in its calls, which take microseconds: to get it back takes milliseconds."""
@@ -37,8 +41,15 @@ class DescriptorGuard:
         wanted = _WANTED if hard == resource.RLIM_INFINITY else min(_WANTED, hard)
         if soft != resource.RLIM_INFINITY and soft < wanted:
             resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+        limit, ceiling = _limit_and_ceiling()
+        if ceiling < _MAX_USED:
+            structlog.get_logger("hub").warning(
+                "few descriptors: a flood of connections may end the hub", limit=limit,
+                wanted=2 * _MAX_USED)
         self._own = os.open(os.devnull, os.O_RDONLY | os.O_CLOEXEC)
         self._ended = 0
+        self._next = 0
+        """Descriptor at which the next look begins, where the last was not through."""
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="descriptors", daemon=True)
         self._thread.start()
@@ -62,7 +73,31 @@ class DescriptorGuard:
             lowest = self._lowest_free(limit)
             wait = _LOOK_S if lowest < ceiling // 4 else _LOOK_AGAIN_S
             if lowest >= ceiling:
-                self._ended += _end_from(ceiling, (ceiling + limit) // 2, limit)
+                self._end_from(ceiling, (ceiling + limit) // 2, limit)
+
+    def _end_from(self, first: int, first_local: int, limit: int) -> None:
+        """End connections from a descriptor on, those to socket files from a higher one.
+
+        So a flood from elsewhere does not close the local door. Where there are many, it goes on
+        at the next look: libzmq takes its time to close what was ended.
+        """
+        gap = 0
+        start = max(self._next, first)
+        self._next = first
+        for descriptor in range(start, limit):
+            listens = _option(descriptor, socket.SO_ACCEPTCONN)
+            if listens is None:
+                gap += 1
+                if gap > _GAP:
+                    return
+                continue
+            gap = 0
+            local = _option(descriptor, socket.SO_DOMAIN) == socket.AF_UNIX
+            if not listens and (descriptor >= first_local or not local):
+                self._ended += _libc.shutdown(descriptor, socket.SHUT_RDWR) == 0
+            if descriptor - start >= _MOST:
+                self._next = descriptor + 1
+                return
 
     def _lowest_free(self, limit: int) -> int:
         number: int = _libc.dup(self._own)
@@ -78,26 +113,6 @@ def _limit_and_ceiling() -> tuple[int, int]:
     if limit == resource.RLIM_INFINITY:
         limit = 2 * _WANTED
     return limit, min(_MAX_USED, limit // 2)
-
-
-def _end_from(first: int, first_local: int, limit: int) -> int:
-    """End all connections from a descriptor on, those to socket files from a higher one.
-
-    So a flood from elsewhere does not close the local door. Gives how many were ended.
-    """
-    ended = gap = 0
-    for descriptor in range(first, limit):
-        listens = _option(descriptor, socket.SO_ACCEPTCONN)
-        if listens is None:
-            gap += 1
-            if gap > _GAP:
-                break
-            continue
-        gap = 0
-        local = _option(descriptor, socket.SO_DOMAIN) == socket.AF_UNIX
-        if not listens and (descriptor >= first_local or not local):
-            ended += _libc.shutdown(descriptor, socket.SHUT_RDWR) == 0
-    return ended
 
 
 def _option(descriptor: int, name: int) -> int | None:

@@ -8,10 +8,11 @@ import pytest
 import zmq
 
 from denseface.service.protocol import messages
+from denseface.service.protocol.roles import Role
 from denseface.service.protocol.wire import Packet, encode
-from denseface.service.security import read_pair, read_public
+from denseface.service.security import allow, read_pair, read_public, revoke
 from tests.system.guarded import Peer, guarded_hub, happened, press_through
-from tests.waiting import LIMIT_S, until
+from tests.waiting import LIMIT_MS, LIMIT_S, until
 
 _FEW_DESCRIPTORS = """
 import resource
@@ -60,13 +61,48 @@ def test_one_key_connects_only_so_often(hub):
     with ExitStack() as stack:
         for _ in range(3):
             with ExitStack() as once:
-                for dealer in connections(once, hub, "worker", 100):
+                for dealer in connections(once, hub, "worker", 90):
                     dealer.send_multipart(encode(Packet(messages.GetStatus(request=1))))
                     until(lambda one=dealer: one.poll(100) or hub.refused("connections"))
         assert hub.refused("connections")
         other = stack.enter_context(closing(hub.peer("presser")))
         assert happened(other, zmq.Event.HANDSHAKE_SUCCEEDED)
         assert other.status()
+
+
+_WAITS_TO_CUT = """
+import time
+from pathlib import Path
+from denseface.service.transport._bound_socket import BoundSocket
+cut = BoundSocket.cut
+def late(self):
+    folder = Path({folder!r})
+    (folder / "cutting").touch()
+    while not (folder / "flooded").exists():
+        time.sleep(0.01)
+    cut(self)
+BoundSocket.cut = late
+"""
+
+
+def test_a_key_comes_and_goes_while_connections_break_off(tmp_path):
+    # libzmq's thread would wait to report them, with a lock that the hub needs to bind again.
+    with (guarded_hub(tmp_path, code=_WAITS_TO_CUT.format(folder=str(tmp_path))) as hub,
+          closing(hub.peer("subscriber", zmq.SUB)) as peer):
+        public = read_public(hub.keys / "subscriber.public")
+        peer.socket.subscribe("status")
+        assert peer.socket.poll(LIMIT_MS)
+        revoke(hub.keys, "subscriber")
+        until((tmp_path / "cutting").exists)
+        port = int(hub.address.rpartition(":")[2]) + 1
+        for _ in range(800):  # three events each; a queue of libzmq holds 2000
+            socket.create_connection(("127.0.0.1", port), LIMIT_S).close()
+        (tmp_path / "flooded").touch()
+        assert hub.status()
+        allow(hub.keys, "subscriber", public, frozenset({Role.SUBSCRIBER}))
+        with closing(hub.peer("subscriber", zmq.SUB)) as again:
+            again.socket.subscribe("status")
+            assert again.socket.poll(LIMIT_MS)
 
 
 def flood(stack, family, address, number):

@@ -5,6 +5,7 @@ import time
 
 import pytest
 import zmq
+from zmq.utils.monitor import parse_monitor_message
 
 from denseface.service.errors import AddressError, KeyFileError
 from denseface.service.monitoring import Counters, Rejections
@@ -115,6 +116,49 @@ def test_who_was_refused_connects_once_allowed(context, wakes, tmp_path, monkeyp
     finally:
         monitor.close()
         dealer.close(linger=0)
+        listeners.close()
+
+
+def test_of_many_that_say_nothing_the_oldest_are_ended(context, wakes, tmp_path, monkeypatch):
+    monkeypatch.setattr("denseface.service.transport._bound_socket._SILENT_S", 0.0)
+    monkeypatch.setattr("denseface.service.transport._bound_socket._MAX_SILENT", 2)
+    _, hub_key = new_pair(tmp_path, "hub")
+    secret, public = new_pair(tmp_path, "one")
+    allow(tmp_path, "one", read_public(public), frozenset({Role.WORKER}))
+    address = _address()
+    settings = ServiceSettings(address=address, key=secret, hub_key=hub_key)
+    hub_settings = ServiceSettings(address=_address(), listen=(address,), keys=tmp_path)
+    listeners = Listeners(context, hub_settings, Rejections(Counters()), [wakes])
+    keys = Credentials.of(settings)
+    opened, ended = [], set()
+
+    def has_ended(monitor):
+        while monitor.poll(0):
+            event = parse_monitor_message(monitor.recv_multipart())["event"]
+            if event == zmq.Event.DISCONNECTED:
+                ended.add(monitor)
+        return monitor in ended
+
+    try:
+        for _ in range(5):
+            dealer = context.socket(zmq.DEALER)
+            keys.apply(dealer)
+            monitor = dealer.get_monitor_socket(
+                zmq.Event.HANDSHAKE_SUCCEEDED | zmq.Event.DISCONNECTED)
+            opened.append((dealer, monitor))
+            dealer.connect(address)
+            _until(listeners, lambda _, one=monitor: one.poll(0))
+            if len(opened) == 1:
+                dealer.send(b"hello")
+                assert _until(listeners, lambda received: received)
+        # Of those that say nothing two are left at a time, and the first has spoken.
+        _until(listeners, lambda _: all(has_ended(monitor) for _, monitor in opened[1:3]))
+        assert not has_ended(opened[0][1])
+    finally:
+        for dealer, monitor in opened:
+            dealer.disable_monitor()
+            monitor.close()
+            dealer.close(linger=0)
         listeners.close()
 
 
