@@ -65,7 +65,7 @@ def test_the_wheel_holds_the_package_alone_and_all_of_it(wheel):
     sources = {str(path.relative_to(REPOSITORY)) for part in ("capture", "recon", "service")
                for path in (REPOSITORY / part).glob("**/*.py")}
     assert {name.removeprefix("denseface/") for name in names if name.endswith(".py")} == (
-        sources | {"__init__.py", "__main__.py"})
+        sources | {"__init__.py", "__main__.py", "files.py"})
 
 
 class Installed:
