@@ -30,6 +30,8 @@ from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
 
+_WRITES_S = 1.0
+"""Longest time for which a purge holds the hub up for files that are being written, seconds."""
 _VERSION = version("denseface")
 """Of this package, as the status says it."""
 
@@ -106,7 +108,8 @@ class Hub:
         outputs: list[Output] = []
         try:
             if wait:
-                outputs.extend(self._finish_writes(now))
+                self._writer.wait()
+                outputs.extend(self._written(now, self._writer.take_results()))
                 self._writer.wait(erased=True)
                 outputs.extend(self._maintenance.erased(now, self._writer.take_erased()))
             else:
@@ -132,10 +135,6 @@ class Hub:
             [one for one in written if isinstance(one.pending.metadata, storage.FrameMetadata)])
         yield from self._jobs.written(
             now, [one for one in written if isinstance(one.pending.metadata, storage.FaceMetadata)])
-
-    def _finish_writes(self, now: float) -> Iterator[Output]:
-        self._writer.wait()
-        yield from self._written(now, self._writer.take_results())
 
     def tick(self, now: float) -> list[Output]:
         """Handle time-outs, silent peers, removals and the status; raises as `receive`.
@@ -205,9 +204,7 @@ class Hub:
             case messages.ListDead() | messages.RetryDead() | messages.DropDead() as message:
                 yield from self._maintenance.receive(peer, message)
             case messages.Purge() as message:
-                yield from self._finish_writes(now)  # no file of it appears afterwards
-                yield from self._presses.refuse_failed()
-                yield from self._maintenance.receive(peer, message)
+                yield from self._purge(now, peer, message)
             case messages.GetStatus(request=request):
                 yield send(peer, self._status(request))
             case messages.SensorReady() | messages.WorkerReady() as message:
@@ -230,6 +227,14 @@ class Hub:
                 self._jobs.result(now, peer, message, packet, key)
             case messages.JobFailed() as message:
                 yield from self._jobs.failed(now, peer, message, key)
+
+    def _purge(self, now: float, peer: bytes, message: messages.Purge) -> Iterator[Output]:
+        """Remove captures when what is being written is: no file of them appears afterwards."""
+        if not self._writer.wait(timeout_s=0.0 if self._presses.disk_hangs else _WRITES_S):
+            raise errors.StoreError("the disk does not answer, nothing was removed")
+        yield from self._written(now, self._writer.take_results())
+        yield from self._presses.refuse_failed()
+        yield from self._maintenance.receive(peer, message)
 
     def _requeue_damaged(self, error: errors.DamagedFaceError, kept_before: bool) -> None:
         self._jobs.requeue_damaged(error.capture_id, str(error), reset_attempts=kept_before)

@@ -28,6 +28,8 @@ _PAGE = 50
 """Dead letters in one answer, as `DeadLetters.letters` allows."""
 _SWEEP_S = 600.0
 """Longest time between two sweeps for what is too old, seconds."""
+_MAX_ASKED = 64
+"""Removals that may wait for their end; beyond, one is refused."""
 _LOG_RETRY_S = 1.0
 """Time after which the database's log is tried again that could not be emptied, seconds."""
 _LOG_WAIT_S = 5.0
@@ -161,6 +163,8 @@ class Maintenance:
         """Answer an operator."""
         if any((one.peer, one.request) == (peer, message.request) for one in self._waiting()):
             return  # a repeat; it is answered when all is erased
+        if not isinstance(message, messages.ListDead) and self._is_full():
+            raise StoreError(f"{_MAX_ASKED} removals are under way already")
         match message:
             case messages.ListDead(request=request, after=after):
                 yield send(peer, messages.DeadLetters(
@@ -169,6 +173,9 @@ class Maintenance:
                 yield from self._dead_letter(peer, message)
             case messages.Purge():
                 yield from self._purge(peer, message)
+
+    def _is_full(self) -> bool:
+        return sum(1 for _ in self._waiting()) >= _MAX_ASKED
 
     def _waiting(self) -> Iterator[_Asked]:
         yield from self._unsaid

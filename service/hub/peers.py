@@ -117,8 +117,13 @@ class Peers:
         return min(free, key=lambda worker: len(worker.jobs), default=None)
 
     def sensor(self) -> SensorPeer | None:
-        """Return the sensor that connected first."""
+        """Return the sensor that connected first, of those that were not `put_last`."""
         return next(iter(self.sensors.values()), None)
+
+    def put_last(self, peer: bytes) -> None:
+        """Ask a sensor only where no other is connected: it lives and gives no frames."""
+        if sensor := self.sensors.pop(peer, None):
+            self.sensors[peer] = sensor
 
     def overdue(self, now: float) -> list[WorkerPeer]:
         """Return the workers whose first job should have been answered."""

@@ -99,6 +99,11 @@ class Presses:
     def __len__(self) -> int:
         return len(self._presses)
 
+    @property
+    def disk_hangs(self) -> bool:
+        """Whether a frame is being written for longer than anybody waits."""
+        return any(press.late for press in self._presses.values())
+
     def press(
         self, now: float, peer: bytes, message: messages.Press, queued: int, key: str = ""
     ) -> Iterator[Output]:
@@ -145,7 +150,7 @@ class Presses:
             why = f"{own} presses of this key wait for their frame already"
             self._rejections.note("limit", key=key, detail=why)
             return "queue", why
-        if any(press.late for press in self._presses.values()):
+        if self.disk_hangs:
             return "disk", f"the disk does not answer ({self._settings.take_timeout_s:g} s)"
         if sum(press.frame_sender is not None for press in self._presses.values()) >= _MAX_SAVING:
             return "disk", f"{_MAX_SAVING} frames wait for the disk already"
@@ -286,6 +291,7 @@ class Presses:
         why = f"no frame from the sensor in {self._settings.take_timeout_s:g} s"
         for capture_id in [key for key, press in self._presses.items()
                            if now >= press.deadline and press.frame_sender is None]:
+            self._peers.put_last(self._presses[capture_id].sensor)
             yield from self._refuse(capture_id, "timeout", why)
         for capture_id, press in self._presses.items():
             if now < press.deadline or press.late or press.frame_sender is None:

@@ -62,6 +62,23 @@ class PackedCloud:
             raise ValueError(f"support has {places} places for {len(self.z)} points")
 
 
+    def check_grid(self) -> None:
+        """Check that columns and rows are `grid_step_mm` apart; ValueError where they are not."""
+        columns = np.unpackbits(np.bitwise_or.reduce(self.support, axis=0),
+                                count=self.grid_shape[1])
+        for name, places, used in (("x", self.x, columns), ("y", self.y, self.support.any(axis=1))):
+            at = np.flatnonzero(used)
+            given = places[at].astype(np.float64)
+            off = given - given[0] - (at - at[0]) * self.grid_step_mm
+            allowed = _OFF_GRID * self.grid_step_mm + _ROUNDING * np.abs(given).max()
+            if np.abs(off).max() > allowed:
+                raise ValueError(f"{name} is not on a grid of {self.grid_step_mm:g} mm")
+
+
+_OFF_GRID = 1e-3
+"""How far a column or row may be from its place, steps of the grid."""
+_ROUNDING = 4 * float(np.finfo(np.float32).eps)
+"""As `_OFF_GRID`, by its coordinate: what 32 bits round away."""
 _INFINITE = int(np.array(np.inf, np.float16).view(np.uint16))
 """The bits of infinity as a float16."""
 

@@ -186,8 +186,15 @@ class FaceHeader(_PayloadHeader):
             "dense_sigma": dense.sigma}
 
     def check(self, arrays: Arrays) -> None:
-        """Check in a fraction of the time of `join` that it would succeed; raises as it."""
-        self._clouds(arrays)
+        """Check in a fraction of the time of `join` that it would succeed; raises as it.
+
+        Also that the dense cloud's columns and rows are as far apart as the header says.
+        """
+        _, dense = self._clouds(arrays)
+        try:
+            dense.check_grid()
+        except ValueError as error:
+            raise RemoteProtocolError(f"face: {error}") from error
 
     def join(self, arrays: Arrays) -> Face:
         """Put the face together again.

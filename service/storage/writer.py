@@ -63,8 +63,11 @@ class Writer(Protocol):
     def take_erased(self) -> list[Erased]:
         """Give what became of erasures since the last call."""
 
-    def wait(self, *, erased: bool = False) -> None:
-        """Wait until every write has a result, and every erasure too if `erased`."""
+    def wait(self, *, erased: bool = False, timeout_s: float | None = None) -> bool:
+        """Wait until every write has a result, and every erasure too if `erased`.
+
+        False where a write has none after `timeout_s`: its disk hangs.
+        """
 
 
 def write(pending_writes: Sequence[PendingWrite]) -> list[WriteResult]:
@@ -120,8 +123,9 @@ class InlineWriter:
         erased, self._erased = self._erased, []
         return erased
 
-    def wait(self, *, erased: bool = False) -> None:
+    def wait(self, *, erased: bool = False, timeout_s: float | None = None) -> bool:  # noqa: ARG002
         """Return: all have their results."""
+        return True
 
 
 class WriterThreads(WakePipe):
@@ -133,6 +137,9 @@ class WriterThreads(WakePipe):
     def __init__(self) -> None:
         super().__init__()
         self._lock = threading.Lock()
+        self._idle = threading.Condition(self._lock)
+        self._under_way = 0
+        """Writes without a result."""
         self._results: list[WriteResult] = []
         self._erased: list[Erased] = []
         self._closed = False
@@ -154,6 +161,8 @@ class WriterThreads(WakePipe):
 
     def start(self, pending: PendingWrite) -> None:
         """Begin to write a file."""
+        with self._lock:
+            self._under_way += 1
         (self._frames if pending.is_frame else self._faces).put(pending)
 
     def take_results(self) -> list[WriteResult]:
@@ -178,12 +187,14 @@ class WriterThreads(WakePipe):
         if not (self._results or self._erased or self._closed):
             self.drain()
 
-    def wait(self, *, erased: bool = False) -> None:
-        """Wait until every write has a result, and every erasure too if `erased`."""
-        self._frames.join()
-        self._faces.join()
+    def wait(self, *, erased: bool = False, timeout_s: float | None = None) -> bool:
+        """See `Writer`."""
+        with self._idle:
+            if not self._idle.wait_for(lambda: self._under_way == 0, timeout_s):
+                return False
         if erased:
             self._erasures.join()
+        return True
 
     def close(self) -> None:
         """Finish all and end the threads; `take_results` still gives the results."""
@@ -206,9 +217,9 @@ class WriterThreads(WakePipe):
             results = write([one for one in batch if one])
             with self._lock:
                 self._results += results
+                self._under_way -= len(results)
                 self.wake()
-            for _ in batch:
-                queue.task_done()
+                self._idle.notify_all()
 
     def _run_erasures(self) -> None:
         while pending := self._erasures.get():

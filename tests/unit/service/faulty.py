@@ -57,6 +57,8 @@ class StepWriter(InlineWriter):
     def __init__(self, room: Callable[[], None], writes: Callable[[PendingWrite], None]) -> None:
         super().__init__()
         self.immediate = True
+        self.hangs = False
+        """Whether nothing that waits is ever written."""
         self.waiting: deque[PendingWrite] = deque()
         self._room = room
         self._writes = writes
@@ -83,6 +85,8 @@ class StepWriter(InlineWriter):
         done, self._done = self._done, []
         return done
 
-    def wait(self, *, erased: bool = False) -> None:
-        super().wait(erased=erased)
+    def wait(self, *, erased: bool = False, timeout_s: float | None = None) -> bool:
+        if self.hangs:
+            return False
         self.step(len(self.waiting))
+        return super().wait(erased=erased, timeout_s=timeout_s)

@@ -5,6 +5,7 @@ import pytest
 from denseface.recon.face import FaceCandidate
 from denseface.service.hub import Hub
 from denseface.service.hub.jobs import _MAX_HANDED_BACK
+from denseface.service.hub.maintenance import _MAX_ASKED
 from denseface.service.hub.outcomes import _MAX_WAITERS_PER_KEY
 from denseface.service.hub.peers import MAX_PEERS_PER_KEY
 from denseface.service.hub.presses import _MAX_PRESSERS, _MAX_PRESSES_PER_KEY, _MAX_REFUSALS
@@ -195,6 +196,20 @@ def test_a_report_that_is_not_of_this_job_is_a_failed_attempt(bench, changes, wh
     assert status(bench).refused == {"untrue": 2}
 
 
+@pytest.mark.parametrize("axis", ["dense_x", "dense_y"])
+def test_a_face_off_its_grid_is_a_failed_attempt(bench, axis):
+    bench.worker()
+    bench.accepted("a")
+    places = FACE_ARRAYS[axis].copy()
+    places[len(places) // 2] += 0.1
+    for credit in (1, 2):
+        bench.result(arrays=FACE_ARRAYS | {axis: places})
+        bench.worker(credit=credit)
+    (end,) = bench.published
+    assert f"{axis[-1]} is not on a grid of 2 mm" in end.message
+    assert status(bench).refused == {"untrue": 2}
+
+
 def test_a_late_report_is_checked_after_a_restart_too(bench):
     bench.worker()
     bench.accepted("a")
@@ -215,6 +230,19 @@ def test_a_frame_larger_than_allowed_is_refused(bench):
     assert (presser[1].kind, presser[1].reason) == ("press_refused", "sensor")
     assert presser[1].message.startswith("color has 10 x 7 pixels, at most 69 allowed")
     assert bench.store.find("a") is None
+
+
+def test_a_sensor_that_lives_and_gives_nothing_is_not_asked_again(bench):
+    bench.sensor()
+    bench.say(OTHER, messages.SensorReady(name="other", source="x"))
+    assert kinds(bench.press("a")) == [(SENSOR, "take")]
+    for _ in range(round(SETTINGS.take_timeout_s)):
+        bench.say(SENSOR, messages.Heartbeat())
+        bench.say(OTHER, messages.Heartbeat())
+        bench.wait(1.0)
+    assert kinds(bench.press("b")) == [(OTHER, "take")]
+    bench.say(OTHER, messages.Goodbye())
+    assert kinds(bench.press("c")) == [(SENSOR, "take")]
 
 
 @pytest.mark.parametrize("kind", [messages.WorkerReady, messages.SensorReady])
@@ -279,6 +307,16 @@ def test_one_key_has_so_many_requests_waiting(bench):
         assert wait_for_it(number, "k") == []
     assert kinds(wait_for_it(999, "k")) == [(b"999", "capture_pending")]
     assert wait_for_it(1000, "another") == []
+
+
+def test_an_operator_has_so_many_removals_under_way(bench, monkeypatch):
+    monkeypatch.setattr(bench.hub._writer, "erase", lambda _: None)
+    for number in range(_MAX_ASKED):
+        assert bench.say(b"o", messages.Purge(request=number, everything=True)) == []
+    ((_, refused),) = bench.say(b"o", messages.Purge(request=999, everything=True))
+    assert (refused.kind, refused.request) == ("request_failed", 999)
+    assert bench.say(b"o", messages.Purge(request=1, everything=True)) == []  # a repeat
+    assert kinds(bench.say(b"o", messages.ListDead(request=1000))) == [(b"o", "dead_letters")]
 
 
 def test_what_is_known_of_attempts_goes_with_the_outcome(bench):

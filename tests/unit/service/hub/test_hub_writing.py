@@ -100,6 +100,19 @@ def test_nobody_waits_for_a_disk_that_does_not_answer(bench):
     assert kinds(bench.press("b", request=11)) == [(SENSOR, "take")]
 
 
+def test_a_purge_does_not_wait_for_a_disk_that_does_not_answer(bench):
+    bench.press()
+    bench.frame()
+    bench.writer.hangs = True
+    for everything in (messages.Purge(request=1, capture_id="a"),
+                       messages.Purge(request=2, everything=True)):
+        (answer,) = bench.operate(everything)
+        assert (answer.kind, answer.message) == (
+            "request_failed", "the disk does not answer, nothing was removed")
+    bench.writer.hangs = False
+    assert bench.operate(messages.Purge(request=3, capture_id="a"))[0].removed == 1
+
+
 def test_a_frame_that_is_refused_late_is_refused(bench):
     bench.press(request=7)
     bench.frame()

@@ -112,8 +112,9 @@ def test_frames_do_not_wait_for_a_face_and_each_kind_stays_in_order(store, monke
         assert [one.pending for one in done] == frames
         assert not writer.has_results()
         assert not readable(writer)
+        assert not writer.wait(timeout_s=0.01)
         go.set()
-        writer.wait()
+        assert writer.wait(timeout_s=LIMIT_S)
         assert writer.has_results()
         assert readable(writer)
         assert [one.pending for one in writer.take_results()] == [face]
