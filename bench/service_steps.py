@@ -17,7 +17,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.wire import Buffer, Packet, decode_from_hub, decode_to_hub, encode
-from denseface.service.runtime.files import write_atomically
+from denseface.service.runtime.files import write_synced
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage import FolderStore
 
@@ -104,10 +104,10 @@ def _steps(laps: Laps, folder: Path, frame: RgbdFrame) -> None:
         laps.time(f"{what}: encode", lambda packet=packet: encode(packet))
         laps.time(f"{what}: checksum", lambda parts=parts: list(map(zlib.crc32, parts)))
         path = folder / f"{what}.tmp"
-        laps.time(f"{what}: cached write", lambda path=path, parts=parts: write_atomically(
-            path, parts, durable=False))
+        laps.time(f"{what}: cached write",
+                  lambda path=path, parts=parts: path.write_bytes(b"".join(parts)))
         laps.time(f"{what}: direct write and sync",
-                  lambda path=path, parts=parts: write_atomically(path, parts, direct=True))
+                  lambda path=path, parts=parts: write_synced(path, parts))
         laps.time(f"{what}: read", path.read_bytes)
 
 

@@ -42,6 +42,7 @@ def test_a_press_gives_a_face_a_report_and_a_picture(running, tmp_path):
     assert report["capture_id"] == "demo"
     assert report["dense_points"] == len(face.dense) > 8 * len(face.initial)
     assert (tmp_path / "face.png").read_bytes().startswith(b"\x89PNG")
+    assert {path.stat().st_mode & 0o777 for path in tmp_path.iterdir()} == {0o600}
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "face.npz", "face.png", "report.json"]
 
@@ -83,12 +84,13 @@ def test_subscribers_get_every_face_in_order(running, tmp_path):
         assert client.status().refused == refused  # nothing in an ordinary day looks like an attack
         missed = client.published(after=found[0].sequence, timeout=LIMIT_S)
         assert [next(missed).capture_id, next(missed).capture_id] == pressed[1:]
-    saved = running.run("subscribe", "--save", tmp_path, "--count", "1", "--after",
+    saved = running.run("subscribe", "--save", tmp_path, "--count", "1", "--mode", "640", "--after",
                         found[0].sequence - 1)
     assert saved.returncode == 0
     assert saved.stdout.startswith(f"{found[0].sequence} {pressed[0]} ")
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         f"{pressed[0]}.json", f"{pressed[0]}.ply"]
+    assert {path.stat().st_mode & 0o777 for path in tmp_path.iterdir()} == {0o640}
 
 
 def test_a_killed_worker_s_job_is_done_by_the_next(running):

@@ -86,6 +86,8 @@ def outcome(capfd, *arguments):
     (["press", "--address", "nowhere"], "expected ipc://PATH or tcp://HOST:PORT"),
     (["press", "--save", "face"], "ending missing"),
     (["subscribe", "--save", "{tmp}/none"], "no such folder"),
+    (["press", "--mode", "688"], "'688': expected three octal digits"),
+    (["subscribe", "--mode", "040"], "'040': expected three octal digits"),
     (["subscribe", "--count", "0"], "--count 0"),
     (["subscribe", "--last", "0"], "--last 0"),
     (["subscribe", "--last", "1", "--after", "1"], "not allowed with"),
