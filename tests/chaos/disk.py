@@ -26,6 +26,8 @@ FOREVER = 10**9
 """Number of operations that fail: from one on, all."""
 _RUNS = (1, 2, 3, 4, 6, FOREVER)
 """Numbers of operations that fail one after another: a write, then what is to mend it."""
+_SOON = 4
+"""Operations after one that failed: by then it is said what became of it."""
 _ERRORS = {"EIO": errno.EIO, "ENOSPC": errno.ENOSPC}
 
 
@@ -117,7 +119,8 @@ class Sweep:
     def power_cuts(self, every: int = 1, failing: int = -1) -> list[Finding]:
         """Cut the power after each or each `every`-th operation of both hubs.
 
-        The operation `failing` of the first fails with EIO before; the first is killed.
+        The operation `failing` of the first fails with EIO before, and the power is cut after each
+        of the next few too. The first hub is killed.
         """
         logs = [self._log.with_suffix(f".{hub}") for hub in range(2)]
         faults = {"first": failing, "count": int(failing >= 0), "error": errno.EIO}
@@ -129,7 +132,8 @@ class Sweep:
                 told.append(record.path)
                 continue
             disk.do(record)
-            if record.position % every or (hub == 0 and record.position < failing):
+            after = record.position - failing if hub == 0 else every
+            if after < 0 or (record.position % every and not (failing >= 0 and after <= _SOON)):
                 continue
             for variant in VARIANTS:
                 shutil.rmtree(self._data, ignore_errors=True)
