@@ -10,6 +10,8 @@ import pytest
 
 from tests.chaos.disk import FOREVER, Sweep, compile_faults, memory_folder
 
+pytestmark = pytest.mark.timeout(300)  # seconds each, but for a machine that is busy otherwise
+
 
 @pytest.fixture(scope="module")
 def sweep():
