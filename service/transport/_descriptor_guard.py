@@ -17,9 +17,12 @@ _WANTED = 65_536
 """Descriptors that the system is asked for."""
 _MAX_USED = 4096
 """Descriptors from which on connections are ended; half of all where there are fewer than 8192.
-All others are there for what comes between two looks: libzmq takes some thirty a millisecond."""
-_LOOK_S, _LOOK_AGAIN_S = 0.01, 0.001
-"""Time between two looks, seconds: usually, and where a quarter of what may be used is."""
+All others are there for what comes between two looks."""
+_LOOK_S, _LOOK_AGAIN_S = 0.1, 0.001
+"""Longest and shortest time between two looks, seconds."""
+_TAKEN_PER_S = 30_000
+"""Connections that libzmq takes a second at most: there is room for four times as many as come
+between two looks."""
 _GAP = 64
 """Descriptors in a row that are no sockets, after which no more are looked for."""
 _MOST = 500
@@ -67,12 +70,13 @@ class DescriptorGuard:
         os.close(self._own)
 
     def _run(self) -> None:
-        wait = _LOOK_S
+        wait = _LOOK_AGAIN_S
         while not self._stop.wait(wait):
             limit, ceiling = _limit_and_ceiling()
             lowest = self._lowest_free(limit)
-            wait = _LOOK_S if lowest < ceiling // 4 else _LOOK_AGAIN_S
+            wait = min(_LOOK_S, max(_LOOK_AGAIN_S, (limit - lowest) / (4 * _TAKEN_PER_S)))
             if lowest >= ceiling:
+                wait = _LOOK_AGAIN_S
                 self._end_from(ceiling, (ceiling + limit) // 2, limit)
 
     def _end_from(self, first: int, first_local: int, limit: int) -> None:
