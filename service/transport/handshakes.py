@@ -22,8 +22,10 @@ _EVENTS = (_E.ACCEPTED | _E.DISCONNECTED | _E.CLOSED | _E.HANDSHAKE_SUCCEEDED
            | _E.HANDSHAKE_FAILED_NO_DETAIL)
 _EVENT = struct.Struct("=Hi")
 """Event and value, as libzmq's monitor sends them."""
-_MAX_EVENTS = 10_000
-"""Events read at a time, some 50 ms; more than a thousand peers that connect again."""
+_MAX_EVENTS = 2000
+"""Events read at a time, in some 20 ms."""
+_MAX_BEHIND = 100
+"""Times in a row that there may be more events than are read: 50 MB of them."""
 _DETAILS = {
     zmq.PROTOCOL_ERROR_ZMTP_CRYPTOGRAPHIC: "made for another hub key",
     zmq.PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH: "not the CURVE mechanism",
@@ -61,8 +63,8 @@ class HandshakeMonitor:
         self._listening = listening
         self._connections = connections
         self.socket = open_monitor(listening, int(_EVENTS))
-        self.flooded = False
-        """More has happened than is read at a time: the socket is to be cut."""
+        self._behind = 0
+        """Times in a row that more had happened than is read at a time."""
         self._accepted: dict[int, float] = {}
         """Descriptor -> when the connection was accepted, monotonic seconds, of those open."""
         self._open: dict[int, str] = {}
@@ -73,23 +75,33 @@ class HandshakeMonitor:
         """Connections refused by the authenticator, which has counted them, and not yet closed."""
 
     def read(self) -> None:
-        """Read and count what happened: of a flood a part, and `flooded` says so."""
+        """Read and count what happened, of a flood a part."""
         for _ in range(_MAX_EVENTS):
             try:
                 event, _ = self.socket.recv_multipart(zmq.DONTWAIT)
             except zmq.Again:
+                self._behind = 0
                 return
             self._note(*_EVENT.unpack(event))
-        self.flooded = True
+        self._behind += 1
+
+    @property
+    def behind(self) -> bool:
+        """More had happened at the last look than was read."""
+        return self._behind > 0
+
+    @property
+    def flooded(self) -> bool:
+        """More has happened for long than can be read: the socket is to be cut."""
+        return self._behind > _MAX_BEHIND
 
     def forget(self) -> None:
         """Forget all connections: they were cut, which libzmq does not report.
 
         To be called when the socket is unbound, so that what is to be read has an end.
         """
-        self.flooded = True
-        while self.flooded:
-            self.flooded = False
+        self.read()
+        while self.behind:
             self.read()
         self._all_closed()
 

@@ -295,7 +295,11 @@ class Listener:
         self._mixed_up = self._mixed_up or nonsense
         descriptor = _descriptor(frame)
         if not self._subscribers.is_open(descriptor):
-            return  # libzmq says what ends with a connection, or the connection has ended
+            # libzmq says what ends with a connection, or the connection has ended. Or of a flood
+            # it was not read yet that it began: who connects again is heard.
+            if self._publisher.monitor.behind:
+                end_connection(descriptor)
+            return
         topic = Topic(name) if name in set(Topic) else None
         if nonsense:
             self._end(descriptor, frame, "malformed", "sent to the publications")

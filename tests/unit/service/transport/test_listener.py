@@ -164,7 +164,8 @@ def test_of_many_that_say_nothing_the_oldest_are_ended(context, wakes, tmp_path,
 
 def test_of_a_flood_a_part_is_read_and_then_the_port_is_cut(
         context, wakes, tmp_path, monkeypatch):
-    monkeypatch.setattr("denseface.service.transport.handshakes._MAX_EVENTS", 50)
+    monkeypatch.setattr("denseface.service.transport.handshakes._MAX_EVENTS", 10)
+    monkeypatch.setattr("denseface.service.transport.handshakes._MAX_BEHIND", 2)
     _, hub_key = new_pair(tmp_path, "hub")
     secret, public = new_pair(tmp_path, "one")
     allow(tmp_path, "one", read_public(public), frozenset({Role.WORKER}))
