@@ -146,3 +146,23 @@ def test_a_face_made_again_stands_under_its_new_number():
     history.published.append(again)
     history.kept[0] = replace(history.kept[0], sequence=7)
     assert violations(replace(history, damaged=frozenset({"c1"}))) == []
+
+
+def test_what_was_said_to_be_removed_and_is_there_is_caught():
+    history = good()
+    history.pressed["c2"] = Answer.REMOVED
+    assert violations(history) == ["c2: removed, and yet done"]
+
+
+@pytest.mark.parametrize("answer", [Answer.REMOVED, Answer.WITHDRAWN])
+def test_what_is_removed_may_have_been_seen(answer):
+    history = good()
+    history.pressed["c2"] = answer
+    del history.kept[1]
+    assert violations(history) == []
+
+
+def test_what_an_operator_asked_for_in_vain_may_be_there():
+    history = good()
+    history.pressed["c2"] = Answer.WITHDRAWN
+    assert violations(history) == []
