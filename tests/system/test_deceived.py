@@ -1,4 +1,4 @@
-"""Peers with good keys that lie, against a real hub."""
+"""Peers with good keys that lie, and a disk that hangs, against a real hub."""
 
 import json
 import threading
@@ -62,3 +62,26 @@ def test_a_worker_that_holds_its_job_for_ever_loses_it(hub):
             assert "JobOverdue" in hub.log.read_text()
         finally:
             context.destroy(linger=0)
+
+
+def test_nobody_waits_for_a_disk_that_hangs(tmp_path):
+    with guarded_hub(tmp_path, DENSEFACE_FAILPOINTS="hub.frame.written=hang",
+                     DENSEFACE_TAKE_TIMEOUT_S=f"{PATIENCE:g}") as hub, \
+            closing(hub.peer("sensor")) as sensor, closing(hub.peer("presser")) as presser, \
+            closing(hub.peer("operator")) as operator:
+        try:
+            sensor.send(messages.SensorReady(name="s", source="x"))
+            until(lambda: hub.status().sensors)
+            presser.send(messages.Press(request=1, capture_id="a"))
+            sensor.receive("take")
+            sensor.send(messages.Frame(capture_id="a", frame=FRAME), FRAME_ARRAYS)
+            said = presser.receive("request_failed").message
+            assert said.request == 1
+            assert "is not known" in said.message
+            assert presser.request(messages.Press(request=2, capture_id="a")).message == said.message
+            assert presser.request(messages.Press(request=3, capture_id="b")).reason == "disk"
+            purge = operator.request(messages.Purge(request=4, everything=True))
+            assert "nothing was removed" in purge.message
+            assert hub.status().pressed == 1
+        finally:
+            hub.process.kill()  # told to stop, it would wait for what it writes

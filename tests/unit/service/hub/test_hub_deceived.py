@@ -3,6 +3,7 @@
 import pytest
 
 from denseface.recon.face import FaceCandidate
+from denseface.service.errors import StoreError
 from denseface.service.hub import Hub
 from denseface.service.hub.jobs import _MAX_HANDED_BACK
 from denseface.service.hub.maintenance import _MAX_ASKED
@@ -65,6 +66,23 @@ def test_a_worker_that_holds_its_job_for_ever_loses_it(bench):
     assert (end.error, end.dead) == ("JobOverdue", True)
     assert "63 s" in end.message
     assert status(bench).since_start["overdue"] == 2
+
+
+def test_its_jobs_are_taken_back_where_the_store_cannot_be_read(bench, monkeypatch):
+    def broken(*_):
+        raise StoreError("database is locked")
+
+    bench.accepted("a", "b")
+    bench.worker(credit=0)
+    bench.worker(credit=1)
+    hold(bench, LEASE_S - 1)
+    with monkeypatch.context() as patch:
+        patch.setattr(bench.store, "find", broken)
+        patch.setattr(bench.store, "undo_attempt", broken)
+        hold(bench, 1)
+    assert (bench.hub._jobs.working, bench.hub._jobs.queued) == (0, 2)
+    bench.wait(1.1)
+    assert kinds(bench.worker(OTHER)) == [(OTHER, "job")]
 
 
 def test_its_face_may_still_come_late(bench):
