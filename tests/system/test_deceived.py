@@ -78,7 +78,8 @@ def test_nobody_waits_for_a_disk_that_hangs(tmp_path):
             said = presser.receive("request_failed").message
             assert said.request == 1
             assert "is not known" in said.message
-            assert presser.request(messages.Press(request=2, capture_id="a")).message == said.message
+            again = presser.request(messages.Press(request=2, capture_id="a"))
+            assert again.message == said.message
             assert presser.request(messages.Press(request=3, capture_id="b")).reason == "disk"
             purge = operator.request(messages.Purge(request=4, everything=True))
             assert "nothing was removed" in purge.message
