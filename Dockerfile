@@ -19,6 +19,7 @@ FROM debian:12-slim
 # The binding loads OpenNI2 by the unversioned name, which only Debian's -dev package holds.
 RUN apt-get update \
     && apt-get install -y --no-install-recommends python3 libopenni2-0 \
+        libegl1 libgl1 libgomp1 libidn2-0 libudev1 libusb-1.0-0 libx11-6 \
     && rm -rf /var/lib/apt/lists/* \
     && ln -s libOpenNI2.so.0 "$(dirname "$(dpkg -L libopenni2-0 | grep '/libOpenNI2\.so\.0$')")/libOpenNI2.so" \
     && useradd --create-home --uid 1000 --groups plugdev,video denseface \
