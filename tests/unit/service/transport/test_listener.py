@@ -13,6 +13,7 @@ from denseface.service.protocol.roles import Role
 from denseface.service.runtime.limits import MemoryWatch
 from denseface.service.security import KeyPair, allow, new_pair, read_public, revoke
 from denseface.service.settings import ServiceSettings
+from denseface.service.transport._descriptor_guard import DescriptorGuard
 from denseface.service.transport.connection import Credentials, connect
 from denseface.service.transport.listener import Listener
 from denseface.service.transport.listeners import Listeners
@@ -114,6 +115,36 @@ def test_who_was_refused_connects_once_allowed(context, wakes, tmp_path, monkeyp
         assert not listeners.is_allowed(incoming.peer)
         assert not listeners.send(incoming.peer, [b"back"])
     finally:
+        monitor.close()
+        dealer.close(linger=0)
+        listeners.close()
+
+
+def test_a_hub_with_a_local_door_alone_has_its_limits_too(context, wakes, monkeypatch):
+    address, rejections = _address(), Rejections(Counters())
+    listeners = Listeners(context, ServiceSettings(address=address), rejections, [wakes])
+    host, port = address.removeprefix("tcp://").split(":")
+    dealer = context.socket(zmq.DEALER)
+    monitor = dealer.get_monitor_socket(zmq.Event.DISCONNECTED)
+    try:
+        dealer.connect(address)
+        dealer.send(b"hello")
+        assert _until(listeners, lambda received: received)
+        with socket.create_connection((host, int(port)), LIMIT_S) as silent:
+            ended = iter([3])
+            monkeypatch.setattr(DescriptorGuard, "take_ended", lambda _: next(ended, 0))
+            _until(listeners, lambda _: rejections.counts().get("connections"))
+            while silent.recv(4096):
+                pass
+        assert not monitor.poll(0)
+        used = iter([1])
+        monkeypatch.setattr(MemoryWatch, "over_limit", lambda _: next(used, 0))
+        _until(listeners, lambda _: monitor.poll(0))
+        assert rejections.counts()["memory"] == 1
+        dealer.send(b"again")
+        assert _until(listeners, lambda received: received)
+    finally:
+        dealer.disable_monitor()
         monitor.close()
         dealer.close(linger=0)
         listeners.close()
