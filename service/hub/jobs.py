@@ -232,9 +232,10 @@ class Jobs:
         """Queue jobs of a worker again; they count as no attempt, unless that happens too often."""
         for capture_id in reversed(capture_ids):
             worker.jobs.remove(capture_id)
-            attempts = self._attempts[capture_id]
-            attempts.handed_back += 1
-            if attempts.handed_back <= _MAX_HANDED_BACK:
+            known = self._attempts.get(capture_id)  # None: another worker ended it
+            if known:
+                known.handed_back += 1
+            if known is None or known.handed_back <= _MAX_HANDED_BACK:
                 self._undo_attempt(capture_id)
             self._take_back(capture_id, "HandedBack", "the worker that held it was stopped",
                             CaptureEvent.HANDED_BACK)

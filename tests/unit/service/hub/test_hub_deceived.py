@@ -349,3 +349,14 @@ def test_what_is_known_of_attempts_goes_with_the_outcome(bench):
     bench.say(b"o", messages.Purge(request=1, capture_id="c"))
     assert [one.kind for one in bench.published] == ["face_done", "capture_failed"]
     assert bench.hub._jobs._attempts == {}
+
+
+def test_nothing_is_kept_of_a_job_that_another_worker_ended(bench):
+    bench.accepted("a")
+    bench.worker()
+    bench.hub.unreachable(WORKER)
+    assert kinds(bench.worker(OTHER)) == [(OTHER, "job")]
+    bench.result("a")  # the first one's, late
+    bench.say(OTHER, messages.Goodbye())
+    assert len(bench.published) == 1
+    assert bench.hub._jobs._attempts == {}
