@@ -211,7 +211,6 @@ class Cluster:
         self.hub_log = LogPipe(folder / "hub.pipe", folder / "hub.log")
 
         self._part = part
-        elsewhere = daemons_at(self.address)
         self._workers = workers
         listen = thief.hub_arguments() if thief else []
         kept = ["--address", self.address, "--data", str(self.data), *listen, *recon]
