@@ -78,6 +78,11 @@ class Eraser:
         return Erased(erasure, found[-1], emptied)
 
     def _erase(self, erasure: Erasure) -> int:
+        if erasure.captures:
+            # That they are withdrawn is synced here, not on the hub's loop, and before any file
+            # goes: the log is synced up to this commit.
+            with closing(self._database.another()) as database:
+                database.set_meta("erasure", str(erasure.number))
         without_row = self._erase_files(erasure.captures) if erasure.captures else 0
         with wrap_os_errors(self._layout.quarantine):
             if erasure.all_quarantined:

@@ -73,6 +73,8 @@ class Retention:
     def remove(self, capture_ids: Sequence[str], state: CaptureState) -> None:
         """Withdraw captures and their outcomes; an erasure does the rest.
 
+        Not synced: until an erasure begins, a power cut may bring them back.
+
         Parameters
         ----------
         state : REMOVED, which no other method sees
@@ -183,7 +185,7 @@ class Retention:
         return row["settings_hash"] if row else None
 
     def _mark(self, capture_ids: Sequence[str], state: CaptureState) -> None:
-        with self._database.transaction() as connection:
+        with self._database.transaction(synced=False) as connection:
             connection.executemany("DELETE FROM outcomes WHERE capture_id = ?",
                                    [(one,) for one in capture_ids])
             connection.executemany("UPDATE captures SET state = ? WHERE capture_id = ?",

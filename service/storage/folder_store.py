@@ -3,6 +3,7 @@
 A file is written and synced before its row is, so a row always names a file that is safe.
 """
 
+import gc
 import os
 import shutil
 from collections.abc import Sequence
@@ -253,7 +254,14 @@ class OpeningStore(Closing):
         self.progress = Progress()
         self._store: FolderStore | None = None
         self._opening = Background[FolderStore]("store")
-        self._opening.start(lambda: FolderStore(folder, progress=self.progress))
+        self._opening.start(lambda: self._open(folder))
+
+    def _open(self, folder: Path) -> FolderStore:
+        gc.disable()  # a collection of all that is read would stop the other threads for a while
+        try:
+            return FolderStore(folder, progress=self.progress)
+        finally:
+            gc.enable()
 
     def fileno(self) -> int:
         """Give the descriptor to poll for reading."""

@@ -92,7 +92,8 @@ def test_the_status_is_known_and_a_press_waits_while_the_database_is_made_again(
             closing(Peer(address)) as watcher:
         # Said once, to a hub that is not there yet: nothing of it is lost.
         sensor.send(messages.SensorReady(name="s", source="x"))
-        presser.send(messages.Press(request=1, capture_id="press"))
+        press = messages.Press(request=1, capture_id="press")
+        presser.send(press)
         with hub_alone(address, data):
             seen = [watcher.status()]
             while seen[-1].state != "serving":
@@ -103,6 +104,8 @@ def test_the_status_is_known_and_a_press_waits_while_the_database_is_made_again(
             read = [one.files_read for one in seen[:-1]]
             assert read == sorted(read)
             assert max(one.files_to_read for one in seen) in (0, kept + kept * 8 // 10)
+            while not sensor.socket.poll(100):  # it may have come before the sensor
+                presser.send(press)
             take = sensor.receive("take").message
             sensor.send(messages.Frame(capture_id=take.capture_id, frame=FRAME), FRAME_ARRAYS)
             assert presser.receive("press_accepted").message.capture_id == "press"

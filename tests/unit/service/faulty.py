@@ -7,6 +7,7 @@ from denseface.service.errors import DiskFullError
 from denseface.service.storage import (
     FolderStore,
     InlineWriter,
+    PendingErasure,
     PendingWrite,
     WriteResult,
     write,
@@ -46,7 +47,7 @@ class FaultyStore(FolderStore):
 
 
 class StepWriter(InlineWriter):
-    """Writes when `step` says so; while `immediate`, at once. Erases at once.
+    """Writes when `step` says so; while `immediate`, at once. Erases at once unless it `holds`.
 
     Parameters
     ----------
@@ -60,6 +61,8 @@ class StepWriter(InlineWriter):
         self.hangs = False
         """Whether nothing that waits is ever written."""
         self.waiting: deque[PendingWrite] = deque()
+        self.holds = False
+        self._erasures: deque[PendingErasure] = deque()
         self._room = room
         self._writes = writes
         self._done: list[WriteResult] = []
@@ -69,7 +72,22 @@ class StepWriter(InlineWriter):
         if self.immediate:
             self.wait()
 
+    def erase(self, pending: PendingErasure) -> None:
+        self._erasures.append(pending)
+        if not self.holds:
+            self.erase_all()
+
+    def erase_all(self) -> None:
+        """Erase what waits to be erased."""
+        while self._erasures:
+            super().erase(self._erasures.popleft())
+
     def step(self, count: int) -> None:
+        """Erase all, and write that many of those that wait, as one batch."""
+        self.erase_all()
+        self.write(count)
+
+    def write(self, count: int) -> None:
         """Write that many of those that wait, as one batch."""
         batch = [self.waiting.popleft() for _ in range(min(count, len(self.waiting)))]
         try:
@@ -88,5 +106,7 @@ class StepWriter(InlineWriter):
     def wait(self, *, erased: bool = False, timeout_s: float | None = None) -> bool:
         if self.hangs:
             return False
-        self.step(len(self.waiting))
+        if erased:
+            self.erase_all()
+        self.write(len(self.waiting))
         return super().wait(erased=erased, timeout_s=timeout_s)

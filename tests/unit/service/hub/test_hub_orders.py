@@ -198,7 +198,8 @@ class AnyOrder(RuleBasedStateMachine):
 
     @rule(count=st.integers(1, 3))
     def the_disk_goes_on(self, count):
-        """Files are safe, and the hub hears of it."""
+        """Files are safe, or gone, and the hub hears of it."""
+        self.writer.holds = False
         try:
             self.writer.step(count)
             self.handle(self.hub.written(self.now))
@@ -330,6 +331,8 @@ class AnyOrder(RuleBasedStateMachine):
     def answer(self, message):
         try:
             outputs = self.hub.receive(self.now, b"o", Packet(message))
+            self.writer.erase_all()
+            outputs += self.hub.written(self.now)
         except KilledError:
             self.kill()
             return self.answer(message)
@@ -347,6 +350,17 @@ class AnyOrder(RuleBasedStateMachine):
         self.taken.discard(capture_id)
         assert not [path for path in (self.folder / "data").rglob("*.f*")
                     if capture_id in path.name.split(".")]
+
+    @rule(capture_id=ids)
+    def a_purge_waits_for_the_disk(self, capture_id):
+        """What else happens comes before the files are gone."""
+        self.writer.holds = True
+        self.killed = False
+        self.request += 1
+        self.say(b"o", messages.Purge(request=self.request, capture_id=capture_id))
+        if not self.killed:
+            self.accepted.discard(capture_id)
+            self.taken.discard(capture_id)
 
     @rule()
     def purge_all(self):

@@ -45,13 +45,13 @@ def calls(monkeypatch):
     return counts
 
 
-def test_a_batch_has_two_transactions_one_sync_of_each_folder_and_one_emptied_log(store, calls):
+def test_a_batch_has_three_transactions_one_sync_of_each_folder_and_one_emptied_log(store, calls):
     store.retention.remove(NAMES, CaptureState.REMOVED)
     assert calls == {"transaction": 1}
     calls.clear()
     store.retention.erase(NAMES)
     # Frame and face, each with or without its name.
-    assert calls == {"unlink": 4 * len(NAMES), "sync": 2, "transaction": 1, "emptied": 1}
+    assert calls == {"unlink": 4 * len(NAMES), "sync": 2, "transaction": 2, "emptied": 1}
     assert not list(store._layout.frames.iterdir())
     assert not list(store._layout.faces.iterdir())
 
@@ -65,3 +65,25 @@ def test_a_report_in_quarantine_is_read_once_however_many_batches_there_are(stor
         store.retention.erase(batch)
     assert calls["read"] == 9
     assert not list(store._layout.quarantine.iterdir())
+
+
+def test_the_loop_syncs_nothing_and_no_file_goes_before_the_thread_has(store, monkeypatch):
+    steps = []
+    transaction, unlink = Database.transaction, Path.unlink
+
+    def begun(database, *, synced=True):
+        steps.append("synced" if synced else "not synced")
+        return transaction(database, synced=synced)
+
+    def unlinked(path, **more):
+        steps.append("unlink")
+        unlink(path, **more)
+
+    monkeypatch.setattr(Database, "transaction", begun)
+    monkeypatch.setattr(Path, "unlink", unlinked)
+    store.retention.remove(NAMES[:1], CaptureState.REMOVED)
+    assert steps == ["not synced"]
+    store.retention.erase(NAMES[:1])
+    assert steps[1] == "synced"
+    assert set(steps[2:-1]) == {"unlink"}
+    assert steps[-1] == "synced"
