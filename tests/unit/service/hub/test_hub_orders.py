@@ -357,7 +357,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.writer.holds = True
         self.killed = False
         self.request += 1
-        self.say(b"o", messages.Purge(request=self.request, capture_id=capture_id))
+        self.say(b"p", messages.Purge(request=self.request, capture_id=capture_id))
         if not self.killed:
             self.accepted.discard(capture_id)
             self.taken.discard(capture_id)
