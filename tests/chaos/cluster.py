@@ -117,7 +117,8 @@ class Part:
             if self._handle == -1:
                 self.starts += 1
                 self.pid = self._nursery.fork(self._spec)
-                self._handle = os.pidfd_open(self.pid)
+                with contextlib.suppress(ProcessLookupError):  # it has ended already
+                    self._handle = os.pidfd_open(self.pid)
 
     def running(self) -> bool:
         """Say whether it runs, stopped or not."""
