@@ -1,5 +1,6 @@
 """The SQLite database of the data folder; its errors become those of the service."""
 
+import os
 import secrets
 import sqlite3
 import time
@@ -12,6 +13,7 @@ from typing import Self
 
 from denseface.service.errors import DamagedDatabaseError, DiskFullError, StoreError
 from denseface.service.runtime.files import sync_folder
+from denseface.service.storage._record_file import wrap_os_errors
 
 _VERSION = 3
 """Version of the schema, in `PRAGMA user_version`."""
@@ -21,6 +23,8 @@ MAX_ERROR, MAX_MESSAGE = 200, 4000
 """Characters of an outcome's error and its reason, as `CaptureFailed` allows."""
 _BUSY_S = 1.0
 """Longest wait for another program that has the database open, seconds."""
+_CHUNK_BYTES = 2**20
+"""Of the log, in memory at a time."""
 _LOG_PAGES = 1000
 """Pages of the write-ahead log beyond which SQLite copies them into the database; its default."""
 _LOG_TRIES, _LOG_PAUSE_S = 10, 0.005
@@ -115,6 +119,9 @@ class Database:
         log = path.with_name(f"{path.name}-wal")
         self.left_open = log.exists() and log.stat().st_size > 0
         """The last hub was killed: some of its last rows may be lost."""
+        if self.left_open:
+            with wrap_os_errors(log):
+                _sync_again(log)
         self._connect()
         try:
             with self._translate_errors():
@@ -348,6 +355,21 @@ class Database:
             raise StoreError(reason) from error
         except UnicodeDecodeError as error:  # from a damaged name in SQLite's message
             raise DamagedDatabaseError(f"{self.path.name}: malformed") from error
+
+
+def _sync_again(path: Path) -> None:
+    """Write what a file holds once more, and sync it.
+
+    Where a sync failed before the last hub was killed, the kernel takes for written what is on no
+    disk, and rows that follow it in the log would be lost with it.
+    """
+    descriptor, at = os.open(path, os.O_RDWR | os.O_CLOEXEC), 0
+    try:
+        while chunk := os.pread(descriptor, _CHUNK_BYTES, at):
+            at += os.pwrite(descriptor, chunk, at)
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _schema(connection: sqlite3.Connection) -> set[tuple[str, str]]:

@@ -41,5 +41,10 @@ def test_whenever_the_power_is_cut_what_was_said_stays_true(sweep):
 
 
 def test_a_sync_that_failed_is_not_relied_upon_when_the_power_is_cut(sweep):
-    for failing in sweep.syncs()[10::6]:
+    for failing in sweep.syncs()[10:-9:9]:
         assert sweep.power_cuts(every=200, failing=failing) == []
+
+
+def test_a_sync_that_failed_before_a_kill_is_made_good_by_the_next_hub(sweep):
+    for failing in sweep.syncs()[-9:]:
+        assert sweep.power_cuts(every=87, failing=failing) == []
