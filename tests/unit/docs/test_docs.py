@@ -32,6 +32,18 @@ def test_files_that_are_named_exist(page):
         assert (ROOT / name).exists() or is_made_by_the_reader(name, text), f"{page}: {name}"
 
 
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_tests_that_are_named_exist(page):
+    for name in re.findall(r"`(test_\w+)`", (ROOT / page).read_text()):
+        assert name in names_of_tests(), f"{page}: {name}"
+
+
+@cache
+def names_of_tests():
+    return set(re.findall(r"^ *(?:async )?def (test_\w+)\(", "\n".join(
+        path.read_text() for path in (ROOT / "tests").rglob("test_*.py")), re.M))
+
+
 def is_made_by_the_reader(name, text):
     return f"<!-- file: {name} -->" in text
 
