@@ -5,7 +5,8 @@ While a file is left so is its row, which says REMOVED: wherever a hub is killed
 withdrawn can be read again, and the next hub goes on.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,9 @@ from denseface.service.storage._disk_reserve import DiskReserve
 from denseface.service.storage._folder_layout import FolderLayout
 from denseface.service.storage._quarantine import Quarantine
 from denseface.service.storage._record_file import wrap_os_errors
+
+_UNLINKING = 8
+"""Files that are removed at the same time."""
 
 
 @dataclass(frozen=True)
@@ -100,23 +104,31 @@ class Eraser:
         return without_row
 
     def _erase_files(self, captures: Mapping[str, str | None]) -> int:
+        layout = self._layout
         unknown = {capture_id for capture_id, known in captures.items() if known is None}
-        faces = self._layout.faces_of(unknown) if unknown else []
-        without_row = {capture_id for capture_id, _ in faces}
-        paths = [path for _, path in faces]
+        files = layout.faces_of(unknown) if unknown else []
         for capture_id, known in captures.items():
+            files += [(capture_id, layout.frame(capture_id)),
+                      (capture_id, layout.unnamed_frame(capture_id))]
             if known is not None:
-                paths += [self._layout.face(capture_id, known),
-                          self._layout.unnamed_face(capture_id, known)]
-            for path in (self._layout.frame(capture_id), self._layout.unnamed_frame(capture_id)):
-                if _unlink(path) and known is None:
-                    without_row.add(capture_id)
-        for path in paths:
-            _unlink(path)
-        for folder in (self._layout.frames, self._layout.faces):
+                files += [(capture_id, layout.face(capture_id, known)),
+                          (capture_id, layout.unnamed_face(capture_id, known))]
+        found = _unlink_all([path for _, path in files])
+        for folder in (layout.frames, layout.faces):
             with wrap_os_errors(folder):
                 sync_folder(folder)
-        return len(without_row)
+        return len({capture_id for (capture_id, _), one in zip(files, found, strict=True)
+                    if one and capture_id in unknown})
+
+
+def _unlink_all(paths: Sequence[Path]) -> list[bool]:
+    """Remove files, as `_unlink` does each."""
+    if len(paths) <= _UNLINKING:
+        return [_unlink(path) for path in paths]
+    # A file system that tells the disk of each block that is free waits for milliseconds in each
+    # call; several calls wait together.
+    with ThreadPoolExecutor(_UNLINKING, thread_name_prefix="unlink") as pool:
+        return list(pool.map(_unlink, paths))
 
 
 def _unlink(path: Path) -> bool:

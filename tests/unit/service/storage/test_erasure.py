@@ -2,6 +2,7 @@
 
 import json
 import os
+import threading
 from collections import Counter
 from pathlib import Path
 
@@ -29,11 +30,12 @@ def store(tmp_path):
 @pytest.fixture
 def calls(monkeypatch):
     """Counts calls of the system, transactions and reports that are read."""
-    counts = Counter()
+    counts, lock = Counter(), threading.Lock()
 
     def counted(name, call):
         def count(*arguments, **more):
-            counts[name] += 1
+            with lock:
+                counts[name] += 1
             return call(*arguments, **more)
         return count
 
