@@ -1,6 +1,7 @@
 """Following the hub's publications without a gap: no sockets, no waiting."""
 
 import time
+from contextlib import suppress
 from datetime import datetime
 
 from denseface.service.client.events import Published, outcome_of
@@ -21,6 +22,8 @@ TOPICS = (Topic.FACES, Topic.STATUS)
 """Topics to subscribe to."""
 _REQUEST_TIMEOUT_S = 5.0
 """Time-out of one request, seconds: the hub may be restarting."""
+_OPENING_S = 0.25
+"""Time between two looks at a hub that reads its data folder, seconds."""
 
 
 class Follower:
@@ -48,8 +51,19 @@ class Follower:
     def start(self, timeout: float | None) -> Exchange[None]:
         """Find where to start; to be run once, after subscribing."""
         until = deadline(timeout)
-        message = self._start_request or messages.GetStatus(request=self._exchanges.next_number())
-        found = (yield from self._request_until(message, until)).message
+        while True:
+            message = self._start_request or messages.GetStatus(
+                request=self._exchanges.next_number())
+            found = (yield from self._request_until(message, until)).message
+            if not isinstance(found, messages.Status) or found.state == "serving":
+                break
+            # It does not know its epoch yet. No publication comes before it does.
+            if time.monotonic() >= until:
+                raise ClientTimeoutError(
+                    f"the hub has not yet read its data folder ({found.files_read} of "
+                    f"{found.files_to_read} files)")
+            with suppress(ClientTimeoutError):
+                yield AwaitPublication(min(_OPENING_S, until - time.monotonic()))
         if not isinstance(found, messages.StartAt if self._start_request else messages.Status):
             raise RemoteProtocolError(f"the hub answered with {found.kind} to {message.kind}")
         self._epoch = found.epoch

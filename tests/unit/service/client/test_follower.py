@@ -20,6 +20,8 @@ class FakeHub:
         self.published = deque()
         self.asked = []
         self.away = 0
+        self.opening = 0
+        """Times that it says that it is not yet serving."""
 
     def conclude(self, *, published=True):
         sequence = len(self.outcomes) + 1
@@ -53,6 +55,10 @@ class FakeHub:
             case SendRequest() if self.away:
                 self.away -= 1
                 raise ClientTimeoutError("away")
+            case SendRequest(message=messages.GetStatus()) if self.opening:
+                self.opening -= 1
+                return Packet(self.status().model_copy(
+                    update={"epoch": "0", "sequence": 0, "state": "opening"}))
             case SendRequest(message=messages.GetStatus()):
                 return Packet(self.status())
             case SendRequest(message=messages.GetNext(after=after)):
@@ -125,6 +131,24 @@ def test_the_last_one_missed_is_known_from_the_status(hub, follower):
     hub.conclude(published=False)
     hub.publish(hub.status())
     assert ids(hub, follower, 1) == ["a1"]
+
+
+@pytest.mark.parametrize("start", [{"after": 2}, {}])
+def test_a_hub_that_is_not_yet_serving_has_no_epoch_to_start_from(hub, start):
+    for _ in range(2):
+        hub.conclude(published=False)
+    hub.opening = 3
+    follower = following(hub, **start)
+    assert hub.opening == 0
+    with pytest.raises(ClientTimeoutError):
+        hub.run(follower.next(60))
+    assert hub.asked == [2]
+
+
+def test_a_hub_that_does_not_serve_in_time_is_said(hub):
+    hub.opening = 10**9
+    with pytest.raises(ClientTimeoutError, match="not yet read its data folder"):
+        hub.run(Follower(Exchanges(2.0)).start(0.01))
 
 
 def test_another_store_starts_over(hub, follower):
