@@ -135,9 +135,12 @@ class Storm(threading.Thread):
 
     def _stall_log(self) -> None:
         """Stop reading what the hub logs, longer than its few lines last in the pipe."""
-        self._scene.cluster.hub_log.stall()
-        self._over.wait(self._random.uniform(0.5, _LONGEST_STALL_S))
-        self._scene.cluster.hub_log.flow()
+        log = self._scene.cluster.hub_log
+        log.stall()
+        # The other harms go on meanwhile.
+        later = threading.Timer(self._random.uniform(0.5, _LONGEST_STALL_S), log.flow)
+        later.daemon = True
+        later.start()
         self.counts["the hub's log stalled"] += 1
 
     def _new_subscriber(self) -> None:
