@@ -191,4 +191,5 @@ class Storm(threading.Thread):
 
 
 def _kind(part: Part | Child) -> str:
-    return part.name.split("-")[0].replace("capture", "capture process")
+    return {"capture": "capture process", "up": "supervisor"}.get(
+        name := part.name.split("-")[0], name)
