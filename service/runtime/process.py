@@ -24,7 +24,8 @@ def forbid_core_dumps(environment: Mapping[str, str] = os.environ) -> None:
     """
     if environment.get(CORE_DUMPS_VARIABLE) == "1":
         return
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    # The hard limit stays: a program that calls the command's `main` may raise it again.
+    resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
     _prctl(_PR_SET_DUMPABLE, 0)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 CRASH = """
 import os, resource, sys
-resource.setrlimit(resource.RLIMIT_CORE, (resource.RLIM_INFINITY,) * 2)
+resource.setrlimit(resource.RLIMIT_CORE, (resource.getrlimit(resource.RLIMIT_CORE)[1],) * 2)
 from denseface.service.cli import main
 try:
     main(sys.argv[1:])
@@ -32,6 +32,20 @@ def crash(folder, **environment):
 def test_a_crash_leaves_no_pictures_in_a_core_file(tmp_path):
     assert not crash(tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_calls_the_command_may_allow_them_again():
+    code = """
+import resource, sys
+from denseface.service.cli import main
+before = resource.getrlimit(resource.RLIMIT_CORE)[1]
+try:
+    main(["worker", "--help"])
+except SystemExit:
+    pass
+assert resource.getrlimit(resource.RLIMIT_CORE) == (0, before)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
 
 
 def test_core_dumps_can_be_had_to_find_a_fault(tmp_path):
