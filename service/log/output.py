@@ -24,6 +24,9 @@ _FLUSH_S = 1.0
 """Longest wait at exit for lines that are not yet written, seconds."""
 _INTERVAL_S = 1.0
 """Time between two calls of `on_interval`, seconds."""
+_GATHER_S = 0.02
+"""Time for which lines are gathered before they are written, seconds. A thread that wakes for each
+of a capture's dozen lines takes Python's lock and a core from who computes."""
 _MAX_PARTIAL = 2**14
 """Characters of a line without an end that are kept, waiting for its end."""
 
@@ -55,6 +58,7 @@ class LogOutput:
         self._bytes = 0
         self._lost = self._told = 0
         self._torn = False
+        self._gathering = self._hurried = False
         self._thread: threading.Thread | None = None
         self._recovering: int | None = None
         """Number of the thread while it is in `on_recovery`."""
@@ -76,12 +80,19 @@ class LogOutput:
                 return
             self._lines.append(data)
             self._bytes += len(data)
-            self._changed.notify_all()
+            if not self._gathering or self._much():
+                self._changed.notify_all()
+
+    def _much(self) -> bool:
+        return self._hurried or self._bytes > _MAX_BYTES // 4
 
     def flush(self, seconds: float = _FLUSH_S) -> None:
         """Wait until all lines are written or lost, but no longer than that."""
         with self._changed:
+            self._hurried = True
+            self._changed.notify_all()
             self._changed.wait_for(lambda: not self._lines, seconds)
+            self._hurried = False
 
     def _running(self) -> bool:
         if self._thread is None:
@@ -100,9 +111,13 @@ class LogOutput:
         due = time.monotonic() + _INTERVAL_S
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._lines, max(0.0, due - time.monotonic()))
-                line = self._lines[0] if self._lines else None
-            if line is not None:
+                if self._changed.wait_for(
+                        lambda: self._lines, max(0.0, due - time.monotonic())):
+                    self._gathering = True
+                    self._changed.wait_for(self._much, _GATHER_S)
+                    self._gathering = False
+                lines = list(self._lines)
+            for line in lines:
                 self._write_first(line)
             if (now := time.monotonic()) >= due:
                 due = now + _INTERVAL_S

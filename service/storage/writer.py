@@ -142,6 +142,8 @@ class WriterThreads(WakePipe):
         """Writes without a result."""
         self._results: list[WriteResult] = []
         self._erased: list[Erased] = []
+        self._awake = False
+        """Whether the pipe was written to since it was drained."""
         self._closed = False
         self._frames: _Queue = Queue()
         self._faces: _Queue = Queue()
@@ -184,8 +186,14 @@ class WriterThreads(WakePipe):
         return erased
 
     def _drained(self) -> None:
-        if not (self._results or self._erased or self._closed):
+        # A read of an empty pipe gives Python's lock away, and to get it back may take a while.
+        if self._awake and not (self._results or self._erased or self._closed):
+            self._awake = False
             self.drain()
+
+    def _tell(self) -> None:
+        self._awake = True
+        self.wake()
 
     def wait(self, *, erased: bool = False, timeout_s: float | None = None) -> bool:
         """See `Writer`."""
@@ -218,7 +226,7 @@ class WriterThreads(WakePipe):
             with self._lock:
                 self._results += results
                 self._under_way -= len(results)
-                self.wake()
+                self._tell()
                 self._idle.notify_all()
 
     def _run_erasures(self) -> None:
@@ -226,5 +234,5 @@ class WriterThreads(WakePipe):
             erased = pending.run()
             with self._lock:
                 self._erased.append(erased)
-                self.wake()
+                self._tell()
             self._erasures.task_done()
