@@ -12,6 +12,7 @@ from structlog import DropEvent
 from structlog.typing import EventDict
 
 from denseface.service.runtime.bounded_dict import BoundedDict
+from denseface.service.runtime.token_bucket import TokenBucket
 
 __all__ = ["LogLimit"]
 
@@ -23,24 +24,16 @@ _MAX_KINDS = 1024
 
 
 @dataclass
-class _TokenBucket:
-    """Lines that one kind may still log."""
+class _Bucket:
+    """What one kind may still log."""
 
-    burst: float
-    per_s: float
-    lines: float
-    since: float
+    lines: TokenBucket
     suppressed: int = 0
 
-    def refill(self, now: float) -> bool:
-        """Say whether there is room for a line."""
-        self.lines = min(self.burst, self.lines + (now - self.since) * self.per_s)
-        self.since = now
-        return self.lines >= 1
-
-    def take(self) -> int:
-        """Take the place of a line and give how many had none since the last."""
-        self.lines -= 1
+    def take(self, now: float) -> int | None:
+        """Take the place of a line and give how many had none since the last; None without one."""
+        if not self.lines.take(now):
+            return None
         suppressed, self.suppressed = self.suppressed, 0
         return suppressed
 
@@ -55,7 +48,7 @@ class LogLimit:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._buckets: BoundedDict[tuple[str, ...], _TokenBucket] = BoundedDict(_MAX_KINDS)
+        self._buckets: BoundedDict[tuple[str, ...], _Bucket] = BoundedDict(_MAX_KINDS)
         self._lock = threading.RLock()
 
     def __call__(self, _: object, level: str, event: EventDict) -> EventDict:
@@ -63,14 +56,14 @@ class LogLimit:
         kind = event.pop("per", None) or (event["event"], str(event.get("key", "")))
         with self._lock:
             now = self._clock()
-            bucket = self._buckets.get(kind)
-            if bucket is None:
+            one = self._buckets.get(kind)
+            if one is None:
                 burst, per_s = _INFO if level == "info" else _OTHERS
-                bucket = self._buckets[kind] = _TokenBucket(burst, per_s, burst, now)
-            if not bucket.refill(now):
-                bucket.suppressed += 1
+                one = self._buckets[kind] = _Bucket(TokenBucket(burst, per_s, now))
+            suppressed = one.take(now)
+            if suppressed is None:
+                one.suppressed += 1
                 raise DropEvent
-            suppressed = bucket.take()
         if suppressed:
             event["suppressed"] = suppressed
         return event
@@ -79,6 +72,7 @@ class LogLimit:
         """Give kinds that were dropped and may log again, and how many lines, once."""
         with self._lock:
             now = self._clock()
-            found = [(" ".join(filter(None, kind)), one.take())
-                     for kind, one in self._buckets.items() if one.suppressed and one.refill(now)]
+            found = [(" ".join(filter(None, kind)), suppressed)
+                     for kind, one in self._buckets.items()
+                     if one.suppressed and (suppressed := one.take(now))]
         yield from found

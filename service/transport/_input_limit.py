@@ -14,6 +14,7 @@ from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
 
+from denseface.service.runtime.token_bucket import TokenBucket
 from denseface.service.runtime.wake_pipe import WakePipe
 from denseface.service.transport.handshakes import address_of, connection_of, end_connection
 
@@ -28,8 +29,7 @@ _TCP_INFO_RECEIVED = 128
 @dataclass
 class _Budget:
     address: str
-    left: float
-    at: float
+    bytes: TokenBucket
     received: int = 0
 
 
@@ -53,7 +53,7 @@ class InputLimit:
     def watch(self, descriptor: int) -> None:
         """Watch a connection until it is closed, which nobody needs to tell."""
         self._budgets[descriptor] = _Budget(
-            address_of(descriptor), _BURST_BYTES, time.monotonic())
+            address_of(descriptor), TokenBucket(_BURST_BYTES, _BYTES_PER_S, time.monotonic()))
         with suppress(OSError):  # it is closed already, or was watched under this number before
             self._epoll.register(descriptor, select.EPOLLIN | select.EPOLLET)
 
@@ -75,11 +75,11 @@ class InputLimit:
         budget = self._budgets.get(descriptor)
         if budget is None or budget.address != address_of(descriptor):
             return  # the number is another connection's by now
-        received, now = _received_bytes(descriptor), time.monotonic()
-        budget.left = min(_BURST_BYTES, budget.left + (now - budget.at) * _BYTES_PER_S)
-        budget.left -= received - budget.received
-        budget.at, budget.received = now, received
-        if budget.left < 0:
+        received = _received_bytes(descriptor)
+        budget.bytes.refill(time.monotonic())
+        budget.bytes.tokens -= received - budget.received
+        budget.received = received
+        if budget.bytes.tokens < 0:
             del self._budgets[descriptor]  # first: the number is free for another soon
             end_connection(descriptor)
             self.ended.append(budget.address)

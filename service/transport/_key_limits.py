@@ -8,9 +8,9 @@ names takes months at this pace.
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from denseface.service.runtime.bounded_dict import BoundedDict
+from denseface.service.runtime.token_bucket import TokenBucket
 
 __all__ = ["MAX_CONNECTIONS", "KeyLimits"]
 
@@ -24,12 +24,6 @@ _MAX_KEYS = 10_000
 """Keys whose handshakes are counted."""
 
 
-@dataclass
-class _Budget:
-    left: float
-    at: float
-
-
 class KeyLimits:
     """Counts the handshakes of each key.
 
@@ -40,15 +34,9 @@ class KeyLimits:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._budgets: BoundedDict[str, _Budget] = BoundedDict(_MAX_KEYS)
+        self._budgets: BoundedDict[str, TokenBucket] = BoundedDict(_MAX_KEYS)
 
     def take_handshake(self, public: str) -> bool:
         """Count a handshake of a key; False where it has made too many lately."""
         now = self._clock()
-        budget = self._budgets.setdefault(public, _Budget(_BURST, now))
-        budget.left = min(_BURST, budget.left + (now - budget.at) * _PER_S)
-        budget.at = now
-        if budget.left < 1:
-            return False
-        budget.left -= 1
-        return True
+        return self._budgets.setdefault(public, TokenBucket(_BURST, _PER_S, now)).take(now)
