@@ -15,7 +15,12 @@ from denseface.capture.frame import RgbdFrame
 from denseface.recon.arrays import Floats
 from denseface.recon.detail import add_detail
 from denseface.recon.detection import detect_face
-from denseface.recon.errors import ImpossibleFrameError, NoDepthError, TooLittleDepthError
+from denseface.recon.errors import (
+    ImpossibleFrameError,
+    NoDepthError,
+    ReconstructionError,
+    TooLittleDepthError,
+)
 from denseface.recon.face import Face, PointCloud, Report
 from denseface.recon.intermediate import ColorSampler, Registration, SurfaceGrid
 from denseface.recon.numerics.threads import one_blas_thread
@@ -26,7 +31,7 @@ from denseface.recon.settings import Settings
 from denseface.recon.support import Support
 from denseface.recon.surface import MIN_SEEDS, fit_surface, mean_spacing
 
-__all__ = ["reconstruct", "surface_of"]
+__all__ = ["ends_the_same", "reconstruct", "surface_of"]
 
 _FEW_SEEDS = 2000
 """With fewer seeds, the report warns."""
@@ -37,7 +42,7 @@ _SPARSE = 4
 _MUCH_SKEW_US = 33_000
 """A whole frame at 30 frames a second: the face may have moved in between."""
 
-_OF_THE_NUMBERS = (ArithmeticError, LookupError, ValueError, cv2.error)
+_OF_THE_NUMBERS = (ReconstructionError, ArithmeticError, LookupError, ValueError, cv2.error)
 """What the numbers of a frame can lead to, where nothing sees to it beforehand. Not lack of memory,
 which another attempt may have."""
 
@@ -65,13 +70,21 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     clock = _Stopwatch()
     try:
         return _reconstruct(frame, settings or Settings(), clock)
-    except _OF_THE_NUMBERS as error:
-        if isinstance(error, cv2.error) and error.code == cv2.Error.StsNoMem:
+    except ReconstructionError:
+        raise
+    except Exception as error:
+        if not ends_the_same(error):
             raise
         reason = " ".join(str(error).split())[:200]
         raise ImpossibleFrameError(
             f"after {clock.last}: {type(error).__name__}: {reason}: is the calibration right?"
         ) from error
+
+
+def ends_the_same(error: Exception) -> bool:
+    """Say whether another attempt would end so too: by the frame's numbers, not the machine."""
+    out_of_memory = isinstance(error, cv2.error) and error.code == cv2.Error.StsNoMem
+    return isinstance(error, _OF_THE_NUMBERS) and not out_of_memory
 
 
 def _reconstruct(frame: RgbdFrame, settings: Settings, clock: "_Stopwatch") -> Face:

@@ -13,6 +13,7 @@ import structlog
 from denseface import recon
 from denseface.recon import ReconstructionError, reconstruct
 from denseface.recon.face import Face
+from denseface.recon.pipeline import ends_the_same
 from denseface.service.log.output import exit_now
 from denseface.service.protocol import messages
 from denseface.service.protocol.message_base import MAX_JOBS
@@ -32,9 +33,6 @@ __all__ = ["run", "warm"]
 
 _FINISH_S = 3.0
 """Time to finish the job under way when the process stops, seconds; below the supervisor's 5."""
-_OF_THE_FRAME = (ReconstructionError, ValueError, ArithmeticError, LookupError)
-"""What a frame's own numbers lead to, for the same frame each time: the first is no face, the
-others are for absurd calibrations that nobody has thought of."""
 _log = structlog.get_logger("worker")
 
 
@@ -167,7 +165,7 @@ class _Worker:
                 capture_id=job.capture_id, settings_hash=job.settings_hash,
                 frame_sha256=job.frame_sha256, face=header)
         except Exception as error:
-            final = _is_final(error)
+            final = ends_the_same(error)
             # One with a cause may be a fault of ours, though another attempt ends the same.
             named = isinstance(error, ReconstructionError) and error.__cause__ is None
             say = _log.warning if named else _log.exception
@@ -187,10 +185,3 @@ def _reconstruct(job: messages.Job, arrays: Arrays, max_pixels: int) -> Face:
     failpoint("worker.job.computing")
     check_frame_size(job.frame, max_pixels)
     return reconstruct(job.frame.join(arrays), job.settings)
-
-
-def _is_final(error: Exception) -> bool:
-    """Say whether another attempt would end the same: by the frame's numbers, not the machine."""
-    if isinstance(error, cv2.error):
-        return bool(error.code != cv2.Error.StsNoMem)
-    return isinstance(error, _OF_THE_FRAME)

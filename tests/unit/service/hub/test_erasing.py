@@ -167,11 +167,17 @@ def test_files_without_a_row_are_purged_too(bench, writer, data, purge):
     assert files(data) == []
 
 
+def reader(data):
+    """Another program that reads the database and does not end its transaction."""
+    other = sqlite3.connect(data / "captures.sqlite3")
+    other.execute("BEGIN")
+    other.execute("SELECT * FROM captures").fetchone()
+    return other
+
+
 def test_nothing_is_said_to_be_removed_while_the_log_names_it(bench, writer, data):
     done(bench, "MargaretHamilton")
-    with closing(sqlite3.connect(data / "captures.sqlite3")) as other:
-        other.execute("BEGIN")
-        other.execute("SELECT * FROM captures").fetchone()
+    with closing(reader(data)):
         bench.say(OPERATOR, messages.Purge(request=1, capture_id="MargaretHamilton"))
         assert go_on(bench, writer) == []
         assert files(data) == []
@@ -188,9 +194,7 @@ def test_nothing_is_said_to_be_removed_while_the_log_names_it(bench, writer, dat
 
 def test_the_log_is_tried_again_until_it_is_empty(bench, writer, data):
     done(bench, "MargaretHamilton")
-    with closing(sqlite3.connect(data / "captures.sqlite3")) as other:
-        other.execute("BEGIN")
-        other.execute("SELECT * FROM captures").fetchone()
+    with closing(reader(data)):
         bench.say(OPERATOR, messages.Purge(request=1, capture_id="MargaretHamilton"))
         assert go_on(bench, writer) == []
     bench.wait(1)
@@ -204,9 +208,7 @@ def test_a_log_that_could_not_be_emptied_is_emptied_by_the_next_hub(data):
     with FolderStore(data) as store:
         bench = Bench(Hub(store, SETTINGS, Settings()), store)
         bench.accepted("MargaretHamilton")
-        other = sqlite3.connect(data / "captures.sqlite3")
-        other.execute("BEGIN")
-        other.execute("SELECT * FROM captures").fetchone()
+        other = reader(data)
         assert bench.say(OPERATOR, messages.Purge(request=1, capture_id="MargaretHamilton")) == []
     assert named(data, "MargaretHamilton")
     with FolderStore(data) as store:

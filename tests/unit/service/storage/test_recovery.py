@@ -27,18 +27,6 @@ from tests.unit.service.storing import accept, finish
 DAY = 86400.0
 
 
-@pytest.fixture
-def data(tmp_path):
-    """A folder with a face, a failure, a dead letter and a frame that waits."""
-    with FolderStore(tmp_path / "data", FakeClock()) as store:
-        for name in ("done", "failed", "dead", "waits"):
-            accept(store, frame(name), Settings(), "0f")
-        finish(store, result("done", store))
-        store.fail("failed", CaptureState.FAILED, "NoFaceError", "no face")
-        store.fail("dead", CaptureState.DEAD, "WorkerLost", "gone")
-    return tmp_path / "data"
-
-
 def states(store):
     return {name: store.find(name) and store.find(name).state
             for name in ("done", "failed", "dead", "waits")}
