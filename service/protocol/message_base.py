@@ -1,7 +1,7 @@
 """What the messages of `service.protocol.messages` are made of."""
 
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, FailFast, Field
 
@@ -45,6 +45,9 @@ class BaseMessage(BaseModel):
     """What all messages have in common."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    newer: ClassVar[frozenset[str]] = frozenset()
+    """Fields that an older release refuses: not written where they say what they did not yet."""
 
     version: Literal[2] = 2
     if TYPE_CHECKING:  # a field of each kind, behind those that it inherits

@@ -5,11 +5,12 @@ Each class is the JSON header of one kind of message; how it is written is in
 of it is a case of `Hub.receive`, and `docs/wire.md` says what it is for.
 """
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import FailFast, Field, model_validator
 
 from denseface.recon.settings import Settings
+from denseface.service.protocol.hint import Hint as Hint
 from denseface.service.protocol.message_base import (
     BaseAnswer,
     BaseMessage,
@@ -29,10 +30,28 @@ from denseface.service.protocol.message_base import (
 )
 from denseface.service.protocol.payload import FaceHeader, FrameHeader, PreviewHeader
 from denseface.service.protocol.roles import Role
+from denseface.service.protocol.sensor_messages import (
+    DEFAULT_GATE_S,
+    BurstFrames,
+    Gate,
+    GateSeconds,
+)
+from denseface.service.protocol.sensor_messages import Frame as Frame
+from denseface.service.protocol.sensor_messages import FrameAccepted as FrameAccepted
+from denseface.service.protocol.sensor_messages import FrameFailed as FrameFailed
+from denseface.service.protocol.sensor_messages import FrameRefused as FrameRefused
+from denseface.service.protocol.sensor_messages import PreviewFrame as PreviewFrame
+from denseface.service.protocol.sensor_messages import QualityHint as QualityHint
+from denseface.service.protocol.sensor_messages import SensorReady as SensorReady
+from denseface.service.protocol.sensor_messages import SensorState as SensorState
+from denseface.service.protocol.sensor_messages import Take as Take
+from denseface.service.protocol.sensor_messages import TakeHints as TakeHints
+from denseface.service.protocol.sensor_messages import TakePreview as TakePreview
 from denseface.service.protocol.status import Latency as Latency
 from denseface.service.protocol.status import Status as Status
 
-PressReason = Literal["no_sensor", "sensor", "sensor_gone", "timeout", "queue", "disk", "purged"]
+PressReason = Literal[
+    "no_sensor", "sensor", "sensor_gone", "quality", "timeout", "queue", "disk", "purged"]
 """Why there is no capture; a label of the metric of refused presses."""
 
 
@@ -45,8 +64,15 @@ class _WithFace(BaseMessage):
 class Press(BaseRequest):
     """Take a frame now and make a face of it; the same id again is the same capture."""
 
+    newer: ClassVar = frozenset({"sensor", "gate", "gate_timeout", "frames"})
+
     kind: Literal["press"] = "press"
     capture_id: CaptureId
+    sensor: PeerName | None = None
+    """The name of the sensor to ask; where None, the hub chooses one."""
+    gate: Gate = "off"
+    gate_timeout: GateSeconds = DEFAULT_GATE_S
+    frames: BurstFrames = 1
 
 
 class GetFace(BaseRequest):
@@ -98,10 +124,14 @@ class PressAccepted(BaseAnswer):
 class PressRefused(BaseAnswer):
     """There is no such capture and none will appear."""
 
+    newer: ClassVar = frozenset({"hint"})
+
     kind: Literal["press_refused"] = "press_refused"
     capture_id: CaptureId
     reason: PressReason
     message: Text
+    hint: Hint | None = None
+    """Of the last frame that was not good enough, where that is the reason."""
 
 
 class CapturePending(BaseAnswer):
@@ -177,6 +207,14 @@ class Preview(FromHub):
     """A number that is missing was not delivered and cannot be asked for."""
 
 
+class Hints(FromHub):
+    """What a person could do better: published on topic `hints` and not stored."""
+
+    kind: Literal["hints"] = "hints"
+    sensor: PeerName
+    hint: Hint
+
+
 # --- operator to hub, and the answers
 
 class ListDead(BaseRequest):
@@ -235,15 +273,7 @@ class Removed(BaseAnswer):
     """More are to be removed: repeat the request."""
 
 
-# --- sensor and worker to hub
-
-class SensorReady(ToHub):
-    """A capture process has its source open."""
-
-    kind: Literal["sensor_ready"] = "sensor_ready"
-    name: PeerName
-    source: Text
-
+# --- worker to hub; what sensors say is in `sensor_messages`
 
 class WorkerReady(ToHub):
     """A worker is free for one job."""
@@ -266,29 +296,6 @@ class Goodbye(ToHub):
     """A sensor or worker disconnects; a job that it did not answer is handed back."""
 
     kind: Literal["goodbye"] = "goodbye"
-
-
-class Frame(ToHub):
-    """The frame that was asked for."""
-
-    frame: FrameHeader
-    kind: Literal["frame"] = "frame"
-    capture_id: CaptureId
-
-
-class FrameFailed(ToHub):
-    """The sensor has no frame to give."""
-
-    kind: Literal["frame_failed"] = "frame_failed"
-    capture_id: CaptureId
-    message: Text
-
-
-class PreviewFrame(ToHub):
-    """The preview that was asked for."""
-
-    preview: PreviewHeader
-    kind: Literal["preview_frame"] = "preview_frame"
 
 
 class Result(_WithFace, ToHub):
@@ -330,34 +337,6 @@ class Denied(FromHub):
     message: Text
 
 
-class Take(FromHub):
-    """Send the newest frame as this capture."""
-
-    kind: Literal["take"] = "take"
-    capture_id: CaptureId
-
-
-class TakePreview(FromHub):
-    """Send one preview, when no frame is to be taken."""
-
-    kind: Literal["take_preview"] = "take_preview"
-
-
-class FrameAccepted(FromHub):
-    """The frame is safe: the sensor may forget it."""
-
-    kind: Literal["frame_accepted"] = "frame_accepted"
-    capture_id: CaptureId
-
-
-class FrameRefused(FromHub):
-    """Nobody waits for this frame, or it cannot be saved: the sensor may forget it."""
-
-    kind: Literal["frame_refused"] = "frame_refused"
-    capture_id: CaptureId
-    message: Text
-
-
 class Job(FromHub):
     """Make a face of this frame."""
 
@@ -382,6 +361,8 @@ TO_HUB: dict[type[ToHub], frozenset[Role]] = {
     DropDead: frozenset({Role.OPERATOR}),
     Purge: frozenset({Role.OPERATOR}),
     SensorReady: frozenset({Role.SENSOR}),
+    SensorState: frozenset({Role.SENSOR}),
+    QualityHint: frozenset({Role.SENSOR}),
     WorkerReady: frozenset({Role.WORKER}),
     Heartbeat: frozenset({Role.SENSOR, Role.WORKER}),
     Goodbye: frozenset({Role.SENSOR, Role.WORKER}),
@@ -395,6 +376,6 @@ TO_HUB: dict[type[ToHub], frozenset[Role]] = {
 
 FROM_HUB: tuple[type[FromHub], ...] = (
     PressAccepted, PressRefused, CapturePending, CaptureUnknown, RequestFailed, NothingNewer,
-    StartAt, DeadLetters, Removed, FaceDone, CaptureFailed, Status, Preview, Announce, Denied, Take,
-    TakePreview, FrameAccepted, FrameRefused, Job)
+    StartAt, DeadLetters, Removed, FaceDone, CaptureFailed, Status, Preview, Hints, Announce,
+    Denied, Take, TakePreview, TakeHints, FrameAccepted, FrameRefused, Job)
 """Every message that the hub sends."""

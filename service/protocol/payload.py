@@ -9,8 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, FailFast, Field, model_validator
+from pydantic import BaseModel, ConfigDict, FailFast, Field, ValidationError, model_validator
 
 from denseface.capture import Calibration, CaptureError, RgbdFrame
 from denseface.recon.face import Face, PointCloud, Report
@@ -18,15 +19,20 @@ from denseface.service.errors import (
     FrameTooLargeError,
     LocalProtocolError,
     RemoteProtocolError,
+    first_error,
 )
+from denseface.service.protocol.hint import Hint
+from denseface.service.protocol.jpeg import jpeg_size
 from denseface.service.protocol.packing import PackedCloud, pack, unpack
 
 MAX_ARRAY_BYTES = 32 * 2**20
 """Largest single array; also MAXMSGSIZE of every socket."""
 MAX_PAYLOAD_BYTES = 96 * 2**20
 """Largest sum of a message's arrays."""
-MAX_PREVIEW_SIDE = 320
+MAX_PREVIEW_SIDE = 640
 """Longest side of a preview, pixels."""
+MAX_JPEG_BYTES = 256 * 1024
+"""Largest JPEG of a preview: that of noise at 640 x 480 and quality 85 has 250 kB, a face's 30."""
 _INITIAL_POINT_BYTES, _DENSE_POINT_BYTES = 15, 39
 """Size of a point of either cloud in memory."""
 
@@ -226,10 +232,53 @@ class PreviewHeader(_PayloadHeader):
     height: _Side
     timestamp_us: _Int64
     """Of the colour image, sensor clock, microseconds."""
+    encoding: Literal["rgb", "jpeg"] = "rgb"
+    jpeg_bytes: Annotated[int, Field(ge=1, le=MAX_JPEG_BYTES)] | None = None
+    """Size of the JPEG; given where the encoding is that one."""
+    sensor: Annotated[str, Field(max_length=100)] = ""
+    """Name of the sensor, as the hub knows it."""
+    hint: Hint | None = None
+    """Of the frame that the picture shows; None where its quality was not measured."""
 
     def layout(self) -> tuple[ArrayInfo, ...]:
-        """Return the picture."""
+        """Return the picture: its pixels, or the bytes of a JPEG."""
+        if self.jpeg_bytes is not None:
+            return (_info("jpeg", "|u1", self.jpeg_bytes),)
         return (_info("image", "|u1", self.height, self.width, 3),)
+
+    @model_validator(mode="after")
+    def _encoded(self) -> Self:
+        if (self.encoding == "jpeg") != (self.jpeg_bytes is not None):
+            raise ValueError("expected jpeg_bytes with the encoding jpeg, and only there")
+        return self
+
+    @classmethod
+    def of_jpeg(
+        cls, data: bytes, timestamp_us: int, hint: Hint | None = None
+    ) -> tuple[Self, Arrays]:
+        """Describe a JPEG; LocalProtocolError where it is none that may be sent."""
+        try:
+            width, height = jpeg_size(data)
+            header = cls(width=width, height=height, timestamp_us=timestamp_us, encoding="jpeg",
+                         jpeg_bytes=len(data), hint=hint)
+        except ValidationError as error:
+            raise LocalProtocolError(": ".join(("preview", *first_error(error)))) from error
+        except ValueError as error:
+            raise LocalProtocolError(f"preview: the picture {error}") from error
+        return header, {"jpeg": np.frombuffer(data, np.uint8)}
+
+    def check(self, arrays: Arrays) -> None:
+        """Check that a JPEG is one of the size that the header says: RemoteProtocolError."""
+        if self.jpeg_bytes is None:
+            return
+        try:
+            size = jpeg_size(arrays["jpeg"].data)
+        except ValueError as error:
+            raise RemoteProtocolError(f"preview: the picture {error}") from error
+        if size != (self.width, self.height):
+            raise RemoteProtocolError(
+                f"preview: the picture has {size[0]} x {size[1]} pixels, its header says "
+                f"{self.width} x {self.height}")
 
 
 Payload = FrameHeader | FaceHeader | PreviewHeader

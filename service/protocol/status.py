@@ -2,9 +2,13 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, FailFast, Field
 
 from denseface.service.protocol.message_base import BaseAnswer, Name, Names, Number, Token
+from denseface.service.protocol.sensor_messages import SensorFigures
+
+MAX_SENSOR_STATES = 64
+"""Sensors whose state a status tells: so many fit into a header, whatever their reasons are."""
 
 _TimeS = Annotated[float, Field(ge=0)]
 _Counts = Annotated[dict[Name, Number], Field(default_factory=dict, max_length=64)]
@@ -30,6 +34,21 @@ class Restarts(BaseModel):
     """It was silent for too long and was ended for it."""
 
 
+class SensorStatus(BaseModel):
+    """One sensor, as its capture process last said."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    name: Name
+    state: Name
+    """A `LiveStateName`; `streaming` where the process does not say."""
+    reason: Name = ""
+    """Why it does not stream: the first 200 characters."""
+    identity: Name = ""
+    """Serial number, USB port or address."""
+    figures: SensorFigures = SensorFigures()
+
+
 class Status(BaseAnswer):
     """Published on topic `status` at every heartbeat.
 
@@ -45,6 +64,7 @@ class Status(BaseAnswer):
     """Of the last outcome."""
     hub_version: Name
     sensors: Names
+    """Those that a press may ask: they stream, or are about to."""
     workers: Names
     pressed: Number
     """Presses that wait for their frame."""
@@ -75,6 +95,9 @@ class Status(BaseAnswer):
     files_read: Number = 0
     """While it is `rebuilding`."""
     files_to_read: Number = 0
+    sensor_states: Annotated[tuple[SensorStatus, ...], Field(max_length=MAX_SENSOR_STATES),
+                             FailFast()] = ()
+    """All sensors, the first of them where there are more."""
 
     @property
     def ready(self) -> bool:

@@ -11,4 +11,6 @@ class Topic(StrEnum):
     STATUS = "status"
     """`Status`, at every heartbeat."""
     PREVIEW = "preview"
-    """`Preview`, ten a second at most while somebody subscribes."""
+    """`Preview`, up to thirty a second of each sensor while somebody subscribes."""
+    HINTS = "hints"
+    """`Hints`, about ten a second of each sensor while somebody subscribes."""

@@ -56,7 +56,7 @@ def encode(packet: Packet) -> list[Buffer]:
     LocalProtocolError where the arrays are not those that the header describes, or it is too long.
     """
     message, arrays = packet.message, packet.arrays
-    header = message.model_dump_json().encode()
+    header = message.model_dump_json(exclude=_left_out(message)).encode()
     if len(header) > MAX_HEADER_BYTES:
         raise LocalProtocolError(
             f"{message.kind}: header has {len(header)} bytes, at most {MAX_HEADER_BYTES} allowed")
@@ -72,6 +72,12 @@ def encode(packet: Packet) -> list[Buffer]:
                 f"{message.kind}: {info.name} is {array.dtype} {list(array.shape)}, "
                 f"the header says {info.dtype} {list(info.shape)}")
     return [header, *(_raw(arrays[info.name].astype(info.dtype, copy=False)) for info in infos)]
+
+
+def _left_out(message: BaseMessage) -> set[str]:
+    """Give the fields that the first release of this version did not have and need not have."""
+    fields = type(message).model_fields
+    return {name for name in message.newer if getattr(message, name) == fields[name].default}
 
 
 def _raw(array: NDArray[Any]) -> memoryview:

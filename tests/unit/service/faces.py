@@ -1,5 +1,6 @@
 """A small made-up face and frame."""
 
+import cv2
 import numpy as np
 
 from denseface.capture.frame import RgbdFrame
@@ -13,6 +14,12 @@ def small_frame(seed: int = 0) -> RgbdFrame:
     calib = calibration(depth=camera(8, 6, 10.0), color=camera(10, 7, 10.0))
     return frame(rng.integers(0, 2000, (6, 8), np.uint16),
                  rng.integers(0, 256, (7, 10, 3), np.uint8), calib)
+
+
+def jpeg(width: int, height: int, seed: int = 0, quality: int = 85) -> bytes:
+    """A picture of noise as a JPEG."""
+    image = np.random.default_rng(seed).integers(0, 256, (height, width, 3), np.uint8)
+    return cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
 
 
 def small_face(rows: int = 12, columns: int = 9, step: float = 2.0) -> Face:

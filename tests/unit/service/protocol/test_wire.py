@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import Phase, example, find, given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from denseface.recon.settings import Preset, Settings
 from denseface.service.errors import LocalProtocolError, ProtocolError, RemoteProtocolError
 from denseface.service.protocol import messages, wire
+from denseface.service.protocol.hint import Hint
 from denseface.service.protocol.message_base import DeadLetter
 from denseface.service.protocol.payload import (
     MAX_ARRAY_BYTES,
@@ -19,14 +21,22 @@ from denseface.service.protocol.payload import (
     FrameHeader,
     PreviewHeader,
 )
-from denseface.service.protocol.status import Restarts
+from denseface.service.protocol.sensor_messages import (
+    MAX_BURST,
+    Gate,
+    LiveStateName,
+    SensorFigures,
+)
+from denseface.service.protocol.status import Restarts, SensorStatus
 from denseface.service.protocol.wire import Packet, decode_from_hub, decode_to_hub, encode
-from tests.unit.service.faces import small_face, small_frame
+from tests.unit.service.faces import jpeg, small_face, small_frame
 
 FRAME, FRAME_ARRAYS = FrameHeader.of(small_frame())
 FACE, FACE_ARRAYS = FaceHeader.of(small_face())
 PREVIEW = PreviewHeader(width=4, height=3, timestamp_us=5)
 PREVIEW_ARRAYS = {"image": np.arange(36, dtype=np.uint8).reshape(3, 4, 3)}
+JPEG, JPEG_ARRAYS = PreviewHeader.of_jpeg(jpeg(4, 3), 5, Hint(
+    timestamp_us=4, codes=("too_far",), text="come closer", measures={"distance_mm": 1400.0}))
 
 ids = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", fullmatch=True)
 numbers = st.integers(0, 2**63 - 1)
@@ -35,6 +45,14 @@ peer_names = st.from_regex(r"[!-~]{1,100}", fullmatch=True)
 hashes = st.from_regex(r"[0-9a-f]{1,64}", fullmatch=True)
 digests = st.from_regex(r"[0-9a-f]{64}", fullmatch=True)
 times = st.datetimes(datetime(1, 1, 2), datetime(9999, 12, 30), timezones=st.just(UTC))
+codes = st.from_regex(r"[a-z][a-z0-9_]{0,15}", fullmatch=True)
+hints = st.builds(
+    Hint, timestamp_us=st.integers(-(2**63), 2**63 - 1), codes=st.lists(codes, max_size=8),
+    text=st.text(st.characters(codec="ascii", min_codepoint=32), max_size=50),
+    measures=st.dictionaries(codes, st.floats(-1e6, 1e6).map(lambda one: round(one, 3)),
+                             max_size=5))
+GATED = {"gate": st.sampled_from(Gate.__args__), "gate_timeout": st.floats(0, 120),
+         "frames": st.integers(1, MAX_BURST)}
 DIGEST = "0f" * 32
 
 
@@ -44,6 +62,7 @@ def plain(kind, **fields):
 
 to_hub = st.one_of(
     plain(messages.Press, request=numbers, capture_id=ids),
+    plain(messages.Press, request=numbers, capture_id=ids, sensor=peer_names, **GATED),
     plain(messages.GetFace, request=numbers, capture_id=ids, wait_s=st.floats(0, 3600)),
     plain(messages.GetNext, request=numbers, after=numbers),
     plain(messages.FindStart, request=numbers, last=st.integers(1, 2**31 - 1)),
@@ -56,10 +75,16 @@ to_hub = st.one_of(
     plain(messages.Purge, request=numbers, before=times),
     plain(messages.Purge, request=numbers, everything=st.just(True)),
     plain(messages.SensorReady, name=peer_names, source=texts),
+    plain(messages.SensorState, name=peer_names, reason=texts, identity=texts,
+          state=st.sampled_from(LiveStateName.__args__),
+          figures=st.builds(SensorFigures, frames=numbers, skew_us=numbers)),
+    plain(messages.QualityHint, hint=hints),
     plain(messages.WorkerReady, name=peer_names, credit=numbers),
     plain(messages.Heartbeat, holding=st.none() | ids),
     st.just(Packet(messages.Goodbye())),
     plain(messages.FrameFailed, capture_id=ids, message=texts),
+    plain(messages.FrameFailed, capture_id=ids, message=texts, reason=st.just("quality"),
+          hint=hints),
     plain(messages.JobFailed, capture_id=ids, settings_hash=hashes, frame_sha256=digests,
           error=texts, message=texts, final=st.booleans()),
     ids.map(lambda name: Packet(messages.Frame(capture_id=name, frame=FRAME), FRAME_ARRAYS)),
@@ -67,11 +92,12 @@ to_hub = st.one_of(
         messages.Result(capture_id=name, settings_hash="0f", frame_sha256=DIGEST, face=FACE),
         FACE_ARRAYS)),
     st.just(Packet(messages.PreviewFrame(preview=PREVIEW), PREVIEW_ARRAYS)),
+    st.just(Packet(messages.PreviewFrame(preview=JPEG), JPEG_ARRAYS)),
 )
 from_hub = st.one_of(
     plain(messages.PressAccepted, request=numbers, capture_id=ids),
     plain(messages.PressRefused, request=numbers, capture_id=ids, message=texts,
-          reason=st.sampled_from(messages.PressReason.__args__)),
+          reason=st.sampled_from(messages.PressReason.__args__), hint=st.none() | hints),
     plain(messages.CapturePending, request=numbers, capture_id=ids),
     plain(messages.CaptureUnknown, request=numbers, capture_id=ids),
     plain(messages.RequestFailed, request=numbers, message=texts),
@@ -97,13 +123,20 @@ from_hub = st.one_of(
               Restarts, exited=numbers, hung=numbers), max_size=3),
           free_bytes=st.none() | numbers, kept_bytes=st.none() | numbers, log_lines_lost=numbers,
           state=st.sampled_from(["serving", "rebuilding"]), files_read=numbers,
-          files_to_read=numbers),
+          files_to_read=numbers, sensor_states=st.lists(st.builds(
+              SensorStatus, name=texts, state=texts, reason=texts, identity=texts,
+              figures=st.builds(SensorFigures, drops=numbers)), max_size=3).map(tuple)),
     numbers.map(lambda number: Packet(messages.Preview(
         epoch="0f", sequence=number, preview=PREVIEW), PREVIEW_ARRAYS)),
+    numbers.map(lambda number: Packet(messages.Preview(
+        epoch="0f", sequence=number, preview=JPEG), JPEG_ARRAYS)),
+    plain(messages.Hints, sensor=peer_names, hint=hints),
     st.just(Packet(messages.TakePreview())),
+    plain(messages.TakeHints, seconds=st.floats(0.1, 3600)),
     st.just(Packet(messages.Announce())),
     plain(messages.Denied, message=texts),
     plain(messages.Take, capture_id=ids),
+    plain(messages.Take, capture_id=ids, **GATED),
     plain(messages.FrameAccepted, capture_id=ids),
     plain(messages.FrameRefused, capture_id=ids, message=texts),
     st.builds(lambda name, preset: Packet(messages.Job(
@@ -295,6 +328,37 @@ def test_a_face_that_is_large_only_in_memory_is_refused_by_its_header(changes, w
     del tree["face"]["arrays"]
     with pytest.raises(RemoteProtocolError, match=words):
         decode_to_hub([json.dumps(tree).encode(), *WIRES[2][1:]])
+
+
+def test_what_a_client_of_an_older_release_says_is_taken():
+    press = decode_to_hub([asked("press", capture_id="a")]).message
+    assert (press.sensor, press.gate, press.frames) == (None, "off", 1)
+    failed = decode_to_hub([json.dumps({
+        "kind": "frame_failed", "version": 2, "capture_id": "a", "message": "m"}).encode()]).message
+    assert (failed.reason, failed.hint) == ("sensor", None)
+
+
+@pytest.mark.parametrize(("message", "written"), [
+    (messages.Press(request=1, capture_id="a"),
+     {"version": 2, "kind": "press", "request": 1, "capture_id": "a"}),
+    (messages.Take(capture_id="a"), {"version": 2, "kind": "take", "capture_id": "a"}),
+    (messages.PressRefused(request=1, capture_id="a", reason="disk", message="m"),
+     {"version": 2, "kind": "press_refused", "request": 1, "capture_id": "a", "reason": "disk",
+      "message": "m"}),
+])
+def test_what_says_nothing_new_is_written_as_an_older_release_reads_it(message, written):
+    (header,) = encode(Packet(message))
+    assert json.loads(header) == written
+
+
+def test_a_message_of_hints_stays_below_a_kilobyte():
+    longest = messages.Hints(sensor="s" * 100, hint=Hint(
+        timestamp_us=-(2**63), codes=tuple(f"code_{i}" for i in range(8)), text="w" * 200,
+        measures={f"measure_{i}_mm": -1234.567 for i in range(18)}))
+    assert 900 < len(encode(Packet(longest))[0]) < 1000
+    with pytest.raises(ValidationError, match="at most 800 allowed"):
+        Hint(timestamp_us=0, text="\N{SNOWMAN}" * 200, measures={
+            f"measure_{i}_mm": -1234.567 for i in range(20)})
 
 
 def test_a_status_of_another_release_can_be_read():
