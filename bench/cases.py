@@ -90,8 +90,7 @@ class Case:
 
 def with_preset(preset: Preset) -> Settings:
     """Give a preset that works on the very seeds and grid of `Case`, whatever its own."""
-    same = Settings()
-    return Settings.of(preset, neighbors=Neighbors.LATTICE, depth_offset_mm=same.depth_offset_mm)
+    return Settings.of(preset, neighbors=Neighbors.LATTICE)
 
 
 def recorded(frames: int) -> Iterator[Case]:

@@ -118,7 +118,7 @@ def _faces(
             continue
         sampled, _ = sample_colors(shot.frame, register(shot.frame), face.dense.points)
         compared = Compared.of(face, TrueColors.of(scene, KINECT_CALIBRATED))
-        yield name, shot.frame.color, face, sampled, compared
+        yield name, shot.frame.rgb, face, sampled, compared
 
 
 def _print_errors(count: int, heads: list[str]) -> None:

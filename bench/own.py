@@ -25,7 +25,7 @@ def milliseconds(call: Callable[[], object]) -> float:
 def after_segmentation(case: Case, known: Settings) -> Callable[[], object]:
     """Give what `reconstruct` does with the seeds of a frame, ready to be called."""
     frame = case.frame
-    registered = register(frame, known.depth_offset_mm)
+    registered = register(frame)
     seeds = segment_face(registered, case.face.report.face_box, frame.calibration.color.fx)
 
     sampler = partial(sample_colors, frame, registered)

@@ -13,7 +13,6 @@ from bench.accuracy import RECORDINGS
 from bench.heads import CHOOSING, REPORTING
 from bench.recall_scenes import View, empty_views, face_views, taken
 from denseface.capture import RgbdFrame, open_source
-from denseface.recon import Settings
 from denseface.recon.detection import Detection, detect_face
 from denseface.recon.errors import ReconstructionError
 from denseface.recon.registration import register
@@ -30,10 +29,10 @@ _COLUMNS = ("faces", "found", "of it near the middle", "something else", "nothin
 
 def _detected(frame: RgbdFrame) -> tuple[Detection | None, float]:
     """Detect as the pipeline does; and say how long that took, ms."""
-    registered = register(frame, Settings().depth_offset_mm, _SPARSE, _SPARSE)
+    registered = register(frame, _SPARSE, _SPARSE)
     start = time.perf_counter()
     try:
-        found = detect_face(frame.color, registered, frame.calibration.color.fx)
+        found = detect_face(frame.rgb, registered, frame.calibration.color.fx)
     except ReconstructionError:
         found = None
     return found, (time.perf_counter() - start) * 1e3

@@ -135,7 +135,7 @@ def _known(heads: tuple[str, ...]) -> list[str]:
 def _with_balls(frame: RgbdFrame, view: View) -> RgbdFrame:
     """Hang balls before the room, in both images, lit from above; no shadows, no noise on them."""
     rng = np.random.default_rng([6, view.seed])
-    depth, color = frame.depth.copy(), frame.color.copy()
+    depth, color = frame.depth.copy(), frame.rgb.copy()
     cameras = frame.calibration
     for _ in range(view.balls):
         middle = rng.uniform((-300, -200, 600), (300, 200, 1500))
@@ -164,7 +164,7 @@ def _mirrored(frame: RgbdFrame) -> RgbdFrame:
         "translation_mm": (-x, y, z), "rotation": tuple(map(tuple, turned.tolist()))})
     return replace(
         frame, depth=np.ascontiguousarray(frame.depth[:, ::-1]),
-        color=np.ascontiguousarray(frame.color[:, ::-1]),
+        color=np.ascontiguousarray(frame.rgb[:, ::-1]),
         calibration=known.model_copy(update={
             "depth": seen(known.depth), "color": seen(known.color), "depth_to_color": way}))
 

@@ -44,7 +44,7 @@ _FAST_RUNS = 15
 
 def _frame_times(case: Case, runs: int) -> None:
     """Whole frames and OpenCV's default detection by turns."""
-    gray = cv2.cvtColor(case.frame.color, cv2.COLOR_RGB2GRAY)
+    gray = cv2.cvtColor(case.frame.rgb, cv2.COLOR_RGB2GRAY)
     folder = Path(cv2.__file__).parent / "data"
     cascade = cv2.CascadeClassifier(str(folder / "haarcascade_frontalface_default.xml"))
     laps: dict[str, list[float]] = {}
@@ -87,8 +87,7 @@ def _fit_times(case: Case, pcl: Pcl | None) -> None:
     """One fit and its evaluation, and the whole of ours, against others, by turns."""
     xs, ys = _grid(case)
     seeds, spacing = case.seeds, case.spacing
-    sampler = partial(sample_colors, case.frame,
-                        register(case.frame, case.face.report.settings.depth_offset_mm))
+    sampler = partial(sample_colors, case.frame, register(case.frame))
     calls: dict[str, Callable[[], float]] = {
         **{f"ours, `{preset.value}`: its fit {_of_fit(preset)} and evaluation": partial(
             milliseconds, partial(_fitted, seeds, spacing, preset, xs, ys))

@@ -258,7 +258,17 @@ class Calibration(_Model):
 
     depth: CameraModel
     color: CameraModel
+    """The depth camera again where a sensor has no other."""
     depth_to_color: DepthToColor = DepthToColor()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _depth_alone(cls, given: Any) -> Any:
+        """Take a calibration without a colour camera for that of a sensor that has none."""
+        if isinstance(given, dict) and "depth" in given and not given.keys() & {
+                "color", "depth_to_color"}:
+            return given | {"color": given["depth"]}
+        return given
 
     @classmethod
     def from_json(cls, text: str | bytes, *, name: str = "calibration") -> Self:

@@ -1,6 +1,7 @@
-"""A synchronized depth + colour frame with its calibration."""
+"""A synchronized depth + colour frame, what its numbers mean and where it comes from."""
 
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from typing import Any, Self
 
 import numpy as np
@@ -9,22 +10,108 @@ from numpy.typing import NDArray
 from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
 from denseface.capture.errors import FrameError
 
-__all__ = ["RgbdFrame"]
+__all__ = ["DepthMeaning", "DepthRounding", "FrameOrigin", "RgbdFrame"]
+
+_UNITS_UM = (1, 100_000)
+"""Least and most micrometres of one count of a depth."""
+_MOST_FUSED = 64
+"""Frames that one frame is made of, at most."""
+
+
+class DepthRounding(StrEnum):
+    """How a measured depth became a whole number of units."""
+
+    CUT = "cut"
+    """The fraction was cut off, as PrimeSense's drivers do: half a unit is missing on average."""
+    ROUND = "round"
+    """To the nearest."""
+    NONE = "none"
+    """Not at all: the unit is far below the sensor's resolution, or the depth is an average."""
+
+
+@dataclass(frozen=True)
+class DepthMeaning:
+    """What the numbers of a depth image mean.
+
+    Attributes
+    ----------
+    unit_um : micrometres of one count
+    rounding : how a depth became a whole number of counts
+    max_mm : the farthest reading; a larger number is none. None where any may be one.
+
+    Raises
+    ------
+    FrameError
+        Where a value is out of its range.
+    """
+
+    unit_um: int = 1000
+    rounding: DepthRounding = DepthRounding.ROUND
+    max_mm: int | None = None
+
+    def __post_init__(self) -> None:
+        least, most = _UNITS_UM
+        if not least <= self.unit_um <= most:
+            raise FrameError(f"depth_unit_um must be {least} to {most}, found {self.unit_um}")
+        if self.max_mm is not None and self.max_mm < 1:
+            raise FrameError(f"max_mm must be positive, found {self.max_mm}")
+
+    @property
+    def offset_mm(self) -> float:
+        """What is missing of each depth on average, mm."""
+        return self.unit_um / 2000 if self.rounding is DepthRounding.CUT else 0.0
+
+    @property
+    def max_count(self) -> int:
+        """The largest number that is a reading."""
+        return 65535 if self.max_mm is None else min(self.max_mm * 1000 // self.unit_um, 65535)
+
+
+@dataclass(frozen=True)
+class FrameOrigin:
+    """Where a frame comes from, and how that is known.
+
+    Attributes
+    ----------
+    sensor : its identity: serial number, USB port or URI; empty where not known
+    captured_at : ISO 8601, UTC; empty where not known
+    exposed_after_press_ms : from the press's arrival to the estimated exposure of the earlier of
+        both images; None where there was no press, or the source is no live one
+    exposure_known_by : what that estimate rests on; `stamps` of the sensor, `arrival` at the host
+    skew_known_by : what the skew rests on: `stamps`, `arrival` or `record order`
+    fused : of how many frames the depth is the average
+    notes : doubts and corrections, in plain English; they become warnings of the report
+    """
+
+    sensor: str = ""
+    captured_at: str = ""
+    exposed_after_press_ms: float | None = None
+    exposure_known_by: str = ""
+    skew_known_by: str = ""
+    fused: int = 1
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.fused <= _MOST_FUSED:
+            raise FrameError(f"fused must be 1 to {_MOST_FUSED}, found {self.fused}")
 
 
 @dataclass(frozen=True, eq=False)
 class RgbdFrame:
-    """One synchronized depth + colour pair with its calibration.
+    """One synchronized depth + colour pair with its calibration; never mirrored.
 
     Attributes
     ----------
-    depth : (H, W) uint16, mm along z, 0 = no reading, as the depth camera sees it
-        (in the colour camera's pixels where `registered`)
-    color : (H', W', 3) uint8, RGB
-    depth_timestamp_us, color_timestamp_us : sensor clock, microseconds
+    depth : (H, W) uint16, counts of `depth_meaning.unit_um` along z (millimetres unless it says
+        otherwise), 0 = no reading, as the depth camera sees it (in the colour camera's pixels
+        where `registered`)
+    color : (H', W', 3) uint8, RGB; None where the sensor has no colour camera
+    depth_timestamp_us, color_timestamp_us : sensor clock, microseconds; the same without colour
     calibration : both cameras and their relative pose
     registered : depth is already in the colour camera's pixels
     calibration_origin : which calibration this is, for the report
+    depth_meaning : what the depth's numbers mean
+    origin : where the frame comes from
 
     Raises
     ------
@@ -33,24 +120,45 @@ class RgbdFrame:
     """
 
     depth: NDArray[np.uint16]
-    color: NDArray[np.uint8]
+    color: NDArray[np.uint8] | None
     depth_timestamp_us: int
     color_timestamp_us: int
     calibration: Calibration
     registered: bool = False
     calibration_origin: str = field(default="unspecified", kw_only=True)
+    depth_meaning: DepthMeaning = field(default=DepthMeaning(), kw_only=True)
+    origin: FrameOrigin = field(default=FrameOrigin(), kw_only=True)
 
     def __post_init__(self) -> None:
         _check("depth", self.depth, np.uint16, 2)
-        _check("color", self.color, np.uint8, 3)
-        if self.color.shape[2] != 3:
-            raise FrameError(f"color must have 3 channels (RGB), found shape {self.color.shape}")
-        for name, image, camera in (("depth", self.depth, self.depth_camera),
-                                    ("color", self.color, self.calibration.color)):
+        images: list[tuple[str, NDArray[Any], CameraModel]] = [
+            ("depth", self.depth, self.depth_camera)]
+        if self.color is not None:
+            _check("color", self.color, np.uint8, 3)
+            if self.color.shape[2] != 3:
+                raise FrameError(
+                    f"color must have 3 channels (RGB), found shape {self.color.shape}")
+            images.append(("color", self.color, self.calibration.color))
+        elif self.registered:
+            raise FrameError("registered, but there is no color to be registered to")
+        for name, image, camera in images:
             height, width = image.shape[:2]
             if (width, height) != (camera.width, camera.height):
                 raise FrameError(f"{name} is {width}x{height}, its calibration says "
                                  f"{camera.width}x{camera.height}")
+
+    @property
+    def rgb(self) -> NDArray[np.uint8]:
+        """`color`, where there is one.
+
+        Raises
+        ------
+        FrameError
+            The sensor has no colour camera.
+        """
+        if self.color is None:
+            raise FrameError("the frame has no color")
+        return self.color
 
     @property
     def depth_camera(self) -> CameraModel:
@@ -70,6 +178,10 @@ class RgbdFrame:
     def with_calibration(self, calibration: Calibration, origin: str) -> Self:
         """Give the same images under another calibration."""
         return replace(self, calibration=calibration, calibration_origin=origin)
+
+    def with_note(self, *notes: str) -> Self:
+        """Give the same frame with more notes of its origin."""
+        return replace(self, origin=replace(self.origin, notes=(*self.origin.notes, *notes)))
 
 
 def _check(name: str, array: NDArray[Any], dtype: type[np.generic], ndim: int) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from denseface.capture.calibration import MAX_SIDE, Calibration, ChosenCalibration
 from denseface.capture.errors import FrameError
-from denseface.capture.frame import RgbdFrame
+from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
 from denseface.capture.source import Source
 from denseface.capture.zipped_arrays import ArrayKind, read_arrays
 from denseface.files import replacing
@@ -24,7 +24,16 @@ _KINDS = {
     "color_timestamp_us": ArrayKind("int64"),
     "calibration": ArrayKind("str"),
     "registered": ArrayKind("bool"),
+    "depth_rounding": ArrayKind("str"),
+    "depth_unit_um": ArrayKind("int64"),
+    "sensor": ArrayKind("str"),
+    "captured_at": ArrayKind("str"),
 }
+_COLOR = frozenset({"color", "color_timestamp_us"})
+"""Keys that are absent, both, where the sensor has no colour camera."""
+_OPTIONAL = frozenset(_KINDS) - {"depth", "depth_timestamp_us", "calibration"}
+_MAX_LINE = 256
+"""Characters of `sensor` and of `captured_at`."""
 
 
 class NpzSource(Source):
@@ -59,14 +68,23 @@ def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> Rgb
     CalibrationError
         The file's own calibration is used and is not one.
     """
-    optional = ("registered",) if chosen is None else ("registered", "calibration")
+    optional = _OPTIONAL if chosen is None else _OPTIONAL | {"calibration"}
     arrays = read_arrays(path, _KINDS, optional)
+    if len(_COLOR & arrays.keys()) == 1:
+        (missing,) = _COLOR - arrays.keys()
+        raise FrameError(f"{path}: key {missing!r} is missing; color and color_timestamp_us: "
+                         "expected both or neither")
     calibration, origin = chosen or (_own_calibration(path, arrays["calibration"]), "npz file")
+    stamp = int(arrays["depth_timestamp_us"])
     try:
         return RgbdFrame(
-            arrays["depth"], arrays["color"],
-            int(arrays["depth_timestamp_us"]), int(arrays["color_timestamp_us"]),
+            arrays["depth"], arrays.get("color"), stamp,
+            int(arrays.get("color_timestamp_us", stamp)),
             calibration, bool(arrays.get("registered", False)), calibration_origin=origin,
+            depth_meaning=DepthMeaning(
+                int(arrays.get("depth_unit_um", 1000)),
+                _rounding(_text(path, arrays, "depth_rounding", DepthRounding.ROUND))),
+            origin=FrameOrigin(_text(path, arrays, "sensor"), _text(path, arrays, "captured_at")),
         )
     except FrameError as error:
         raise FrameError(f"{path}: {error} (calibration: {origin})") from error
@@ -74,16 +92,42 @@ def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> Rgb
 
 def save_frame(path: str | Path, frame: RgbdFrame) -> None:
     """Write a frame file: whole, or not at all; OSError as from the system."""
+    arrays: dict[str, Any] = {
+        "depth": frame.depth,
+        "depth_timestamp_us": np.int64(frame.depth_timestamp_us),
+        "calibration": np.array(frame.calibration.to_json()),
+        "registered": np.bool_(frame.registered),
+        "depth_rounding": np.array(str(frame.depth_meaning.rounding)),
+        "depth_unit_um": np.int64(frame.depth_meaning.unit_um),
+    }
+    if frame.color is not None:
+        arrays |= {"color": frame.color, "color_timestamp_us": np.int64(frame.color_timestamp_us)}
+    for name, text in (("sensor", frame.origin.sensor), ("captured_at", frame.origin.captured_at)):
+        if text:
+            arrays[name] = np.array(text[:_MAX_LINE])
     with replacing(Path(path)) as file:
-        np.savez_compressed(
-            file, allow_pickle=False, depth=frame.depth, color=frame.color,
-            depth_timestamp_us=np.int64(frame.depth_timestamp_us),
-            color_timestamp_us=np.int64(frame.color_timestamp_us),
-            calibration=np.array(frame.calibration.to_json()),
-            registered=np.bool_(frame.registered),
-        )
+        np.savez_compressed(file, allow_pickle=False, **arrays)
         file.flush()
         os.fsync(file.fileno())
+
+
+def _rounding(text: str) -> DepthRounding:
+    if text not in set(DepthRounding):
+        raise FrameError(f"depth_rounding must be {', '.join(DepthRounding)}, found {text[:40]!r}")
+    return DepthRounding(text)
+
+
+def _text(path: str | Path, arrays: dict[str, NDArray[Any]], key: str, otherwise: str = "") -> str:
+    if key not in arrays:
+        return otherwise
+    try:
+        text = str(arrays[key])
+    except (ValueError, SystemError) as error:
+        raise FrameError(f"{path}: {key}: not Unicode text") from error
+    if len(text) > _MAX_LINE or not text.isprintable():
+        raise FrameError(f"{path}: {key}: expected one line of at most {_MAX_LINE} characters, "
+                         f"found {text[:40]!r}")
+    return text
 
 
 def _own_calibration(path: str | Path, array: NDArray[Any]) -> Calibration:

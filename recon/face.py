@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, FailFast, Field, field_validator
 
+from denseface.capture.frame import DepthRounding
 from denseface.recon.arrays import Bytes, Floats, Ints
 from denseface.recon.settings import Settings
 
@@ -136,6 +137,24 @@ class Report(_Model):
     """Which calibration was used."""
     skew_us: int
     """Depth time stamp less colour time stamp, microseconds."""
+    skew_known_by: str = ""
+    """What the skew rests on: `stamps` of the sensor, `arrival` or `record order`."""
+    sensor: str = ""
+    """Identity of the sensor: serial number, USB port or URI."""
+    captured_at: str = ""
+    """ISO 8601, UTC."""
+    exposed_after_press_ms: float | None = None
+    """From the press's arrival at the sensor to the estimated exposure; None without a press."""
+    exposure_known_by: str = ""
+    """What that estimate rests on: `stamps` of the sensor or `arrival` at the host."""
+    fused: int = 1
+    """Of how many frames the depth is the average."""
+    registered: bool = False
+    """Depth came in the colour camera's pixels."""
+    depth_unit_um: int = 1000
+    """Micrometres of one count of the frame's depth."""
+    depth_rounding: DepthRounding = DepthRounding.ROUND
+    """How a depth became a whole number of counts."""
     version: str
     warnings: Annotated[tuple[str, ...], FailFast()] = ()
 

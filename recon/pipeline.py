@@ -5,13 +5,15 @@ Unconstrained Environment".
 """
 
 import time
+from dataclasses import fields
 from functools import cache, partial
 from importlib.metadata import version
+from typing import Any
 
 import cv2
 import numpy as np
 
-from denseface.capture.frame import RgbdFrame
+from denseface.capture.frame import FrameOrigin, RgbdFrame
 from denseface.recon.arrays import Floats
 from denseface.recon.detail import add_detail
 from denseface.recon.detection import detect_face
@@ -89,11 +91,11 @@ def ends_the_same(error: Exception) -> bool:
 
 def _reconstruct(frame: RgbdFrame, settings: Settings, clock: "_Stopwatch") -> Face:
     focal_px = frame.calibration.color.fx
-    overview = _overview(frame, settings.depth_offset_mm)
+    overview = _overview(frame)
     clock.lap("overview")
-    found = detect_face(frame.color, overview, focal_px)
+    found = detect_face(frame.rgb, overview, focal_px)
     clock.lap("detection")
-    registered = register(frame, settings.depth_offset_mm, *box_window(overview, found.box))
+    registered = register(frame, *box_window(overview, found.box))
     clock.lap("registration")
     seeds = segment_face(registered, found.box, focal_px)
     _check_seeds(seeds.points)
@@ -112,9 +114,17 @@ def _reconstruct(frame: RgbdFrame, settings: Settings, clock: "_Stopwatch") -> F
         mean_spacing_mm=spacing, r0_mm=settings.r0_factor * spacing, noise_mm=surface.noise,
         timings_ms=clock.timings_ms(), settings=settings,
         calibration=frame.calibration_origin, skew_us=frame.skew_us,
+        registered=frame.registered, depth_unit_um=frame.depth_meaning.unit_um,
+        depth_rounding=frame.depth_meaning.rounding, **_of_origin(frame.origin),
         version=_version(), warnings=_warnings(frame, len(initial)),
     )
     return Face(initial, dense, report)
+
+
+def _of_origin(origin: FrameOrigin) -> dict[str, Any]:
+    """Give what the report repeats of a frame's origin; its notes are among the warnings."""
+    return {field.name: getattr(origin, field.name) for field in fields(origin)
+            if field.name != "notes"}
 
 
 def _check_seeds(points: Floats) -> None:
@@ -128,13 +138,13 @@ def _check_seeds(points: Floats) -> None:
                                    "across: is the calibration right?")
 
 
-def _overview(frame: RgbdFrame, depth_offset_mm: float) -> Registration:
+def _overview(frame: RgbdFrame) -> Registration:
     """Register every k-th pixel, or all where none of those has a depth."""
     sparse = slice(None, None, _SPARSE)
     try:
-        return register(frame, depth_offset_mm, sparse, sparse, colors=False)
+        return register(frame, sparse, sparse, colors=False)
     except NoDepthError:
-        return register(frame, depth_offset_mm, colors=False)
+        return register(frame, colors=False)
 
 
 @cache
@@ -169,7 +179,7 @@ def surface_of(
 
 
 def _warnings(frame: RgbdFrame, seeds: int) -> tuple[str, ...]:
-    found = []
+    found = list(frame.origin.notes)
     if seeds < _FEW_SEEDS:
         found.append(f"only {seeds} seeds: the face is far away or mostly unmeasured")
     if abs(frame.skew_us) > _MUCH_SKEW_US:

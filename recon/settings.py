@@ -8,6 +8,10 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 __all__ = ["Neighbors", "Preset", "Settings"]
 
 
+_FORMER = frozenset({"depth_offset_mm"})
+"""Settings that reports of older faces still name; how a depth was rounded is the frame's now."""
+
+
 class Neighbors(StrEnum):
     """How the neighbourhood of a seed is found."""
 
@@ -32,8 +36,7 @@ class Preset(StrEnum):
         preset.settings = settings or {}
         return preset
 
-    PAPER = "paper", {"r0_factor": 6.0, "smoothing": 0.1, "neighbors": Neighbors.RANDOMIZED,
-                      "depth_offset_mm": 0.0}
+    PAPER = "paper", {"r0_factor": 6.0, "smoothing": 0.1, "neighbors": Neighbors.RANDOMIZED}
     """The paper's R0 and the little smoothing that meets its reported error."""
     FAITHFUL = "faithful", {"r0_factor": 6.0, "smoothing": 3.0, "neighbors": Neighbors.RANDOMIZED}
     """The paper's R0 with the smoothing that a sensor's noise asks for."""
@@ -63,8 +66,6 @@ class Settings(BaseModel):
     added (`detail_factor`)."""
     neighbors: Neighbors = Neighbors.LATTICE
     """How the mean spacing is measured."""
-    depth_offset_mm: Annotated[float, Field(ge=-10, le=10)] = 0.5
-    """Added to each depth: drivers cut off the fraction of a millimetre, half of one on average."""
     ratio: Annotated[float, Field(ge=1, le=100)] = 10.0
     """Dense points for each seed."""
 
@@ -77,7 +78,7 @@ class Settings(BaseModel):
             preset = Preset(given.get("preset", Preset.BEST))
         except ValueError:
             return given  # the field's own validation says what is wrong
-        return preset.settings | given
+        return preset.settings | {k: v for k, v in given.items() if k not in _FORMER}
 
     @classmethod
     def of(cls, preset: Preset | str, **changes: Any) -> Self:

@@ -40,7 +40,7 @@ def warm() -> None:
     frame = _ball()
     registered = register(frame)
     with suppress(NoFaceError):  # not even OpenCV sees one
-        detect_face(frame.color, registered, _FOCAL_PX)
+        detect_face(frame.rgb, registered, _FOCAL_PX)
     judge_box(_BOX, registered, _FOCAL_PX)
     seeds = segment_face(registered, _BOX, _FOCAL_PX)
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)

@@ -4,7 +4,7 @@ from typing import Any
 
 from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.errors import FrameError, SensorError
-from denseface.capture.frame import RgbdFrame
+from denseface.capture.frame import DepthMeaning, DepthRounding, RgbdFrame
 from denseface.capture.openni2._calibration import derive_calibration
 from denseface.capture.openni2._library import close_handle, open_sources
 from denseface.capture.openni2._streams import COLOR, DEPTH, Image, Streams
@@ -26,6 +26,7 @@ class OpenNI2Source(Source):
         self.pairer: Pairer[Any, Any] = Pairer()
         self._chosen = chosen
         self._registered = False
+        self._unit_um = 1000
 
     def __del__(self) -> None:
         self.close()
@@ -44,6 +45,7 @@ class OpenNI2Source(Source):
         open_sources.add(self)
         try:
             streams = self._streams = Streams(device, self._name, live=self._live)
+            self._unit_um = streams.depth_unit_um
             if self._chosen is None:
                 calibration, derivation = derive_calibration(
                     streams.properties, streams.size(DEPTH), streams.size(COLOR))
@@ -62,7 +64,9 @@ class OpenNI2Source(Source):
             raise SensorError(f"{self._name}: is closed")
         calibration, origin = self._chosen
         try:
+            # PrimeSense's drivers, and the recordings made through them, cut the fraction off.
             return RgbdFrame(pair.depth, pair.color, pair.depth_us, pair.color_us, calibration,
-                             self._registered, calibration_origin=origin)
+                             self._registered, calibration_origin=origin,
+                             depth_meaning=DepthMeaning(self._unit_um, DepthRounding.CUT))
         except FrameError as error:
             raise FrameError(f"{self._name}: {error} (calibration: {origin})") from error

@@ -18,7 +18,7 @@ from denseface.capture.openni2._library import binding_errors, close_handle
 DEPTH, COLOR = "depth", "color"
 """Kinds of stream."""
 Image = tuple[int, NDArray[Any]]
-"""Stamp (sensor clock, microseconds) and pixels: (H, W) uint16 mm or (H, W, 3) uint8 RGB."""
+"""Stamp (sensor clock, microseconds) and pixels: (H, W) uint16 counts or (H, W, 3) uint8 RGB."""
 
 _FOV, _MIRRORING = 1, 7
 """OpenNI2's numbers of stream properties."""
@@ -84,6 +84,11 @@ class Streams:
     def handle(self, kind: str) -> Any:
         """Give the binding's own stream, for its recorder."""
         return self._streams[kind].handle
+
+    @property
+    def depth_unit_um(self) -> int:
+        """Micrometres of one count of a depth."""
+        return 100 if self._streams[DEPTH].pixel_format == _100_UM else 1000
 
     def size(self, kind: str) -> tuple[int, int]:
         """Give (width, height), pixels."""
@@ -186,8 +191,6 @@ class Streams:
                                          (stride, pixel, 1)).copy()
         if stream.kind == DEPTH:
             image = image.view(np.uint16)[..., 0]
-            if stream.pixel_format == _100_UM:
-                image = ((image.astype(np.uint32) + 5) // 10).astype(np.uint16)
         return np.ascontiguousarray(image[:, ::-1]) if stream.mirrored else image
 
 

@@ -53,13 +53,13 @@ class Projected(NamedTuple):
 
 @compiled
 def project(
-    depth: NDArray[np.uint16], offset_mm: float, grid: PixelGrid, camera: ColorCamera,
-    out: Projected, z_buffer: ZBuffer,
+    depth: NDArray[np.uint16], unit_and_offset_mm: tuple[float, float], grid: PixelGrid,
+    camera: ColorCamera, out: Projected, z_buffer: ZBuffer,
 ) -> tuple[int, int, int, int]:
     """Back-project each measured depth by Eq. (1) and project it into the colour image.
 
-    depth : (H, W), mm, the pixels of `grid`; 0 where nothing was measured
-    offset_mm : added to each depth
+    depth : (H, W), counts, the pixels of `grid`; 0 where nothing was measured
+    unit_and_offset_mm : mm of a count, and what is added to each depth
     out : written where there is a depth; pixels and z only before the colour camera
     z_buffer : lowered to the points inside the colour image
 
@@ -67,7 +67,7 @@ def project(
     """
     points, pixels, color_depth = out
     nearest, per_cell = z_buffer.nearest, np.float32(1) / np.float32(z_buffer.pitch)
-    offset = np.float32(offset_mm)
+    unit, offset = np.float32(unit_and_offset_mm[0]), np.float32(unit_and_offset_mm[1])
     columns = depth.shape[1]
     ray_x, ray_y = np.empty(columns), np.empty(columns)
     px, py, pz = (np.empty(columns, np.float32), np.empty(columns, np.float32),
@@ -82,7 +82,7 @@ def project(
         line = depth[i]
         # Vectorised over the whole row, measured or not: faster than a branch for each pixel.
         for j in range(columns):
-            z = np.float32(line[j]) + offset
+            z = np.float32(line[j]) * unit + offset
             px[j], py[j], pz[j] = np.float32(ray_x[j] * z), np.float32(ray_y[j] * z), z
             us[j], vs[j], zs[j] = _to_color_image(px[j], py[j], z, camera)
         for j in range(columns):

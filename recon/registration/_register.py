@@ -12,11 +12,12 @@ from denseface.recon.registration import _kernels as kernels
 from denseface.recon.registration._kernels import ColorCamera, PixelGrid, Projected
 
 _ALL = slice(None)
+_NO_LIMIT = int(np.iinfo(np.uint16).max)
+"""Largest number of a depth."""
 
 
 def register(
-    frame: RgbdFrame, depth_offset_mm: float = 0.0, rows: slice = _ALL, columns: slice = _ALL, *,
-    colors: bool = True,
+    frame: RgbdFrame, rows: slice = _ALL, columns: slice = _ALL, *, colors: bool = True,
 ) -> Registration:
     """Tie depth to colour through both cameras' intrinsics, distortion and relative pose.
 
@@ -25,8 +26,7 @@ def register(
 
     Parameters
     ----------
-    frame : depth, mm, and colour with their calibration
-    depth_offset_mm : added to each depth, mm
+    frame : depth, in its own unit, and colour with their calibration
     rows, columns : the part of the depth image to register, every pixel or every k-th
     colors : whether to sample them; zero otherwise
 
@@ -36,6 +36,9 @@ def register(
         Where no pixel has a depth.
     """
     depth = np.array(frame.depth[rows, columns])
+    meaning = frame.depth_meaning
+    if meaning.max_count < _NO_LIMIT:
+        depth[depth > meaning.max_count] = 0
     valid = depth > 0
     if not valid.any():
         raise NoDepthError("the depth image is empty: every pixel is 0 (no reading)")
@@ -47,17 +50,18 @@ def register(
     grid = PixelGrid(*_rays(frame.depth_camera), (first_row, first_column), (row_step, column_step))
     camera = _color_camera(frame)
     pitch = max(1.0, camera.intrinsics[0] / frame.depth_camera.fx * row_step)
-    cells = [int(np.ceil(side / pitch)) + 1 for side in frame.color.shape[:2]]
+    cells = [int(np.ceil(side / pitch)) + 1 for side in frame.rgb.shape[:2]]
     nearest = np.full(cells, NO_DEPTH_MM)
     z_buffer = ZBuffer(nearest, pitch)
-    top, bottom, left, right = kernels.project(depth, depth_offset_mm, grid, camera, out, z_buffer)
+    top, bottom, left, right = kernels.project(
+        depth, (meaning.unit_um / 1000, meaning.offset_mm), grid, camera, out, z_buffer)
     # Each point covers about its cell and the next: without this, a far surface would shine
     # through between the samples of a near one.
     if bottom >= 0:
         part = (slice(max(top - 1, 0), bottom + 2), slice(max(left - 1, 0), right + 2))
         nearest[part] = cv2.erode(nearest[part], np.ones((3, 3), np.uint8))
     visible = kernels.visible_mask(out.pixels, out.color_depth, z_buffer, camera.size)
-    sampled = (kernels.sample_image(out.pixels, visible, _read_only(frame.color)) if colors
+    sampled = (kernels.sample_image(out.pixels, visible, _read_only(frame.rgb)) if colors
                else np.zeros((*depth.shape, 3), np.uint8))
     return Registration(rows, columns, frame.depth_camera.fx, out.points, valid, out.pixels,
                         out.color_depth, visible, sampled, z_buffer)
@@ -84,7 +88,7 @@ def sample_colors(
                     np.empty((1, len(points)), np.float32))
     kernels.project_points(out, camera)
     visible = kernels.visible_mask(out.pixels, out.color_depth, registered.z_buffer, camera.size)
-    return kernels.sample_image(out.pixels, visible, _read_only(frame.color))[0], visible[0]
+    return kernels.sample_image(out.pixels, visible, _read_only(frame.rgb))[0], visible[0]
 
 
 def _rays(camera: CameraModel) -> tuple[Doubles, Doubles]:

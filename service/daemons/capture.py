@@ -195,7 +195,7 @@ class _Capture:
             raise error
 
     def _send_preview(self, frame: RgbdFrame) -> None:
-        image = _preview_image(frame.color)
+        image = _preview_image(frame.rgb)
         height, width, _ = image.shape
         header = PreviewHeader(
             width=width, height=height, timestamp_us=frame.color_timestamp_us)

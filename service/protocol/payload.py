@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, FailFast, Field, ValidationError, model_validator
 
-from denseface.capture import Calibration, CaptureError, RgbdFrame
+from denseface.capture import (
+    Calibration,
+    CaptureError,
+    DepthMeaning,
+    DepthRounding,
+    FrameOrigin,
+    RgbdFrame,
+)
 from denseface.recon.face import Face, PointCloud, Report
 from denseface.service.errors import (
     FrameTooLargeError,
@@ -42,6 +49,10 @@ Arrays = Mapping[str, NDArray[Any]]
 _Count = Annotated[int, Field(gt=0, le=2**24)]
 _Side = Annotated[int, Field(ge=1, le=MAX_PREVIEW_SIDE)]
 _Int64 = Annotated[int, Field(ge=-(2**63), lt=2**63)]
+_MAX_LINE, _MAX_NOTE = 256, 1000
+"""Characters of a frame's line of text and of a note."""
+_Line = Annotated[str, Field(max_length=_MAX_LINE)]
+_Note = Annotated[str, Field(max_length=_MAX_NOTE)]
 _DType = Literal["<u2", "|u1", "<f4", "<i2", "<f2"]
 _ITEM_BYTES = {"<u2": 2, "|u1": 1, "<f4": 4, "<i2": 2, "<f2": 2}
 """Size of one element of each dtype."""
@@ -99,29 +110,58 @@ class FrameHeader(_PayloadHeader):
     color_timestamp_us: _Int64
     registered: bool = False
     calibration_origin: Annotated[str, Field(max_length=4096)] = "unspecified"
+    has_color: bool = True
+    depth_unit_um: int = 1000
+    depth_rounding: Literal["cut", "round", "none"] = "round"
+    depth_max_mm: Annotated[int, Field(ge=1)] | None = None
+    sensor: _Line = ""
+    captured_at: _Line = ""
+    exposed_after_press_ms: float | None = None
+    exposure_known_by: _Line = ""
+    skew_known_by: _Line = ""
+    fused: Annotated[int, Field(ge=1, le=64)] = 1
+    notes: Annotated[tuple[_Note, ...], Field(max_length=32), FailFast()] = ()
 
     def layout(self) -> tuple[ArrayInfo, ...]:
-        """Return depth and colour, as large as the calibration says."""
+        """Return depth, and colour where there is one, as large as the calibration says."""
         color = self.calibration.color
         depth = color if self.registered else self.calibration.depth
-        return (_info("depth", "<u2", depth.height, depth.width),
-                _info("color", "|u1", color.height, color.width, 3))
+        images: tuple[ArrayInfo, ...] = (_info("depth", "<u2", depth.height, depth.width),)
+        if self.has_color:
+            images += (_info("color", "|u1", color.height, color.width, 3),)
+        return images
 
     @classmethod
     def of(cls, frame: RgbdFrame) -> tuple[Self, Arrays]:
         """Take a frame apart."""
+        meaning, origin = frame.depth_meaning, frame.origin
         header = cls(
             calibration=frame.calibration, depth_timestamp_us=frame.depth_timestamp_us,
             color_timestamp_us=frame.color_timestamp_us, registered=frame.registered,
-            calibration_origin=frame.calibration_origin)
-        return header, {"depth": frame.depth, "color": frame.color}
+            calibration_origin=frame.calibration_origin[:4096], has_color=frame.color is not None,
+            depth_unit_um=meaning.unit_um, depth_rounding=meaning.rounding.value,
+            depth_max_mm=meaning.max_mm, sensor=origin.sensor[:_MAX_LINE],
+            captured_at=origin.captured_at, fused=origin.fused,
+            exposed_after_press_ms=origin.exposed_after_press_ms,
+            exposure_known_by=origin.exposure_known_by, skew_known_by=origin.skew_known_by,
+            notes=tuple(note[:_MAX_NOTE] for note in origin.notes[:32]))
+        images: dict[str, NDArray[Any]] = {"depth": frame.depth}
+        if frame.color is not None:
+            images["color"] = frame.color
+        return header, images
 
     def join(self, arrays: Arrays) -> RgbdFrame:
         """Put the frame together again; RemoteProtocolError where they do not make one."""
         try:
             return RgbdFrame(
-                arrays["depth"], arrays["color"], self.depth_timestamp_us, self.color_timestamp_us,
-                self.calibration, self.registered, calibration_origin=self.calibration_origin)
+                arrays["depth"], arrays["color"] if self.has_color else None,
+                self.depth_timestamp_us, self.color_timestamp_us,
+                self.calibration, self.registered, calibration_origin=self.calibration_origin,
+                depth_meaning=DepthMeaning(
+                    self.depth_unit_um, DepthRounding(self.depth_rounding), self.depth_max_mm),
+                origin=FrameOrigin(
+                    self.sensor, self.captured_at, self.exposed_after_press_ms,
+                    self.exposure_known_by, self.skew_known_by, self.fused, self.notes))
         except (CaptureError, KeyError) as error:
             raise RemoteProtocolError(f"frame: {error}") from error
 

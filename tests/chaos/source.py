@@ -24,7 +24,7 @@ def write_small_frame(path: Path) -> None:
     with open_source(str(_RECORDING)) as source:
         frame = next(iter(source))
     depth = np.ascontiguousarray(frame.depth[::_DEPTH_SHRINK, ::_DEPTH_SHRINK])
-    color = cv2.resize(frame.color, None, fx=1 / _COLOR_SHRINK, fy=1 / _COLOR_SHRINK,
+    color = cv2.resize(frame.rgb, None, fx=1 / _COLOR_SHRINK, fy=1 / _COLOR_SHRINK,
                        interpolation=cv2.INTER_AREA)
     calibration = Calibration(
         depth=frame.calibration.depth.scaled(1 / _DEPTH_SHRINK),

@@ -19,7 +19,7 @@ def sheet(shown: Simulated) -> NDArray[np.uint8]:
     truth, labels = shown.truth, np.zeros((960, 1280), np.uint8)
     labels[truth.top:truth.top + truth.labels.shape[0],
            truth.left:truth.left + truth.labels.shape[1]] = truth.labels
-    return np.hstack([shown.frame.color, np.repeat(near[..., None], 3, axis=2).astype(np.uint8),
+    return np.hstack([shown.frame.rgb, np.repeat(near[..., None], 3, axis=2).astype(np.uint8),
                       _TINTS[labels[::2, ::2]]])
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from denseface.capture.frame import RgbdFrame
+from denseface.capture.frame import DepthMeaning, DepthRounding, RgbdFrame
 from tests.simulator.camera_views import color_view, depth_view
 from tests.simulator.heads import load_head
 from tests.simulator.holes import hole_share
@@ -59,6 +59,7 @@ def simulate(
                 color_timestamp_us=1_000_000 + index * _PERIOD_US,
                 calibration=sensor.calibration,
                 calibration_origin=f"simulated sensor {sensor.name}",
+                depth_meaning=DepthMeaning(rounding=DepthRounding.CUT),
             ),
             truth=truth,
         ))

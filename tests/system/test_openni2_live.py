@@ -38,7 +38,7 @@ def test_frames_are_bit_exact_and_not_mirrored(clip, shown):
     for frame in frames:
         depth, color = shown[number(frame.depth_timestamp_us) % 3]
         np.testing.assert_array_equal(frame.depth, depth)
-        np.testing.assert_array_equal(frame.color, color)
+        np.testing.assert_array_equal(frame.rgb, color)
         assert frame.skew_us == 0
         assert not frame.registered
     stamps = [frame.depth_timestamp_us for frame in frames]
@@ -59,7 +59,8 @@ def test_the_skew_stays_on_the_frame(clip, skew_us):
 def test_depth_in_tenths_of_a_millimetre(clip, shown):
     (frame,), _ = play("openni2:", environment(clip, depth_unit="100um"), max_frames=1)
     depth, _ = shown[number(frame.depth_timestamp_us) % 3]
-    np.testing.assert_array_equal(frame.depth, np.minimum(depth, 6554))
+    np.testing.assert_array_equal(frame.depth, np.minimum(depth * np.uint32(10), 65535))
+    assert frame.depth_meaning.unit_um == 100
 
 
 def test_an_argument_wins_over_what_the_sensor_says(clip, tmp_path):

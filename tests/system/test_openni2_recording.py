@@ -37,7 +37,7 @@ def test_what_is_recorded_is_played(recorded, shown):
     assert len(frames) == len(shown)
     for frame, (depth, color) in zip(frames, shown, strict=True):
         np.testing.assert_array_equal(frame.depth, depth)
-        assert np.abs(frame.color.astype(int) - color).mean() < _JPEG_LOSS
+        assert np.abs(frame.rgb.astype(int) - color).mean() < _JPEG_LOSS
         assert frame.skew_us == 0
         assert not frame.registered
     assert frames[0].calibration.depth.fx == pytest.approx(121 / 0.1052 / 2)
@@ -66,7 +66,7 @@ recorder.record(None, sys.argv[1], int(sys.argv[2]))
     assert all(node.properties["xnMirror"] == 1 for node in check_oni(oni)[0])
     for frame, (depth, color) in zip(play(oni)[0], shown, strict=True):
         np.testing.assert_array_equal(frame.depth, depth)
-        assert np.abs(frame.color.astype(int) - color).mean() < _JPEG_LOSS
+        assert np.abs(frame.rgb.astype(int) - color).mean() < _JPEG_LOSS
 
 
 def test_a_recorder_that_gets_too_few_frames_leaves_no_file(shown, tmp_path):

@@ -25,7 +25,7 @@ def sensor(tmp_path_factory):
     """Give an environment with a sensor that sees a face."""
     frames, _ = play(RECORDINGS / "frontal_700.oni")
     clip = tmp_path_factory.mktemp("clip") / "clip"
-    write_clip(clip, [(frame.depth, frame.color) for frame in frames])
+    write_clip(clip, [(frame.depth, frame.rgb) for frame in frames])
     return environment(clip)
 
 

@@ -37,4 +37,4 @@ def test_a_fixture_plays(name):
     for frame in frames:
         assert frame.depth.shape == (480, 640)
         assert np.count_nonzero(frame.depth) > 10_000
-        assert frame.color.std() > 10
+        assert frame.rgb.std() > 10

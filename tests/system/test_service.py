@@ -239,7 +239,7 @@ def clip(tmp_path_factory):
     """What the virtual sensor shows: a face."""
     frames, _ = play(RECORDINGS / "frontal_700.oni", max_frames=2)
     path = tmp_path_factory.mktemp("clip") / "clip"
-    write_clip(path, [(frame.depth, frame.color) for frame in frames])
+    write_clip(path, [(frame.depth, frame.rgb) for frame in frames])
     return path
 
 

@@ -153,7 +153,7 @@ def test_every_line_of_every_process_is_json(running):
 
 def test_a_live_sensor_shows_itself_between_presses(tmp_path):
     frames, _ = play(RECORDINGS / "frontal_700.oni", max_frames=2)
-    write_clip(tmp_path / "clip", [(frame.depth, frame.color) for frame in frames])
+    write_clip(tmp_path / "clip", [(frame.depth, frame.rgb) for frame in frames])
     with service("openni2:", tmp_path / "data", environment=environment(tmp_path / "clip")) as up, \
             up.client() as client:
         previews = client.previews(timeout=LIMIT_S)

@@ -41,7 +41,7 @@ def resampled(frame: RgbdFrame, factor: int | float) -> RgbdFrame:
         depth = np.ascontiguousarray(frame.depth[::every, ::every])
         camera = known.depth.scaled(factor).model_copy(update={
             "cx": known.depth.cx * factor, "cy": known.depth.cy * factor})
-    color = cv2.resize(frame.color, None, fx=factor, fy=factor,
+    color = cv2.resize(frame.rgb, None, fx=factor, fy=factor,
                        interpolation=cv2.INTER_AREA if factor < 1 else cv2.INTER_LINEAR
                        ).astype(np.uint8)
     calib = Calibration(depth=camera, color=known.color.scaled(factor),

@@ -86,7 +86,7 @@ def make(name: str, folder: Path) -> list[Path]:
     frames = [shot.frame for shot in shots]
     with tempfile.TemporaryDirectory() as name_of_scratch:
         scratch = Path(name_of_scratch)
-        write_clip(scratch / "clip", [(frame.depth, frame.color) for frame in frames])
+        write_clip(scratch / "clip", [(frame.depth, frame.rgb) for frame in frames])
         oni = scratch / f"{name}.oni"
         record_clip(scratch / "clip", oni, len(frames))
         _compare(name, frames, play(oni)[0])
@@ -109,7 +109,7 @@ def _compare(name: str, shown: list[RgbdFrame], played: list[RgbdFrame]) -> None
     if len(shown) != len(played):
         raise RuntimeError(f"{name}: {len(shown)} frames were shown, {len(played)} are played")
     for number, (a, b) in enumerate(zip(shown, played, strict=True)):
-        loss = float(np.abs(a.color.astype(np.int16) - b.color).mean())
+        loss = float(np.abs(a.rgb.astype(np.int16) - b.rgb).mean())
         wrong = np.flatnonzero(a.depth != b.depth)
         if (wrong < a.depth.size - _CODEC_TAIL).any() or loss > _JPEG_LOSS:
             raise RuntimeError(f"{name}: frame {number} is not played as it was shown "

@@ -10,7 +10,7 @@ from hypothesis.extra import numpy as arrays_of
 from denseface.capture import open_source
 from denseface.capture.calibration import Calibration
 from denseface.capture.errors import CalibrationError, FrameError, UnreadableSourceError
-from denseface.capture.frame import RgbdFrame
+from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
 from denseface.capture.npz import load_frame, save_frame
 from tests.unit import frames
 
@@ -53,6 +53,36 @@ def test_what_is_saved_is_loaded(tmp_path, depth, color, stamps, registered, pos
     assert loaded.calibration == calibration
     assert loaded.calibration_origin == "npz file"
     assert [p.name for p in tmp_path.iterdir()] == ["f.npz"]
+
+
+def test_what_a_depth_means_and_where_it_comes_from_is_kept(tmp_path):
+    meaning = DepthMeaning(100, DepthRounding.NONE)
+    frame = RgbdFrame(good()["depth"], None, 5, 5, CALIBRATION, depth_meaning=meaning,
+                      origin=FrameOrigin("B00366600000000A", "2026-11-29T12:00:00Z"))
+    save_frame(tmp_path / "f.npz", frame)
+    loaded = load_frame(tmp_path / "f.npz")
+    assert loaded.color is None
+    assert loaded.depth_meaning == meaning
+    assert loaded.origin == frame.origin
+
+
+def test_a_file_that_does_not_say_was_rounded(tmp_path):
+    loaded = load_frame(write(tmp_path / "f.npz"))
+    assert loaded.depth_meaning == DepthMeaning(1000, DepthRounding.ROUND)
+    assert loaded.depth_meaning.offset_mm == 0
+
+
+@pytest.mark.parametrize(("changes", "words"), [
+    ({"depth_rounding": np.array("up")}, "depth_rounding must be cut, round, none, found 'up'"),
+    ({"depth_unit_um": np.int64(0)}, "depth_unit_um must be 1 to 100000, found 0"),
+    ({"sensor": np.array("two\nlines")}, "sensor: expected one line"),
+    ({"color": None}, "expected both or neither"),
+    ({"color": None, "color_timestamp_us": None, "registered": np.bool_(True)},
+     "there is no color to be registered to"),
+])
+def test_a_wrong_meaning_is_named(tmp_path, changes, words):
+    with pytest.raises(FrameError, match=words):
+        load_frame(write(tmp_path / "f.npz", **changes))
 
 
 def complaint(path) -> str | None:

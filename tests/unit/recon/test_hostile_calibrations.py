@@ -128,7 +128,7 @@ def test_the_rays_of_a_large_camera_take_no_memory():
                   calibration(depth=one, color=camera(8, 8, 8.0)))
     tracemalloc.start()
     try:
-        register(large, 0.0, slice(None, None, 64), slice(None, None, 64))
+        register(large, slice(None, None, 64), slice(None, None, 64))
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()

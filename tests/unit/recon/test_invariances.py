@@ -101,7 +101,7 @@ def turned_frame(frame: RgbdFrame) -> RgbdFrame:
             rotation=tuple(tuple(row) for row in rotation.tolist()),
             translation_mm=tuple(R @ np.array(known.depth_to_color.translation_mm)))})
     return replace(frame, depth=np.ascontiguousarray(np.rot90(frame.depth, -1)),
-                   color=np.ascontiguousarray(np.rot90(frame.color, -1)), calibration=calibration)
+                   color=np.ascontiguousarray(np.rot90(frame.rgb, -1)), calibration=calibration)
 
 
 def test_a_sensor_on_its_side_registers_the_same_points(shot):

@@ -40,7 +40,7 @@ def apart(a, b):
 def registered(frame: RgbdFrame) -> RgbdFrame:
     """The frame as a driver gives it that registers depth to colour itself."""
     tied = register(frame)
-    depth = np.full(frame.color.shape[:2], 65535, np.uint16)
+    depth = np.full(frame.rgb.shape[:2], 65535, np.uint16)
     u, v = np.rint(tied.pixels[tied.visible]).astype(int).T
     np.minimum.at(depth, (v, u), np.rint(tied.color_depth[tied.visible]).astype(np.uint16))
     depth[depth == 65535] = 0
@@ -53,10 +53,10 @@ def shifted(frame: RgbdFrame, right: int, down: int) -> RgbdFrame:
         return camera.model_copy(update={"cx": camera.cx + right, "cy": camera.cy + down})
 
     known = frame.calibration
-    return RgbdFrame(
-        np.roll(frame.depth, (down, right), (0, 1)), np.roll(frame.color, (down, right), (0, 1)),
-        frame.depth_timestamp_us, frame.color_timestamp_us,
-        known.model_copy(update={"depth": moved(known.depth), "color": moved(known.color)}))
+    return replace(
+        frame, depth=np.roll(frame.depth, (down, right), (0, 1)),
+        color=np.roll(frame.rgb, (down, right), (0, 1)), calibration=known.model_copy(
+            update={"depth": moved(known.depth), "color": moved(known.color)}))
 
 
 def check_sound(face) -> None:
@@ -150,10 +150,10 @@ def test_the_same_frame_twice_is_the_same_face(face, shot):
 
 
 def test_the_frame_stays_as_it_was(shot):
-    depth, color = shot.frame.depth.copy(), shot.frame.color.copy()
+    depth, color = shot.frame.depth.copy(), shot.frame.rgb.copy()
     reconstruct(shot.frame)
     np.testing.assert_array_equal(shot.frame.depth, depth)
-    np.testing.assert_array_equal(shot.frame.color, color)
+    np.testing.assert_array_equal(shot.frame.rgb, color)
 
 
 @pytest.mark.parametrize(("factor", "error_mm"), [(0.5, 1.0), (2, 0.7)])
@@ -252,7 +252,7 @@ def emptied(shot):
 
 
 def faceless(shot):
-    return replace(shot.frame, color=np.full_like(shot.frame.color, 128))
+    return replace(shot.frame, color=np.full_like(shot.frame.rgb, 128))
 
 
 def unmeasured_face(shot):
@@ -308,7 +308,7 @@ def test_frames_of_half_and_twice_the_size(face, shot, size):
 
     known, factor = shot.frame.calibration, size[0] / 640
     one = reconstruct(replace(
-        shot.frame, depth=resized(shot.frame.depth), color=resized(shot.frame.color),
+        shot.frame, depth=resized(shot.frame.depth), color=resized(shot.frame.rgb),
         calibration=known.model_copy(update={
             "depth": known.depth.scaled(factor), "color": known.color.scaled(factor)})))
     check_sound(one)
@@ -321,7 +321,7 @@ def test_frames_of_half_and_twice_the_size(face, shot, size):
 def test_a_sharper_colour_camera_leaves_the_same_seeds(face, shot):
     """What is measured in depth pixels must not be counted in the colour camera's."""
     known = shot.frame.calibration
-    color = shot.frame.color.repeat(2, axis=0).repeat(2, axis=1)
+    color = shot.frame.rgb.repeat(2, axis=0).repeat(2, axis=1)
     sharp = reconstruct(replace(
         shot.frame, color=color,
         calibration=known.model_copy(update={"color": known.color.scaled(2)})))
@@ -343,10 +343,10 @@ def test_shading_brings_a_face_nearer_to_the_truth(light):
 def test_without_colour_the_face_is_that_of_depth(shot):
     """What is there to see is one grey, so that nothing but its border can be told from it."""
     box = reconstruct(shot.frame).report.face_box
-    grey = replace(shot.frame, color=np.full_like(shot.frame.color, 128))
+    grey = replace(shot.frame, color=np.full_like(shot.frame.rgb, 128))
     heights = []
     for frame, shading in ((grey, True), (shot.frame, False)):
-        tied = register(frame, 0.5)
+        tied = register(frame)
         seeds = segment_face(tied, box, frame.calibration.color.fx)
         spacing = mean_spacing(seeds.points, seeds.pixels, Neighbors.LATTICE)
         surface = surface_of(seeds.points, spacing, Settings(shading=shading),

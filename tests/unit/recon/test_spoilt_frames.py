@@ -53,7 +53,7 @@ def spoils(draw: st.DrawFn) -> Spoil:
     seed = draw(st.integers(0, 99))
 
     def changed(frame: RgbdFrame) -> RgbdFrame:
-        depth, color = frame.depth.copy(), frame.color.copy()
+        depth, color = frame.depth.copy(), frame.rgb.copy()
         rng = np.random.default_rng(seed)
         if kind == "set":
             depth[where] = value

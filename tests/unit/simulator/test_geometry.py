@@ -88,7 +88,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_does_not():
     first, again = (simulate(SCENE, seed=5, frames=2) for _ in range(2))
     for a, b in zip(first, again, strict=True):
         assert a.frame.depth.tobytes() == b.frame.depth.tobytes()
-        assert a.frame.color.tobytes() == b.frame.color.tobytes()
+        assert a.frame.rgb.tobytes() == b.frame.rgb.tobytes()
     assert (first[0].frame.depth != first[1].frame.depth).any()
     assert (first[0].frame.depth != simulate(SCENE, seed=6)[0].frame.depth).any()
 
@@ -102,5 +102,5 @@ def test_light_from_one_side_leaves_the_other_darker_and_the_depth_alone():
     calibration = shown.frame.calibration
     at = calibration.color.project(calibration.depth_to_color.apply(points))
     column, row = np.rint(at).astype(int).T
-    brightness = shown.frame.color[row, column].mean(axis=1)
+    brightness = shown.frame.rgb[row, column].mean(axis=1)
     assert brightness[points[:, 0] > 20].mean() > 1.5 * brightness[points[:, 0] < -20].mean()

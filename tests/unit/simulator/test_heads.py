@@ -52,7 +52,7 @@ def test_opencv_finds_exactly_one_face_at_a_metre(name, cascades):
 @HEADS
 def test_the_face_is_one_piece_of_a_faces_size(name, cascades):
     shown = simulate(Scene(people=(Person(head=name, distance_mm=700),)))[0]
-    check_one_face(shown.frame.color, 700, cascades)
+    check_one_face(shown.frame.rgb, 700, cascades)
     truth = shown.truth
     face = (truth.labels == Label.FACE).astype(np.uint8)
     _, _, stats, _ = cv2.connectedComponentsWithStats(face)

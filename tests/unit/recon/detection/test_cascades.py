@@ -12,7 +12,7 @@ EVERYWHERE = CenterMask(np.ones((1, 1), np.bool_), 640.0)
 
 @pytest.fixture(scope="module")
 def gray(shot):
-    return cv2.cvtColor(shot.frame.color, cv2.COLOR_RGB2GRAY)
+    return cv2.cvtColor(shot.frame.rgb, cv2.COLOR_RGB2GRAY)
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ def pair():
 
 
 def detected(frame):
-    return detect_face(frame.color, register(frame), frame.calibration.color.fx)
+    return detect_face(frame.rgb, register(frame), frame.calibration.color.fx)
 
 
 def seen_at(frame, millimetres):
@@ -129,7 +129,7 @@ def test_the_center_stays_when_the_images_are_turned(shot):
     turn = cv2.getRotationMatrix2D((x + w / 2, y + h / 2), -25, 1)
     size = one.width, one.height
     tipped = replace(
-        frame, color=cv2.warpAffine(frame.color, turn, size),
+        frame, color=cv2.warpAffine(frame.rgb, turn, size),
         depth=cv2.warpAffine(frame.depth, turn, size, flags=cv2.INTER_NEAREST))
     u, v, wide, high = detected(tipped).box
     assert abs(u + wide / 2 - (x + w / 2)) < 0.1 * w
@@ -185,7 +185,7 @@ def test_a_face_without_depth_is_named(shot):
 
 
 def test_no_face_is_named(shot):
-    frame = replace(shot.frame, color=np.full_like(shot.frame.color, 90))
+    frame = replace(shot.frame, color=np.full_like(shot.frame.rgb, 90))
     with pytest.raises(NoFaceError, match="no face found in the colour image"):
         detected(frame)
 
@@ -200,7 +200,7 @@ def test_depth_behind_the_colour_camera_is_named(shot):
 
 
 def test_a_face_in_a_dark_picture_is_found(shot):
-    dark = np.rint(shot.frame.color * 0.12).astype(np.uint8)
+    dark = np.rint(shot.frame.rgb * 0.12).astype(np.uint8)
     x, y, w, _ = detected(replace(shot.frame, color=dark)).box
     bright = detected(shot.frame).box
     assert np.hypot(x - bright[0], y - bright[1]) < 0.2 * w

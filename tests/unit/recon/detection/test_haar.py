@@ -15,7 +15,7 @@ EVERYWHERE = np.ones((1, 1), np.bool_)
 
 @pytest.fixture(scope="module")
 def gray(shot):
-    return cv2.cvtColor(shot.frame.color, cv2.COLOR_RGB2GRAY)
+    return cv2.cvtColor(shot.frame.rgb, cv2.COLOR_RGB2GRAY)
 
 
 def whole(image):

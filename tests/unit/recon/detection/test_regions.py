@@ -16,7 +16,7 @@ def registration(depth, every=1):
     shown = frame(depth.astype(np.uint16), np.zeros((*SIZE, 3), np.uint8),
                   calibration(depth=one, color=one), registered=True)
     part = slice(None, None, every)
-    return register(shown, 0.0, part, part)
+    return register(shown, part, part)
 
 
 def regions(depth, every=1, **limit):

@@ -4,6 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from denseface.capture.calibration import Calibration, DepthToColor
+from denseface.capture.frame import DepthMeaning, DepthRounding
 from denseface.recon.errors import NoDepthError
 from denseface.recon.registration import register, sample_colors
 from tests.unit.frames import calibration, camera, cameras, frame, poses
@@ -99,6 +100,29 @@ def test_registered_depth_needs_no_moving():
     assert not around[41:79, 61:99].any()
     around[38:82, 58:102] = False
     assert not around.any()
+
+
+@pytest.mark.parametrize(("meaning", "z"), [
+    (DepthMeaning(), 700.0),
+    (DepthMeaning(rounding=DepthRounding.CUT), 700.5),
+    (DepthMeaning(rounding=DepthRounding.NONE), 700.0),
+    (DepthMeaning(100), 70.0),
+    (DepthMeaning(100, DepthRounding.CUT), 70.05),
+    (DepthMeaning(2000, DepthRounding.CUT), 1401.0),
+])
+def test_a_depth_means_what_its_frame_says(meaning, z):
+    depth = np.full((120, 160), 700, np.uint16)
+    shot = frame(depth, np.zeros((120, 160, 3), np.uint8), depth_meaning=meaning)
+    np.testing.assert_allclose(register(shot).points[..., 2], z, rtol=1e-6)
+
+
+def test_a_number_beyond_the_farthest_reading_is_none():
+    depth = np.full((120, 160), 700, np.uint16)
+    depth[:, :80] = 4095
+    shot = frame(depth, np.zeros((120, 160, 3), np.uint8), depth_meaning=DepthMeaning(max_mm=4000))
+    registered = register(shot)
+    assert not registered.valid[:, :80].any()
+    assert registered.valid[:, 80:].all()
 
 
 def test_depth_behind_the_colour_camera_is_not_visible():

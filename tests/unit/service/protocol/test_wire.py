@@ -1,6 +1,7 @@
 """Messages: round trips, garbage, limits."""
 
 import json
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from hypothesis import Phase, example, find, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin
 from denseface.recon.settings import Preset, Settings
 from denseface.service.errors import LocalProtocolError, ProtocolError, RemoteProtocolError
 from denseface.service.protocol import messages, wire
@@ -288,13 +290,24 @@ def test_wrong_arrays_are_not_sent():
         encode(Packet(message, FRAME_ARRAYS | {"depth": np.zeros((6, 8), np.int32)}))
 
 
+def test_a_frame_without_colour_survives_with_its_meaning_and_origin():
+    depth_alone = replace(
+        small_frame(), color=None, depth_meaning=DepthMeaning(100, DepthRounding.CUT, 4000),
+        origin=FrameOrigin("serial", "2026-11-29T12:00:00Z", 12.5, "stamps", "arrival", 3, ("a",)))
+    header, arrays = FrameHeader.of(depth_alone)
+    packet = decode_to_hub(encode(Packet(messages.Frame(capture_id="a", frame=header), arrays)))
+    back = packet.message.frame.join(packet.arrays)
+    assert back.color is None
+    assert (back.depth_meaning, back.origin) == (depth_alone.depth_meaning, depth_alone.origin)
+
+
 def test_frame_and_face_survive_the_wire():
     frame = small_frame()
     header, arrays = FrameHeader.of(frame)
     packet = decode_to_hub(encode(Packet(messages.Frame(capture_id="a", frame=header), arrays)))
     back = packet.message.frame.join(packet.arrays)
     np.testing.assert_array_equal(back.depth, frame.depth)
-    np.testing.assert_array_equal(back.color, frame.color)
+    np.testing.assert_array_equal(back.color, frame.rgb)
     assert (back.calibration, back.skew_us) == (frame.calibration, frame.skew_us)
 
 
