@@ -7,10 +7,11 @@ import tempfile
 from pathlib import Path
 
 from denseface.capture.openni2._library import find_library
+from tests.virtual_sensor.control import layout_header
 
 __all__ = ["build"]
 
-_SOURCE = Path(__file__).with_name("driver.cpp")
+_SOURCES = Path(__file__).with_name("driver")
 _INCLUDE = Path("/usr/include/openni2")
 _COMPILE = ["g++", "-std=c++17", "-O2", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC",
             "-pthread"]
@@ -33,7 +34,9 @@ def build(folder: Path | None = None) -> Path:
     library = find_library()
     drivers = library / "OpenNI2" / "Drivers"
     real = (library / "libOpenNI2.so").resolve()
-    key = hashlib.sha256(_SOURCE.read_bytes() + real.read_bytes()
+    sources = b"".join(path.read_bytes() for path in sorted(_SOURCES.iterdir()))
+    layout = layout_header().encode()
+    key = hashlib.sha256(sources + layout + real.read_bytes()
                          + " ".join(_COMPILE).encode()).hexdigest()[:16]
     parent = folder or Path(__file__).resolve().parents[2] / "build" / "virtual_sensor"
     ready = parent / key
@@ -48,7 +51,8 @@ def build(folder: Path | None = None) -> Path:
         # OpenNI2 looks for drivers beside the file that was loaded, so a copy and not a link.
         shutil.copy(real, made / "libOpenNI2.so")
         shutil.copy((drivers / "libOniFile.so").resolve(), private / "libOniFile.so.0")
-        subprocess.run([*_COMPILE, f"-I{_INCLUDE}", str(_SOURCE), "-o",
+        (made / "control_layout.h").write_bytes(layout)
+        subprocess.run([*_COMPILE, f"-I{_INCLUDE}", f"-I{made}", str(_SOURCES / "driver.cpp"), "-o",
                         str(private / "libVirtualSensor.so.0")], check=True)
         try:
             made.rename(ready)

@@ -10,6 +10,8 @@ VIRTUAL_SENSOR_SKEW_US              added to the colour stamps
 VIRTUAL_SENSOR_DISCONNECT_AFTER     unplugged after that many frames
 VIRTUAL_SENSOR_STREAMS              ``both`` (default), ``depth`` or ``color``
 VIRTUAL_SENSOR_DEPTH_UNIT           ``100um``: depth in tenths of a millimetre
+VIRTUAL_SENSOR_CONTROL              the files of control channels, separated by colons: one device
+                                    for each, which they steer instead of all of the above
 =================================== =============================================================
 """
 
@@ -17,12 +19,14 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.npz import load_frame
 from tests.virtual_sensor.build import build
+from tests.virtual_sensor.control import Control
 from tests.waiting import LIMIT_S
 
 __all__ = ["environment", "play", "record_clip", "run_python"]
@@ -45,18 +49,24 @@ record(None, sys.argv[1], int(sys.argv[2]))
 """
 
 
-def environment(clip: Path | None = None, **options: Any) -> dict[str, str]:
+def environment(
+    clip: Path | None = None, *, controls: Sequence[Control] = (), **options: Any
+) -> dict[str, str]:
     """Give the environment in which a process sees the virtual sensor and no other driver.
 
     Parameters
     ----------
     clip : what `write_clip` wrote; without it no device is there, but recordings can be played
+    controls : the devices that are there, each steered while it runs; `clip` and `options` do not
+        matter then
     options : `end`, `skew_us`, `disconnect_after`, `streams`, `depth_unit` as in the table above
     """
     kept = {name: value for name, value in os.environ.items()
             if not name.startswith(("VIRTUAL_SENSOR_", "OPENNI2_REDIST"))}
     if clip is not None:
         options["frames"] = clip
+    if controls:
+        options["control"] = ":".join(str(control.path) for control in controls)
     return kept | {"OPENNI2_REDIST": str(build())} | {
         f"VIRTUAL_SENSOR_{name.upper()}": str(value) for name, value in options.items()}
 
