@@ -149,6 +149,8 @@ class Report(_Model):
     """What that estimate rests on: `stamps` of the sensor or `arrival` at the host."""
     fused: int = 1
     """Of how many frames the depth is the average."""
+    colored: bool = True
+    """The sensor has a colour camera; else colours are the shades of the depth's relief."""
     registered: bool = False
     """Depth came in the colour camera's pixels."""
     depth_unit_um: int = 1000

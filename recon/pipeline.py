@@ -27,7 +27,7 @@ from denseface.recon.face import Face, PointCloud, Report
 from denseface.recon.intermediate import ColorSampler, Registration, SurfaceGrid
 from denseface.recon.numerics.threads import one_blas_thread
 from denseface.recon.propagation import densify, noise_fraction
-from denseface.recon.registration import register, sample_colors
+from denseface.recon.registration import register, sample_colors, with_shaded_depth
 from denseface.recon.segmentation import box_window, segment_face
 from denseface.recon.settings import Settings
 from denseface.recon.support import Support
@@ -55,7 +55,7 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
 
     Parameters
     ----------
-    frame : depth, mm, and colour with their calibration
+    frame : depth and colour with their calibration; without colour the face is found by its relief
     settings : the `best` preset where None
 
     Returns
@@ -90,6 +90,9 @@ def ends_the_same(error: Exception) -> bool:
 
 
 def _reconstruct(frame: RgbdFrame, settings: Settings, clock: "_Stopwatch") -> Face:
+    colored = frame.color is not None
+    if not colored:
+        frame, settings = with_shaded_depth(frame), settings.model_copy(update={"shading": False})
     focal_px = frame.calibration.color.fx
     overview = _overview(frame)
     clock.lap("overview")
@@ -114,9 +117,10 @@ def _reconstruct(frame: RgbdFrame, settings: Settings, clock: "_Stopwatch") -> F
         mean_spacing_mm=spacing, r0_mm=settings.r0_factor * spacing, noise_mm=surface.noise,
         timings_ms=clock.timings_ms(), settings=settings,
         calibration=frame.calibration_origin, skew_us=frame.skew_us,
-        registered=frame.registered, depth_unit_um=frame.depth_meaning.unit_um,
+        colored=colored, registered=frame.registered and colored,
+        depth_unit_um=frame.depth_meaning.unit_um,
         depth_rounding=frame.depth_meaning.rounding, **_of_origin(frame.origin),
-        version=_version(), warnings=_warnings(frame, len(initial)),
+        version=_version(), warnings=_warnings(frame, len(initial), colored=colored),
     )
     return Face(initial, dense, report)
 
@@ -178,8 +182,10 @@ def surface_of(
         sampler=sampler if settings.shading else None)
 
 
-def _warnings(frame: RgbdFrame, seeds: int) -> tuple[str, ...]:
+def _warnings(frame: RgbdFrame, seeds: int, *, colored: bool) -> tuple[str, ...]:
     found = list(frame.origin.notes)
+    if not colored:
+        found.append("the sensor has no colour camera: the face is shaded grey")
     if seeds < _FEW_SEEDS:
         found.append(f"only {seeds} seeds: the face is far away or mostly unmeasured")
     if abs(frame.skew_us) > _MUCH_SKEW_US:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from denseface.capture import CaptureError, RgbdFrame
 from denseface.capture.errors import SensorError
+from denseface.recon.registration import with_shaded_depth
 from denseface.service.daemons.sensor import SensorReader
 from denseface.service.errors import FrameTooLargeError
 from denseface.service.log.output import exit_now
@@ -195,7 +196,7 @@ class _Capture:
             raise error
 
     def _send_preview(self, frame: RgbdFrame) -> None:
-        image = _preview_image(frame.rgb)
+        image = _preview_image(with_shaded_depth(frame).rgb)
         height, width, _ = image.shape
         header = PreviewHeader(
             width=width, height=height, timestamp_us=frame.color_timestamp_us)

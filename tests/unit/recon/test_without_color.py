@@ -1,0 +1,71 @@
+"""Frames of a sensor that has no colour camera."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from denseface.capture.frame import DepthMeaning, DepthRounding
+from denseface.recon import NoFaceError, reconstruct
+from denseface.recon.registration import shaded_depth, with_shaded_depth
+from tests.simulator import Person, Scene, measure, simulate
+from tests.unit.frames import camera
+
+
+@pytest.fixture(scope="module")
+def depth_alone(shot):
+    return replace(shot.frame, color=None)
+
+
+def test_a_face_is_found_by_its_relief(shot, face, depth_alone):
+    found = reconstruct(depth_alone)
+    assert not found.report.colored
+    assert not found.report.registered
+    assert not found.report.settings.shading
+    assert any("no colour camera" in warning for warning in found.report.warnings)
+    assert 0.9 < found.report.initial_points / face.report.initial_points < 1.1
+    with_color, without = (measure(one, shot.truth, shot.frame) for one in (face, found))
+    assert without.mean_mm < 1.15 * with_color.mean_mm
+
+
+def test_colours_are_the_shades_of_the_relief(depth_alone):
+    colors = reconstruct(depth_alone).dense.colors
+    assert (colors == colors[:, :1]).all()
+    assert colors.std() > 10
+
+
+@pytest.mark.parametrize("person", [
+    Person("ict_neutral", 600, yaw=15), Person("mh_cauc_m", 1000, pitch=8)])
+def test_turned_near_and_far(person):
+    shot = simulate(Scene((person,)), seed=3)[0]
+    face = reconstruct(replace(shot.frame, color=None))
+    assert measure(face, shot.truth, shot.frame).mean_mm < 1.0
+
+
+def test_nobody_is_found_in_an_empty_room():
+    shot = simulate(Scene(()), seed=4)[0]
+    with pytest.raises(NoFaceError):
+        reconstruct(replace(shot.frame, color=None))
+
+
+def test_tenths_of_a_millimetre_are_the_same_face(shot, depth_alone):
+    fine = replace(depth_alone, depth=np.where(depth_alone.depth < 6500, depth_alone.depth * 10, 0)
+                   .astype(np.uint16), depth_meaning=DepthMeaning(100, DepthRounding.NONE))
+    whole = replace(depth_alone, depth_meaning=DepthMeaning(1000, DepthRounding.NONE))
+    one, other = reconstruct(fine), reconstruct(whole)
+    assert one.report.depth_unit_um == 100
+    np.testing.assert_allclose(one.dense.points.mean(axis=0), other.dense.points.mean(axis=0),
+                               atol=0.01)
+
+
+def test_a_plane_has_one_shade_and_a_hole_is_black():
+    plane = np.full((48, 64), 700, np.uint16)
+    plane[:, 40:] = 0
+    shade = shaded_depth(plane, camera(64, 48, 60.0), 1.0)
+    assert np.ptp(shade[4:-4, 4:30]) <= 1
+    assert (shade[:, 60:] == 0).all()
+    assert shade[24, 10] > 100
+
+
+def test_a_frame_with_colour_stays_as_it_is(shot):
+    assert with_shaded_depth(shot.frame) is shot.frame
