@@ -4,7 +4,7 @@ Each error is also the builtin kind that a caller would expect to catch.
 """
 
 __all__ = ["CalibrationError", "CaptureError", "FrameError", "SensorError", "SensorTimeoutError",
-           "UnreadableSourceError"]
+           "UnreadableSourceError", "WrongSizeError"]
 
 
 class CaptureError(Exception):
@@ -29,3 +29,7 @@ class SensorError(CaptureError, RuntimeError):
 
 class SensorTimeoutError(SensorError, TimeoutError):
     """The sensor sent nothing for longer than allowed."""
+
+
+class WrongSizeError(SensorError):
+    """A frame is not of the size that its stream's mode says: the next one may be."""

@@ -11,7 +11,7 @@ from primesense import openni2
 from primesense.utils import OpenNIError
 
 from denseface.capture.calibration import MAX_SIDE
-from denseface.capture.errors import SensorError
+from denseface.capture.errors import SensorError, WrongSizeError
 from denseface.capture.openni2._calibration import SensorProperties
 from denseface.capture.openni2._library import binding_errors, close_handle
 
@@ -26,6 +26,8 @@ _ZPD, _ZPPS, _DCRCDIS = 0x1080100C, 0x1080100D, 0x1080100F
 """PrimeSense's numbers of stream properties (PS1080.h); see `_calibration`."""
 _LIVE_SIZE, _LIVE_FPS = (640, 480), 30
 """Video mode of live sensors: pixels, frames a second."""
+_PIXEL_BYTES = {DEPTH: 2, COLOR: 3}
+"""Of a frame as it is read."""
 _C = TypeVar("_C", bound="ctypes._SimpleCData[Any]")
 _1_MM, _100_UM = int(openni2.PIXEL_FORMAT_DEPTH_1_MM), int(openni2.PIXEL_FORMAT_DEPTH_100_UM)
 _PIXEL_FORMATS = {DEPTH: {_1_MM: "depth in 1 mm", _100_UM: "depth in 100 um"},
@@ -105,14 +107,51 @@ class Streams:
         return next((k for k, h in zip(kinds, handles, strict=True) if h is ready), None)
 
     def read(self, kind: str) -> Image:
-        """Copy the frame that `wait` announced out of the driver's memory."""
-        stream = self._streams[kind]
+        """Copy the frame that `wait` announced out of the driver's memory.
+
+        Raises
+        ------
+        WrongSizeError
+            It is not of the size that the stream's mode says.
+        """
+        memory = np.empty(self.frame_bytes(kind), np.uint8)
+        stamp_us = self.copy_frame(kind, memory)
+        return stamp_us, self.image(kind, memory)
+
+    def frame_bytes(self, kind: str) -> int:
+        """Give the size of a frame as the driver sends it, bytes."""
+        width, height = self.size(kind)
+        return width * height * _PIXEL_BYTES[kind]
+
+    def copy_frame(self, kind: str, memory: NDArray[np.uint8]) -> int:
+        """Copy the frame that `wait` announced, as it is, and give its stamp, microseconds.
+
+        Parameters
+        ----------
+        memory : (`frame_bytes`,) uint8, contiguous
+
+        Raises
+        ------
+        WrongSizeError
+            It is not of the size that the stream's mode says; it is read all the same.
+        """
         with binding_errors(f"{self._name}: reading a {kind} frame failed"):
-            frame = stream.handle.read_frame()
+            frame = self._streams[kind].handle.read_frame()
         try:
-            return int(frame.timestamp), self._copy(stream, frame)
+            self._copy(kind, frame, memory)
+            return int(frame.timestamp)
         finally:
             frame.close()
+
+    def image(self, kind: str, memory: NDArray[np.uint8]) -> NDArray[Any]:
+        """Make an image of what `copy_frame` copied: an array of its own, not mirrored."""
+        stream = self._streams[kind]
+        width, height = stream.size
+        if kind == COLOR:
+            image: NDArray[Any] = memory.reshape(height, width, 3)
+        else:
+            image = memory.view(np.uint16).reshape(height, width)
+        return (image[:, ::-1] if stream.mirrored else image).copy()
 
     def close(self) -> None:
         """Stop and destroy both, also of a device that is gone."""
@@ -176,22 +215,20 @@ class Streams:
             usb_vendor=int(device.device_info.usbVendorId),
         )
 
-    def _copy(self, stream: _Stream, frame: Any) -> NDArray[Any]:
-        width, height = stream.size
-        pixel = 2 if stream.kind == DEPTH else 3
-        stride, size = int(frame.stride), int(frame.dataSize)
-        if ((int(frame.width), int(frame.height)) != stream.size or stride < width * pixel
-                or size < stride * (height - 1) + width * pixel):
-            raise SensorError(
-                f"{self._name}: a {stream.kind} frame of {frame.width}x{frame.height} in {size} "
+    def _copy(self, kind: str, frame: Any, memory: NDArray[np.uint8]) -> None:
+        """Copy at once: the next read reuses the driver's memory, and closing frees it."""
+        width, height = self.size(kind)
+        row, stride, size = width * _PIXEL_BYTES[kind], int(frame.stride), int(frame.dataSize)
+        if ((int(frame.width), int(frame.height)) != (width, height) or stride < row
+                or size < stride * (height - 1) + row):
+            raise WrongSizeError(
+                f"{self._name}: a {kind} frame of {frame.width}x{frame.height} in {size} "
                 f"bytes, expected {width}x{height} (cropping is not supported)")
-        # The next read reuses this memory, and closing frees it.
-        memory = ctypes.string_at(int(frame.data), size)
-        image: NDArray[Any] = np.ndarray((height, width, pixel), np.uint8, memory, 0,
-                                         (stride, pixel, 1)).copy()
-        if stream.kind == DEPTH:
-            image = image.view(np.uint16)[..., 0]
-        return np.ascontiguousarray(image[:, ::-1]) if stream.mirrored else image
+        if stride == row:
+            ctypes.memmove(memory.ctypes.data, int(frame.data), row * height)
+            return
+        source = (ctypes.c_uint8 * (stride * (height - 1) + row)).from_address(int(frame.data))
+        memory.reshape(height, row)[:] = np.ndarray((height, row), np.uint8, source, 0, (stride, 1))
 
 
 def _property(handle: Any, number: int, kind: type[_C]) -> Any:

@@ -1,0 +1,82 @@
+"""A live sensor as the capture process uses it, whatever the driver.
+
+One that is made looks for its sensor, opens it, opens it again when it was lost, and never gives
+up; all calls of the driver are made by a thread of its own. Whoever asks here never waits for the
+driver.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from denseface.capture.frame import RgbdFrame
+from denseface.capture.live.states import LiveFigures, LiveState
+
+__all__ = ["LiveSensor", "Shot"]
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A pair of depth and colour, and when it was taken."""
+
+    frame: RgbdFrame
+    """With arrays of its own: it may be kept."""
+    number: int
+    """Of the pair since the sensor was opened; one that is missing was not asked for in time."""
+    earliest_s: float
+    """Neither image was exposed before, monotonic clock, seconds."""
+    latest_s: float
+    """Nor after."""
+
+
+class LiveSensor(Protocol):
+    """What looks after a live sensor; all may be called from any thread.
+
+    Attributes
+    ----------
+    uri : what was asked for
+    on_change : called, in the driver's thread, when the state changed, and when a pair came after
+        `latest` or `first_after` had none to give; must return at once and not raise
+    """
+
+    uri: str
+    on_change: Callable[[], object]
+
+    @property
+    def state(self) -> LiveState:
+        """Where the sensor is; it gives pairs while `STREAMING`."""
+
+    @property
+    def reason(self) -> str:
+        """Why it does not stream, for the person who pressed; empty where it does."""
+
+    @property
+    def identity(self) -> str:
+        """Serial number, else USB port, else address of the sensor last opened; else empty."""
+
+    @property
+    def figures(self) -> LiveFigures:
+        """What happened since the start."""
+
+    def latest(self) -> Shot | None:
+        """Give the newest pair; None while the sensor does not stream."""
+
+    def first_after(self, after_s: float) -> Shot | None:
+        """Give the first pair of which both images were surely exposed at a time or later.
+
+        None while there is none: `on_change` is called when to ask again. The pair after a shot is
+        `first_after(math.nextafter(shot.earliest_s, math.inf))`.
+
+        Parameters
+        ----------
+        after_s : monotonic clock, seconds
+        """
+
+    def wait(self, number: int, timeout_s: float) -> bool:
+        """Wait for a pair after that of a number; False where none came. For threads."""
+
+    def needs_new_process(self) -> str:
+        """Say why only another process can go on, as when the driver hangs; empty while none."""
+
+    def close(self, timeout_s: float = 2.0) -> bool:
+        """Close the sensor; False where the driver hangs, and the process is to be ended."""
