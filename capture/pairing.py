@@ -98,8 +98,7 @@ class Pairer(Generic[D, C]):
     def _add(
         self, own: "_Stream", other: "_Stream", stamp_us: int, item: Any
     ) -> tuple["_Item", "_Item"] | None:
-        """Let the item wait, and take what it makes certain: one of its own stream, one of the
-        other."""
+        """Let the item wait, and take what it makes certain: one of each stream."""
         if own.last_us is not None and stamp_us <= own.last_us:
             self.clear()  # the sensor's clock started over
         own.last_us = stamp_us

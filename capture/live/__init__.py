@@ -1,1 +1,1 @@
-"""What a live sensor needs and no driver gives: clocks, memory, pairs, states. Nothing is called."""
+"""What a live sensor needs and no driver gives: clocks, memory, pairs, states; pure."""

@@ -33,10 +33,9 @@ _SAMPLES = 16
 _WINDOW_S = 10.0
 """The minimum is that of the last one or two windows, seconds: it follows a clock that drifts (by
 10 ms at 500 parts in a million)."""
-_JUMP_S = 0.05
-"""A frame that arrives so much sooner after its stamp than the fastest one: the clock jumped."""
-_LATE_S = 0.25
-"""`_SAMPLES` frames that arrive so much later than the fastest one: the clock jumped back."""
+_JUMP_S = 0.25
+"""A frame that arrives so much sooner after its stamp than the fastest one, or `_SAMPLES` frames
+that arrive so much later: the clock jumped, seconds. A smaller jump ahead is but a new minimum."""
 _SHORT_STEP = 0.3
 """A step from stamp to stamp below this part of the period: the clock jumped back."""
 _RATES = 0.7, 1.4
@@ -83,9 +82,10 @@ class StreamClock:
     Attributes
     ----------
     kind : what the stamps are good for
-    period_s : measured time from frame to frame
+    period_s : measured time from frame to frame, where none is lost
     transport_s : longest time from exposure to arrival, as far as it is known
     offset_s : least arrival minus stamp of late; None while stamps are of no use
+    frames : how many came, a repeat of the one before left out
     jumps : how often the sensor's clock jumped or started over
     missed : frames that never came, by gaps in the stamps or arrivals
     """
@@ -95,11 +95,16 @@ class StreamClock:
             raise ValueError(f"transport_s must be from 0 to 10, got {transport_s}")
         self.period_s = _DEFAULT_PERIOD_S
         self.transport_s = transport_s
-        self.jumps = self.missed = 0
+        self.frames = self.jumps = self.missed = 0
         self._started_s = started_s
         self._first: int | None = None
         """The very first stamp, as long as the transport is measured."""
         self._begin_segment()
+
+    @property
+    def last_arrival_s(self) -> float:
+        """When the last frame came; at first, when the stream was started."""
+        return self._samples[-1][1] if self._samples else self._started_s
 
     def _begin_segment(self) -> None:
         """Forget what was measured: from here on the sensor's clock is another one."""
@@ -130,6 +135,7 @@ class StreamClock:
                 self._first = None
                 self._begin_segment()
         self._count_missed(stamp_us, arrival_s)
+        self.frames += 1
         self._samples.append((stamp_us, arrival_s))
         self._classify()
         self._measure_period()
@@ -148,12 +154,12 @@ class StreamClock:
     def _jumped(self, stamp_us: int, last_us: int, arrival_s: float) -> bool:
         """Say whether the clock jumped or is no clock; a busy machine explains late arrivals only.
 
-        One frame may come late by any time, `_SAMPLES` of them in a row by no more than `_LATE_S`.
+        One frame may come late by any time, `_SAMPLES` of them in a row by no more than `_JUMP_S`.
         """
         late_s = [arrival - stamp * self._unit_s - (self.offset_s or 0.0)
                   for stamp, arrival in (*self._samples, (stamp_us, arrival_s))]
         return ((stamp_us - last_us) * self._unit_s < _SHORT_STEP * self.period_s
-                or late_s[-1] < -_JUMP_S or (len(late_s) > _SAMPLES and min(late_s) > _LATE_S))
+                or late_s[-1] < -_JUMP_S or (len(late_s) > _SAMPLES and min(late_s) > _JUMP_S))
 
     def _count_missed(self, stamp_us: int, arrival_s: float) -> None:
         if len(self._samples) < _SETTLED:
@@ -205,8 +211,9 @@ class StreamClock:
             self._first = None
 
     def _measure_period(self) -> None:
-        of = 1 if self.offset_s is None else 0
-        unit_s = 1.0 if of else self._unit_s
-        steps = [(b[of] - a[of]) * unit_s for a, b in pairwise(self._samples)]
-        if len(steps) >= 3 and (period_s := median(steps)) > 0:
+        """Measure the period: the shortest step of stamps, as frames are lost; arrivals jitter."""
+        by_stamps = self.offset_s is not None
+        steps_s = [(b[0] - a[0]) * self._unit_s if by_stamps else b[1] - a[1]
+                   for a, b in pairwise(self._samples)]
+        if len(steps_s) >= 3 and (period_s := (min if by_stamps else median)(steps_s)) > 0:
             self.period_s = period_s

@@ -74,7 +74,9 @@ class LivePairs:
     Attributes
     ----------
     clocks : of the streams
+    count : of the pairs
     repeats : images that the driver gave twice
+    skew_us : of the last pair: how much later the depth was taken, microseconds
     """
 
     def __init__(
@@ -84,8 +86,7 @@ class LivePairs:
         self._pairer: Pairer[_Arrived, _Arrived] = Pairer(
             dropped=lambda arrived: arrived.slot.release())
         self._freshness = {kind: Freshness() for kind in started_s}
-        self._number = 0
-        self.repeats = 0
+        self.count = self.repeats = self.skew_us = 0
 
     def add(self, kind: str, slot: Slot, stamp_us: int, arrival_s: float) -> LivePair | None:
         """Take an image, with the caller's hold on its slot; give the pair that it completes.
@@ -104,8 +105,8 @@ class LivePairs:
             return self._pair(arrived, None)
         self._pairer.follow(self.clocks["depth"].period_s, self.clocks["color"].period_s)
         add = self._pairer.add_depth if kind == "depth" else self._pairer.add_color
-        pair = add(round(self._common_s(kind, exposure) * 1e6), arrived)
-        return pair and self._pair(pair.depth, pair.color)
+        pair = add(round(self._common_s(exposure) * 1e6), arrived)
+        return self._pair(pair.depth, pair.color) if pair else None
 
     def close(self) -> None:
         """Release what waits for a partner."""
@@ -123,28 +124,29 @@ class LivePairs:
         known = [offset for offset in offsets if offset is not None]
         return len(known) == len(offsets) and max(known) - min(known) <= _SAME_CLOCK_S
 
-    def _common_s(self, kind: str, exposure: Exposure) -> float:
+    def _common_s(self, exposure: Exposure) -> float:
         """Give a time by which both streams' images can be compared, monotonic clock, seconds."""
         if exposure.stamp_s is None or not self.one_clock:
             return exposure.latest_s
         return exposure.stamp_s + min(clock.offset_s or 0.0 for clock in self.clocks.values())
 
     def _pair(self, depth: _Arrived, color: _Arrived | None) -> LivePair:
-        self._number += 1
+        self.count += 1
         by_stamps = depth.exposure.stamp_s is not None
         depth_s = depth.exposure.latest_s if depth.exposure.stamp_s is None else (
             depth.exposure.stamp_s)
         depth_us = round(depth_s * 1e6)
         if color is None:
             return LivePair(
-                self._number, depth.slot, None, depth_us, depth_us, depth.exposure.earliest_s,
+                self.count, depth.slot, None, depth_us, depth_us, depth.exposure.earliest_s,
                 depth.exposure.latest_s, _known_by(stamps=by_stamps), "", self._notes())
         a, b = depth.exposure, color.exposure
         exact = self.one_clock and a.stamp_s is not None and b.stamp_s is not None
         skew_s = (a.stamp_s - b.stamp_s if exact and a.stamp_s is not None
                   and b.stamp_s is not None else a.latest_s - b.latest_s)
+        self.skew_us = round(skew_s * 1e6)
         return LivePair(
-            self._number, depth.slot, color.slot, depth_us, depth_us - round(skew_s * 1e6),
+            self.count, depth.slot, color.slot, depth_us, depth_us - self.skew_us,
             min(a.earliest_s, b.earliest_s), max(a.latest_s, b.latest_s),
             _known_by(stamps=by_stamps and b.stamp_s is not None), _known_by(stamps=exact),
             self._notes())

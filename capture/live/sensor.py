@@ -7,12 +7,19 @@ driver.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
 from typing import Protocol
 
+from denseface.capture.calibration import choose_calibration
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.live.states import LiveFigures, LiveState
 
-__all__ = ["LiveSensor", "Shot"]
+__all__ = ["LiveSensor", "Shot", "open_sensor"]
+
+_SENSORS = {"openni2:": "openni2:WatchedSensor"}
+"""A sensor's scheme, and which class of which module of `capture` looks after it: called with what
+follows the scheme, or None, and the chosen calibration or None."""
 
 
 @dataclass(frozen=True)
@@ -80,3 +87,25 @@ class LiveSensor(Protocol):
 
     def close(self, timeout_s: float = 2.0) -> bool:
         """Close the sensor; False where the driver hangs, and the process is to be ended."""
+
+
+def open_sensor(uri: str, calibration: Path | None = None) -> LiveSensor | None:
+    """Begin to look after a live sensor; None where the URI is that of another kind of source.
+
+    Parameters
+    ----------
+    uri, calibration : as of `open_source`
+
+    Raises
+    ------
+    CalibrationError
+        The calibration cannot be read.
+    """
+    scheme, colon, address = uri.partition(":")
+    name = _SENSORS.get(scheme.lower() + colon)
+    if name is None:
+        return None
+    module, kind = name.split(":")
+    maker = getattr(import_module(f"denseface.capture.{module}"), kind)
+    sensor: LiveSensor = maker(address or None, choose_calibration(None, calibration))
+    return sensor

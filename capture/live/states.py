@@ -14,7 +14,7 @@ A sensor is never given up. What ends when the driver hangs is the process, not 
 
 import math
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import Enum
 
 __all__ = ["LiveEvent", "LiveFigures", "LiveState", "LiveStates"]
@@ -75,9 +75,12 @@ TRANSITIONS: dict[tuple[LiveState, LiveEvent], LiveState] = {
 }
 """What each event makes of each state; an event that has no row here is a mistake of ours."""
 
-HANG_S: dict[LiveState, float] = {LiveState.OPENING: 10.0, LiveState.CLOSING: 2.0}
-"""States in which the driver is called without a time-out of its own, and how long that may take,
-seconds; beyond, it hangs, and only a new process helps."""
+HANG_S: dict[LiveState, float] = dict.fromkeys(LiveState, 5.0) | {
+    LiveState.ABSENT: 10.0, LiveState.BLOCKED: 10.0, LiveState.OPENING: 10.0,
+    LiveState.CLOSING: 2.0}
+"""How long one step of the driver may take in each state, seconds; beyond, it hangs, and only a new
+process helps. Where nothing is amiss, waiting for a frame takes 0.1 s at most and opening 0.25 s.
+"""
 
 PATIENCE_S: dict[LiveState, float] = {LiveState.WARMING: 4.0, LiveState.STALLED: 0.7}
 """States that wait for frames, and how long, seconds; beyond, the sensor is closed and opened
@@ -90,16 +93,18 @@ _LOOP_LOSSES = 3
 """Losses within `_LOOP_S` that are no accident but a cable, a port or too little power."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class LiveFigures:
-    """What a live sensor did since this process looks after it."""
+    """What a live sensor did since this process looks after it, or since it was opened."""
 
     frames: int = 0
     """Pairs."""
     drops: int = 0
-    """Frames of either stream that never came, came damaged by size, or found no room."""
+    """Frames of either stream that never came, were of a wrong size, or found no room."""
     wrong_size: int = 0
     """Of those, frames of another size than their mode's."""
+    repeats: int = 0
+    """Frames that the driver gave twice."""
     stalls: int = 0
     """Times that it fell silent."""
     reconnects: int = 0
@@ -108,6 +113,12 @@ class LiveFigures:
     """Times that one of its clocks jumped or started over."""
     skew_us: int = 0
     """Of the last pair: how much later the depth was taken, microseconds."""
+
+    def __add__(self, later: "LiveFigures") -> "LiveFigures":
+        """Put together what was counted before and later."""
+        sums = {field.name: getattr(self, field.name) + getattr(later, field.name)
+                for field in fields(self)}
+        return LiveFigures(**sums | {"skew_us": later.skew_us or self.skew_us})
 
 
 @dataclass
@@ -154,9 +165,9 @@ class LiveStates:
         return (f"{reason} (lost {len(self._losses)} times within a minute: try another cable, "
                 "port or power supply)")
 
-    def hangs(self, now_s: float) -> bool:
-        """Say whether the driver has been in a call for longer than it may."""
-        return now_s - self.since_s > HANG_S.get(self.state, math.inf)
+    def explain(self, reason: str) -> None:
+        """Say anew why the sensor does not stream, in the same state."""
+        self.reason = reason
 
     def overdue(self, now_s: float) -> bool:
         """Say whether frames were waited for in vain for so long that it is to be opened again."""

@@ -13,5 +13,6 @@ How the library's faults are avoided:
 
 from denseface.capture.openni2._live import LiveSource
 from denseface.capture.openni2._recording import RecordingSource
+from denseface.capture.openni2._sensor import WatchedSensor
 
-__all__ = ["LiveSource", "RecordingSource"]
+__all__ = ["LiveSource", "RecordingSource", "WatchedSensor"]

@@ -2,9 +2,12 @@
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.errors import FrameError, SensorError
-from denseface.capture.frame import DepthMeaning, DepthRounding, RgbdFrame
+from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
 from denseface.capture.openni2._calibration import derive_calibration
 from denseface.capture.openni2._library import close_handle, open_sources
 from denseface.capture.openni2._streams import COLOR, DEPTH, Image, Streams
@@ -60,13 +63,21 @@ class OpenNI2Source(Source):
         return (self.pairer.add_depth if kind == DEPTH else self.pairer.add_color)(*image)
 
     def _frame(self, pair: Pair[Any, Any]) -> RgbdFrame:
+        return self._make_frame(pair.depth, pair.color, (pair.depth_us, pair.color_us),
+                                FrameOrigin())
+
+    def _make_frame(
+        self, depth: NDArray[np.uint16], color: NDArray[np.uint8] | None,
+        stamps_us: tuple[int, int], origin: FrameOrigin,
+    ) -> RgbdFrame:
+        """Make a frame; `stamps_us` are of depth and of colour."""
         if self._chosen is None:
             raise SensorError(f"{self._name}: is closed")
-        calibration, origin = self._chosen
+        calibration, chosen = self._chosen
         try:
             # PrimeSense's drivers, and the recordings made through them, cut the fraction off.
-            return RgbdFrame(pair.depth, pair.color, pair.depth_us, pair.color_us, calibration,
-                             self._registered, calibration_origin=origin,
+            return RgbdFrame(depth, color, *stamps_us, calibration, self._registered,
+                             calibration_origin=chosen, origin=origin,
                              depth_meaning=DepthMeaning(self._unit_um, DepthRounding.CUT))
         except FrameError as error:
-            raise FrameError(f"{self._name}: {error} (calibration: {origin})") from error
+            raise FrameError(f"{self._name}: {error} (calibration: {chosen})") from error

@@ -1,21 +1,30 @@
-"""Live sensors: always the newest pair, and an error when the sensor falls silent or leaves."""
+"""A live sensor from its opening to its closing: always the newest pair, by the calling thread."""
 
 import time
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
 
 from primesense import openni2
 
 from denseface.capture.calibration import ChosenCalibration
-from denseface.capture.errors import SensorError, SensorTimeoutError
-from denseface.capture.frame import RgbdFrame
+from denseface.capture.errors import SensorError, SensorTimeoutError, WrongSizeError
+from denseface.capture.frame import FrameOrigin, RgbdFrame
+from denseface.capture.live.pairs import LivePair, LivePairs
+from denseface.capture.live.ring import Ring
+from denseface.capture.live.sensor import Shot
+from denseface.capture.live.states import LiveFigures
 from denseface.capture.openni2._base import OpenNI2Source
 from denseface.capture.openni2._library import binding_errors, load, lost_devices
 from denseface.capture.openni2._streams import COLOR, DEPTH, Streams
 
 _SLICE_S = 0.1
 """Longest single wait, seconds: Ctrl-C and an unplugged sensor are noticed in between."""
-_STALE_S = 0.1
-"""Seconds since the last read after which waiting frames are thrown away."""
+_SLOTS = 12
+"""Frames of each stream in memory: 4 newest pairs, 4 that wait for a partner, one that is written,
+and three that are looked at."""
+
+_WARM_PAIRS = 10
+"""Pairs after which the clocks are known."""
 
 
 class LiveSource(OpenNI2Source):
@@ -26,6 +35,12 @@ class LiveSource(OpenNI2Source):
     device_uri : OpenNI2's URI of the device; None for the first one
     timeout_s : how long to wait for a pair
     start : start the streams at once; a recorder has to be attached before
+
+    Attributes
+    ----------
+    pairs : the clocks and what waits for a partner; there from the start of the streams on
+    no_room : frames that were lost because all memory was held
+    wrong_size : frames of another size than their mode's, which were dropped
 
     Raises
     ------
@@ -44,7 +59,7 @@ class LiveSource(OpenNI2Source):
     ) -> None:
         super().__init__(f"openni2:{device_uri or ''}", chosen)
         self.timeout_s = timeout_s
-        self._last_read = float("-inf")
+        self.no_room = self.wrong_size = 0
         load()
         found = openni2.Device.enumerate_uris()
         if not found:
@@ -58,50 +73,129 @@ class LiveSource(OpenNI2Source):
             device = openni2.Device(wanted)
         self._device_uri = bytes(device.uri)
         lost_devices.discard(self._device_uri)
-        self._open_streams(device)
+        streams = self._opened = self._open_streams(device)
+        self._rings = {kind: Ring(_SLOTS, streams.frame_bytes(kind)) for kind in (DEPTH, COLOR)}
+        self.pairs: LivePairs | None = None
         if start:
             self.start()
 
     def start(self) -> None:
         """Start both streams of a source that was made with `start=False`."""
+        started_s = time.monotonic()
         self.streams.start()
-        self._last_read = time.monotonic()
+        self.pairs = LivePairs({DEPTH: started_s, COLOR: started_s})
 
     def __iter__(self) -> Iterator[RgbdFrame]:
         while self._streams is not None:
             yield self.read()
 
     def read(self) -> RgbdFrame:
-        """Wait for a pair and give it.
+        """Wait for a pair that arrived after this call, and give it; the first few are left out.
 
-        OpenNI2 keeps the newest frame of each stream, however old. After a pause in reading, those
-        are thrown away first: no frame is from before the call.
+        OpenNI2 keeps the newest frame of each stream, however old: by its stamp it is known.
         """
-        streams = self.streams
-        if time.monotonic() - self._last_read > _STALE_S:
-            self.flush()
-        deadline = time.monotonic() + self.timeout_s
-        received = {DEPTH: 0, COLOR: 0}
-        while True:
-            kind = streams.wait(min(_SLICE_S, max(deadline - time.monotonic(), 0.0)))
-            self._check_present()
-            if kind is not None:
-                received[kind] += 1
-                if pair := self._add(kind, streams.read(kind)):
-                    self._last_read = time.monotonic()
-                    return self._frame(pair)
-            if time.monotonic() >= deadline:
-                raise SensorTimeoutError(
-                    f"{self._name}: no depth and color pair within {self.timeout_s:g} s (received "
-                    f"{received[DEPTH]} depth and {received[COLOR]} color frames)")
+        asked_s = time.monotonic()
+        while time.monotonic() < asked_s + self.timeout_s:
+            pair = self.poll(_SLICE_S)
+            if pair is None:
+                continue
+            try:
+                if self.warm and pair.latest_s >= asked_s:
+                    return self.shot(pair).frame
+            finally:
+                pair.release()
+        clocks = self.pairs.clocks if self.pairs is not None else {}
+        raise SensorTimeoutError(
+            f"{self._name}: no depth and color pair within {self.timeout_s:g} s (received "
+            + " and ".join(f"{clock.frames} {kind}" for kind, clock in clocks.items()) + " frames)")
 
     def flush(self) -> None:
-        """Throw away waiting frames: the next one is from after this call."""
+        """Nothing is to be thrown away: `read` gives only what arrived after its call."""
+
+    def poll(self, timeout_s: float) -> LivePair | None:
+        """Wait for the next frame of either stream, copy it, and give the pair that it completes.
+
+        The pair is held for the caller. A frame of a wrong size, or that finds no memory, is
+        dropped and counted.
+
+        Raises
+        ------
+        SensorError
+            The device went away, or reading failed.
+        """
         streams = self.streams
-        for kind in (DEPTH, COLOR):
-            if streams.wait(0.0, (kind,)) is not None:
-                streams.read(kind)
-        self.pairer.clear()
+        kind = streams.wait(timeout_s)
+        self._check_present()
+        if kind is None or self.pairs is None:
+            return None
+        slot = self._rings[kind].claim()
+        if slot is None:
+            self.no_room += 1
+            streams.read(kind)
+            return None
+        try:
+            stamp_us = streams.copy_frame(kind, slot.memory)
+        except WrongSizeError:
+            self.wrong_size += 1
+            slot.release()
+            return None
+        except BaseException:
+            slot.release()
+            raise
+        return self.pairs.add(kind, slot, stamp_us, time.monotonic())
+
+    def shot(self, pair: LivePair) -> Shot:
+        """Make a frame of a pair that the caller holds; the source may be closed meanwhile."""
+        streams = self._opened
+        color = None if pair.color is None else streams.image(COLOR, pair.color.memory)
+        middle_s = (pair.earliest_s + pair.latest_s) / 2
+        taken = datetime.now(UTC) - timedelta(seconds=time.monotonic() - middle_s)
+        origin = FrameOrigin(
+            sensor=self.identity, captured_at=taken.isoformat(timespec="milliseconds"),
+            exposure_known_by=pair.exposure_known_by, skew_known_by=pair.skew_known_by,
+            notes=pair.notes)
+        frame = self._make_frame(streams.image(DEPTH, pair.depth.memory), color,
+                                 (pair.depth_us, pair.color_us), origin)
+        return Shot(frame, pair.number, pair.earliest_s, pair.latest_s)
+
+    @property
+    def warm(self) -> bool:
+        """Whether enough pairs came: the clocks are known."""
+        return self.pairs is not None and self.pairs.count >= _WARM_PAIRS
+
+    @property
+    def figures(self) -> LiveFigures:
+        """What happened since it was opened."""
+        lost = self.no_room + self.wrong_size
+        if self.pairs is None:
+            return LiveFigures(drops=lost, wrong_size=self.wrong_size)
+        clocks = self.pairs.clocks.values()
+        return LiveFigures(
+            self.pairs.count, lost + sum(clock.missed for clock in clocks), self.wrong_size,
+            self.pairs.repeats, clock_jumps=sum(clock.jumps for clock in clocks),
+            skew_us=self.pairs.skew_us)
+
+    @property
+    def period_s(self) -> float:
+        """Measured time from pair to pair, seconds."""
+        return _SLICE_S if self.pairs is None else self.pairs.period_s
+
+    def silence(self) -> str:
+        """Say, when no pair comes, what is missing."""
+        if self.pairs is None:
+            return f"{self._name}: the streams were not started"
+        now_s = time.monotonic()
+        silent = [kind for kind, clock in self.pairs.clocks.items()
+                  if now_s - clock.last_arrival_s > 2 * _SLICE_S]
+        if not silent:
+            return f"{self._name}: its depth and color frames do not belong together"
+        which = f"{silent[0]} stream" if len(silent) == 1 else "sensor"
+        return f"{self._name}: the {which} has fallen silent or repeats itself"
+
+    @property
+    def identity(self) -> str:
+        """What the sensor is known by."""
+        return self._device_uri.decode("utf-8", "replace")
 
     @property
     def streams(self) -> Streams:

@@ -154,10 +154,9 @@ class Streams:
         return (image[:, ::-1] if stream.mirrored else image).copy()
 
     def close(self) -> None:
-        """Stop and destroy both, also of a device that is gone."""
+        """Stop and destroy both, also of a device that is gone; `image` still works."""
         for stream in self._streams.values():
             close_handle(stream.handle)
-        self._streams.clear()
 
     def _create(self, device: Any, kind: str, *, live: bool) -> _Stream:
         make = device.create_depth_stream if kind == DEPTH else device.create_color_stream
@@ -227,8 +226,8 @@ class Streams:
         if stride == row:
             ctypes.memmove(memory.ctypes.data, int(frame.data), row * height)
             return
-        source = (ctypes.c_uint8 * (stride * (height - 1) + row)).from_address(int(frame.data))
-        memory.reshape(height, row)[:] = np.ndarray((height, row), np.uint8, source, 0, (stride, 1))
+        for y in range(height):  # a driver that pads its rows
+            ctypes.memmove(memory.ctypes.data + y * row, int(frame.data) + y * stride, row)
 
 
 def _property(handle: Any, number: int, kind: type[_C]) -> Any:

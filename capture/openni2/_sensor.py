@@ -1,0 +1,224 @@
+"""Looking after a live sensor, in a thread of its own: the only one that calls the driver."""
+
+import threading
+import time
+from collections.abc import Callable
+
+from primesense import openni2
+
+from denseface.capture.calibration import ChosenCalibration
+from denseface.capture.errors import CaptureError, SensorError
+from denseface.capture.live.pairs import LivePair, PairLog
+from denseface.capture.live.sensor import LiveSensor, Shot
+from denseface.capture.live.states import HANG_S, LiveEvent, LiveFigures, LiveState, LiveStates
+from denseface.capture.openni2._library import binding_errors, load
+from denseface.capture.openni2._live import LiveSource
+
+_SLICE_S = 0.1
+"""Longest wait for a frame at once, seconds: an unplugged sensor is noticed in between."""
+_LOOK_S = 0.2
+"""Time between two looks for a sensor that is not there or cannot be had, seconds."""
+_RETRY_S = 1.0
+"""Pause before a sensor that refused is asked again, seconds."""
+_SILENT_PERIODS, _SILENT_S = 5, 0.3
+"""A sensor without a new pair for so many periods, and so many seconds, is silent."""
+
+
+class WatchedSensor(LiveSensor):
+    """A sensor that is looked for, opened, and opened again when it was lost.
+
+    Parameters
+    ----------
+    device_uri : OpenNI2's URI of the device; None for any one
+    chosen : calibration; None for what the sensor says of itself
+    """
+
+    def __init__(
+        self, device_uri: str | None = None, chosen: ChosenCalibration | None = None
+    ) -> None:
+        self.uri = f"openni2:{device_uri or ''}"
+        self.on_change: Callable[[], object] = lambda: None
+        self._device_uri, self._chosen = device_uri, chosen
+        self._states = LiveStates(time.monotonic())
+        self._past = LiveFigures()
+        """Of the time before the sensor was opened last."""
+        self._stuck = ""
+        self._identity = ""
+        self._source: LiveSource | None = None
+        self._log = PairLog()
+        self._asked = False
+        """Whether somebody asked for a pair that was not there."""
+        self._last_pair_s = 0.0
+        self._called_s = time.monotonic()
+        """When the driver's thread last showed itself."""
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="sensor", daemon=True)
+        self._thread.start()
+
+    # --- for any thread
+
+    @property
+    def state(self) -> LiveState:
+        return self._states.state
+
+    @property
+    def reason(self) -> str:
+        return self._states.reason
+
+    @property
+    def identity(self) -> str:
+        return self._identity
+
+    @property
+    def figures(self) -> LiveFigures:
+        source, past = self._source, self._past
+        return past if source is None else past + source.figures
+
+    def latest(self) -> Shot | None:
+        return self._shot(self._log.newest)
+
+    def first_after(self, after_s: float) -> Shot | None:
+        return self._shot(lambda: self._log.first_after(after_s))
+
+    def wait(self, number: int, timeout_s: float) -> bool:
+        return self._log.wait(number, timeout_s)
+
+    def needs_new_process(self) -> str:
+        state, silent_s = self.state, time.monotonic() - self._called_s
+        if not self._thread.is_alive() or silent_s > HANG_S[state]:
+            return f"the driver hangs ({state.value} for {silent_s:.1f} s)"
+        return self._stuck
+
+    def close(self, timeout_s: float = HANG_S[LiveState.CLOSING]) -> bool:
+        self._stop.set()
+        self._thread.join(timeout_s)
+        return not self._thread.is_alive()
+
+    def _shot(self, find: Callable[[], LivePair | None]) -> Shot | None:
+        source = self._source
+        self._asked = True  # before the look: a pair that comes in between is told
+        pair = find() if source is not None else None
+        if pair is None or source is None:
+            return None
+        self._asked = False
+        try:
+            return source.shot(pair)
+        finally:
+            pair.release()
+
+    # --- for the driver's thread alone
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            self._called_s = time.monotonic()
+            _STEPS[self._states.state](self)
+        self._called_s = time.monotonic()
+        self._shut()
+
+    def _advance(self, event: LiveEvent, reason: str = "") -> None:
+        self._called_s = time.monotonic()
+        before = self._states.state
+        after = self._states.advance(event, self._called_s, reason)
+        if after in (LiveState.OPENING, LiveState.CLOSING):
+            # Whoever waits for `on_change` is to look when the driver hangs.
+            timer = threading.Timer(HANG_S[after] + 0.01, lambda: self.on_change())
+            timer.daemon = True
+            timer.start()
+        if after is not before:
+            self.on_change()
+
+    def _look(self) -> None:
+        """Look for the sensor while it is absent or cannot be had."""
+        try:
+            load()
+            with binding_errors(f"{self.uri}: OpenNI2 does not list its devices"):
+                found = openni2.Device.enumerate_uris()
+        except SensorError as error:
+            self._advance(LiveEvent.REFUSED, str(error))
+            self._stop.wait(_RETRY_S)
+            return
+        listed = [uri.decode("utf-8", "replace") for uri in found]
+        if listed and (self._device_uri is None or self._device_uri in listed):
+            if self._states.state is LiveState.BLOCKED:
+                self._stop.wait(_RETRY_S)
+            self._advance(LiveEvent.FOUND, "the sensor is being opened")
+            return
+        if self._states.state is LiveState.BLOCKED:
+            self._advance(LiveEvent.LOST)
+        if not self._identity:
+            self._states.explain(f"{self.uri.rstrip(':')}: " + (
+                f"no such sensor; found: {', '.join(listed)}" if listed else
+                "OpenNI2 finds no sensor"))
+        self._stop.wait(_LOOK_S)
+
+    def _open(self) -> None:
+        try:
+            source = LiveSource(self._device_uri, self._chosen)
+        except Exception as error:  # whatever a driver makes the binding raise
+            known = isinstance(error, CaptureError)
+            self._advance(LiveEvent.REFUSED, str(error) if known else f"{self.uri}: {error!r}")
+            return
+        self._source = source
+        self._past += LiveFigures(reconnects=int(bool(self._identity)))
+        self._identity = source.identity
+        self._last_pair_s = time.monotonic()
+        self._advance(LiveEvent.OPENED, "the sensor was just opened and is warming up")
+
+    def _serve(self) -> None:
+        """Take what comes; notice when nothing does."""
+        source = self._source
+        if source is None:
+            raise RuntimeError("no sensor is open")
+        try:
+            pair = source.poll(_SLICE_S)
+        except SensorError as error:
+            self._advance(LiveEvent.LOST, str(error))
+            return
+        if pair is not None:
+            self._take(source, pair)
+            return
+        now_s = time.monotonic()
+        if self._states.state is LiveState.STREAMING and (
+                now_s - self._last_pair_s > max(_SILENT_PERIODS * source.period_s, _SILENT_S)):
+            self._log.clear()
+            self._past += LiveFigures(stalls=1)
+            self._advance(LiveEvent.SILENT, source.silence())
+        elif self._states.overdue(now_s):
+            self._advance(LiveEvent.LOST, source.silence())
+
+    def _take(self, source: LiveSource, pair: LivePair) -> None:
+        self._last_pair_s = time.monotonic()
+        if self._states.state is LiveState.WARMING:
+            if not source.warm:
+                pair.release()
+                return
+            self._advance(LiveEvent.WARM)
+        elif self._states.state is LiveState.STALLED:
+            self._advance(LiveEvent.FRAME)
+        self._log.add(pair)
+        if self._asked:
+            self._asked = False
+            self.on_change()
+
+    def _close(self) -> None:
+        self._shut()
+        self._advance(LiveEvent.CLOSED)
+
+    def _shut(self) -> None:
+        self._log.clear()
+        source, self._source = self._source, None
+        if source is not None:
+            self._past += source.figures
+            source.close()
+
+
+_STEPS: dict[LiveState, Callable[[WatchedSensor], None]] = {
+    LiveState.ABSENT: WatchedSensor._look,
+    LiveState.BLOCKED: WatchedSensor._look,
+    LiveState.OPENING: WatchedSensor._open,
+    LiveState.WARMING: WatchedSensor._serve,
+    LiveState.STREAMING: WatchedSensor._serve,
+    LiveState.STALLED: WatchedSensor._serve,
+    LiveState.CLOSING: WatchedSensor._close,
+}
+"""What the driver's thread does in each state, over and over."""
