@@ -31,28 +31,28 @@ _ALT2, _PROFILE = "haarcascade_frontalface_alt2", "haarcascade_profileface"
 _PROFILE_WIDER = 1.09
 """A profile cascade's box by a frontal one's around the same head."""
 
-_COARSE = CascadePass(_ALT2, 28.0, 1.18, 3)
+COARSE = CascadePass(_ALT2, 28.0, 1.18, 3)
 """At a third of a Kinect's resolution for a face at 0.8 m."""
-_MEDIUM = CascadePass(_ALT2, 42.0)
+MEDIUM = CascadePass(_ALT2, 42.0)
 """At half of it."""
 _FINE = CascadePass(_ALT2, 60.0, 1.07)
 """At two thirds of it."""
-_ROLLED = tuple(CascadePass(_ALT2, 36.0, 1.15, 3, roll=degrees) for degrees in (-30, 30, -15, 15))
+ROLLED = tuple(CascadePass(_ALT2, 36.0, 1.15, 3, roll=degrees) for degrees in (-30, 30, -15, 15))
 """For tipped heads."""
-_PROFILES = tuple(CascadePass(_PROFILE, 34.0, 1.05, 6, mirrored=way) for way in (False, True))
+PROFILES = tuple(CascadePass(_PROFILE, 34.0, 1.05, 6, mirrored=way) for way in (False, True))
 """For turned heads, either way."""
 _WHOLE_IMAGE = CascadePass(_ALT2, 28.0, 1.2, 3)
 """Where no pass found a face, to name what looks like one."""
 
-_PASSES = (_COARSE, _MEDIUM, *_ROLLED, *_PROFILES, _FINE)
-"""Until depth confirms a face. `_COARSE` finds most, the others what is turned, tipped or lit from
+_PASSES = (COARSE, MEDIUM, *ROLLED, *PROFILES, _FINE)
+"""Until depth confirms a face. `COARSE` finds most, the others what is turned, tipped or lit from
 the side."""
-_EQUALIZED_PASSES = (_COARSE, _MEDIUM, *_ROLLED, _FINE)
+_EQUALIZED_PASSES = (COARSE, MEDIUM, *ROLLED, _FINE)
 """Then, in equalised images, for faces in the dark, before a bright wall or lit aslant. The profile
 cascade takes the back of an ear for a face there."""
-_NEARER_PASSES = (_MEDIUM, *_ROLLED[:2], *_PROFILES)
+_NEARER_PASSES = (MEDIUM, *ROLLED[:2], *PROFILES)
 """For what stands before a face that was found."""
-_NEARER_EQUALIZED_PASSES = (_MEDIUM, *_ROLLED[:2], _FINE)
+_NEARER_EQUALIZED_PASSES = (MEDIUM, *ROLLED[:2], _FINE)
 """The same in equalised images."""
 _NEARER_MM = 10.0
 """What is nearer than the face by this is searched again."""
@@ -106,13 +106,13 @@ def detect_face(color: Bytes, registered: Registration, focal_px: float) -> Dete
     NoDepthError
         Where nothing measured lies before the colour camera.
     """
-    search = _Search(color, registered, focal_px)
+    search = Search(color, registered, focal_px)
     for equalized, passes in ((False, _PASSES), (True, _EQUALIZED_PASSES)):
         for one in passes:
             hit = search.nearest_face(one, search.regions, equalized=equalized)
             if hit:
                 return search.detection(search.nearer_face(hit.face) or hit)
-            if one is _COARSE and not equalized:
+            if one is COARSE and not equalized:
                 search.regions = search.without_flat(search.regions)
     raise search.failure()
 
@@ -156,7 +156,7 @@ class _Hit(NamedTuple):
     cascade_pass: CascadePass
 
 
-class _Search:
+class Search:
     """One frame's search: the image, the regions to search, and the candidates so far."""
 
     def __init__(self, color: Bytes, registered: Registration, focal_px: float) -> None:
@@ -184,17 +184,24 @@ class _Search:
     ) -> _Hit | None:
         """Give the nearest face of the nearest region that has any."""
         for region in regions:
-            small, large = FACE_WIDTH_MM
-            typical = self.focal_px * _TYPICAL_WIDTH_MM / np.sqrt(region.near_mm * region.far_mm)
-            sizes = (self.focal_px * small / region.far_mm, self.focal_px * large / region.near_mm)
-            centers = CenterMask(region.centers, self.gray.shape[1] / CELLS)
             gray = self._equalize(region) if equalized else self.gray
-            found = self._run(gray, region.roi, cascade_pass, typical, sizes, centers)
-            self.candidates += found
-            faces = [c for c in found if c.verdict == "face"]
+            faces = self.faces_in(cascade_pass, region, gray)
             if faces:
                 return _Hit(min(faces, key=_depth), gray, cascade_pass)
         return None
+
+    def faces_in(
+        self, cascade_pass: CascadePass, region: Region, gray: Bytes | None = None
+    ) -> list[FaceCandidate]:
+        """Give all that one pass takes for a face in a region, of the image or another version."""
+        small, large = FACE_WIDTH_MM
+        typical = self.focal_px * _TYPICAL_WIDTH_MM / np.sqrt(region.near_mm * region.far_mm)
+        sizes = (self.focal_px * small / region.far_mm, self.focal_px * large / region.near_mm)
+        centers = CenterMask(region.centers, self.gray.shape[1] / CELLS)
+        found = self._run(self.gray if gray is None else gray, region.roi, cascade_pass, typical,
+                          sizes, centers)
+        self.candidates += found
+        return [candidate for candidate in found if candidate.verdict == "face"]
 
     def nearer_face(self, found: FaceCandidate) -> _Hit | None:
         """Search, by other passes, what stands before a face and is not its own body."""

@@ -26,7 +26,8 @@ def register(
 
     Parameters
     ----------
-    frame : depth, in its own unit, and colour with their calibration
+    frame : depth, in its own unit, and colour with their calibration; without colour, the depth
+        is tied to the colour camera that the calibration describes, and `colors` must be False
     rows, columns : the part of the depth image to register, every pixel or every k-th
     colors : whether to sample them; zero otherwise
 
@@ -50,7 +51,7 @@ def register(
     grid = PixelGrid(*_rays(frame.depth_camera), (first_row, first_column), (row_step, column_step))
     camera = _color_camera(frame)
     pitch = max(1.0, camera.intrinsics[0] / frame.depth_camera.fx * row_step)
-    cells = [int(np.ceil(side / pitch)) + 1 for side in frame.rgb.shape[:2]]
+    cells = [int(np.ceil(side / pitch)) + 1 for side in reversed(camera.size)]
     nearest = np.full(cells, NO_DEPTH_MM)
     z_buffer = ZBuffer(nearest, pitch)
     top, bottom, left, right = kernels.project(
