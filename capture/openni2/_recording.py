@@ -2,27 +2,37 @@
 
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, BinaryIO
 
 from primesense import openni2
 
-from denseface.capture.calibration import MAX_SIDE, ChosenCalibration
+from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.errors import SensorError, UnreadableSourceError
 from denseface.capture.frame import RgbdFrame
+from denseface.capture.oni.mend import mended, what_is_missing
+from denseface.capture.oni.recorded import Recorded
+from denseface.capture.oni.records import DEPTH_NODE, IMAGE_NODE
 from denseface.capture.openni2._base import OpenNI2Source
 from denseface.capture.openni2._library import binding_errors, load, open_sources
-from denseface.capture.openni2._oni_file import DEPTH_NODE, IMAGE_NODE, OniNode, check_oni
 from denseface.capture.openni2._path import ascii_name
 from denseface.capture.openni2._streams import COLOR, DEPTH, Streams
+from denseface.capture.pairing import Pair
 
 _FILE_WAIT_S = 2.0
 """Longest wait for a frame of a file, seconds: longer, and the file is damaged."""
 _SETTLE_S = 0.1
 """Wait between stopping and destroying streams, seconds."""
+_NODES = {DEPTH: DEPTH_NODE, COLOR: IMAGE_NODE}
 
 
 class RecordingSource(OpenNI2Source):
     """An `.oni` recording; each pass over it starts at the first frame.
+
+    One that was cut gives the frames before. What OpenNI2 cannot play for want of something that
+    can be supplied is played from a temporary copy. Either is said in each frame's `origin.notes`.
 
     Raises
     ------
@@ -33,35 +43,29 @@ class RecordingSource(OpenNI2Source):
     """
 
     _live = False
+    _copy: BinaryIO | None = None
 
     def __init__(self, path: Path, chosen: ChosenCalibration | None = None) -> None:
-        super().__init__(str(path), chosen)
+        self._recorded = Recorded(path)
+        super().__init__(str(path), chosen or self._recorded.calibration)
         self._unread = True
-        nodes, _ = check_oni(path)
-        depth, color = (self._find_node(nodes, kind, what)
-                        for kind, what in ((DEPTH_NODE, DEPTH), (IMAGE_NODE, COLOR)))
+        self._registered = self._recorded.depth.registered
+        if self._recorded.color is None:
+            raise UnreadableSourceError(
+                f"{self.uri}: has no color stream; depth and color are needed")
+        self._expected = {DEPTH: self._recorded.depth.frames, COLOR: self._recorded.color.frames}
+        self.frame_count = self._recorded.pairs
+        if not self.frame_count:
+            raise UnreadableSourceError(
+                f"{self.uri}: holds no pair of {self._expected[DEPTH]} depth and "
+                f"{self._expected[COLOR]} color frames")
         self._open()
-        self._registered = depth.registered
-        self._expected = {DEPTH: depth.frames, COLOR: color.frames}
-        self.frame_count = min(self._expected.values())
-
-    def _find_node(self, nodes: list[OniNode], kind: int, what: str) -> OniNode:
-        """Find a stream that has a size: without one, OpenNI2 invents it and crashes."""
-        node = next((node for node in nodes if node.kind == kind), None)
-        if node is None:
-            raise UnreadableSourceError(
-                f"{self.uri}: has no {what} stream; depth and color are needed")
-        if node.sides is None or not all(1 <= side <= MAX_SIDE for side in node.sides):
-            found = "no size" if node.sides is None else "{}x{}".format(*node.sides)
-            raise UnreadableSourceError(
-                f"{self.uri}: the {what} stream has {found}, expected sides of 1 to {MAX_SIDE}")
-        return node
 
     def __iter__(self) -> Iterator[RgbdFrame]:
         streams = self._streams
         if not self._unread or streams is None:
             # Seeking hangs, so each new pass opens the file again.
-            self.close()
+            self._close_device()
             streams = self._open()
         self._unread = False
         self.pairer.clear()
@@ -82,11 +86,18 @@ class RecordingSource(OpenNI2Source):
             if max(left.values()) <= 0:
                 # At the end the player's thread would busy-wait.
                 streams.stop()
-            if pair := self._add(kind, image):
+            stamp_us, pixels = image
+            if pair := self._add(kind, (stamp_us + self._recorded.shift_us[_NODES[kind]], pixels)):
                 yield self._frame(pair)
 
     def close(self) -> None:
         """Stop the streams and close the file; harmless when repeated."""
+        self._close_device()
+        if self._copy is not None:
+            self._copy.close()
+            self._copy = None
+
+    def _close_device(self) -> None:
         if self._streams is not None and not self._unread:
             # The player's thread reads the list of streams without a lock, and crashes when one
             # is destroyed meanwhile. While all are stopped, it sleeps 10 ms a round.
@@ -94,16 +105,26 @@ class RecordingSource(OpenNI2Source):
             time.sleep(_SETTLE_S)
         super().close()
 
+    def _frame(self, pair: Pair[Any, Any]) -> RgbdFrame:
+        return replace(super()._frame(pair), depth_meaning=self._recorded.meaning(self._unit_um),
+                       origin=self._recorded.origin(pair.depth_us))
+
     def _open(self) -> Streams:
         load()
         path = Path(self.uri).absolute()
-        # Devices that were opened by the same name share their position in the file.
-        again = any(other is not self and other._streams is not None
-                    and Path(other.uri).absolute() == path for other in list(open_sources))
         try:
-            with binding_errors(f"{self.uri}: OpenNI2 cannot open it", UnreadableSourceError):
-                with ascii_name(path, unique=again) as name:
-                    device = openni2.Device.open_file(name)
+            with (binding_errors(f"{self.uri}: OpenNI2 cannot open it", UnreadableSourceError),
+                  ExitStack() as stack):
+                if what_is_missing(self._recorded.file):
+                    self._copy = self._copy or mended(path, self._recorded.file)
+                    name = b"/proc/self/fd/%d" % self._copy.fileno()
+                else:
+                    # Devices that were opened by the same name share their position in the file.
+                    again = any(other is not self and other._streams is not None
+                                and Path(other.uri).absolute() == path
+                                for other in list(open_sources))
+                    name = stack.enter_context(ascii_name(path, unique=again))
+                device = openni2.Device.open_file(name)
                 if not device.is_file():
                     device.close()
                     raise UnreadableSourceError(

@@ -44,8 +44,9 @@ with open_source(sys.argv[1]) as source:
 """
 _RECORD = """
 import sys
-from denseface.capture.openni2.recorder import record
-record(None, sys.argv[1], int(sys.argv[2]))
+from pathlib import Path
+from tests.virtual_sensor.recorder import record
+record(Path(sys.argv[1]), int(sys.argv[2]))
 """
 
 

@@ -8,7 +8,7 @@ import pytest
 from denseface import load_face, open_source
 from denseface.capture.calibration import Calibration
 from denseface.capture.errors import CaptureError
-from denseface.capture.openni2._oni_file import check_oni
+from denseface.capture.oni.file import read_oni
 from denseface.service.errors import ServiceError
 from denseface.service.protocol.roles import Role
 from denseface.service.security import AllowList, KeyPair, allow, read_pair, read_public
@@ -29,7 +29,7 @@ def calibration_beside(path):
 READERS = {
     "input.npz": open_source,
     "input.oni": open_source,
-    "records.oni": check_oni,
+    "records.oni": read_oni,
     "face.npz": load_face,
     "calibration.json": Calibration.from_file,
     "beside.json": calibration_beside,

@@ -1,11 +1,13 @@
 import struct
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from denseface.capture.errors import UnreadableSourceError
-from denseface.capture.openni2._oni_file import DEPTH_NODE, IMAGE_NODE, check_oni, written_frames
+from denseface.capture.oni.file import read_oni
+from denseface.capture.oni.records import DEPTH_NODE, IMAGE_NODE
 
 
 def text(value: str) -> bytes:
@@ -27,32 +29,59 @@ def recording(*extra: bytes) -> bytes:
         record(0x0D, 1, text("Depth1") + struct.pack("<I", 2) + b"16zT" + bytes(20)),
         record(0x0D, 2, text("Image1") + struct.pack("<I", 3) + b"JPEG" + bytes(20)),
         number(1, "xnMirror", 1), *extra,
-        *(record(0x0A, node, bytes(12), b"x" * 50) for node in (1, 2, 1)),
+        *(record(0x0A, node, struct.pack("<QI", stamp, stamp), b"x" * 50)
+          for stamp, node in enumerate((1, 2, 1))),
         record(0x0B, 0),
     ])
 
 
-def test_nodes_frames_and_properties(tmp_path):
+def written(tmp_path: Path, content: bytes) -> Path:
     path = tmp_path / "a.oni"
-    path.write_bytes(recording(number(1, "AlternativeViewPoint", 1)) + bytes(1000))
-    (depth, image), end = check_oni(path)
+    path.write_bytes(content)
+    return path
+
+
+def test_nodes_frames_and_properties(tmp_path):
+    content = recording(number(1, "AlternativeViewPoint", 1))
+    found = read_oni(written(tmp_path, content + bytes(1000)))
+    depth, image = found.nodes.values()
     assert (depth.kind, depth.frames, depth.registered) == (DEPTH_NODE, 2, True)
     assert (image.kind, image.frames, image.registered) == (IMAGE_NODE, 1, False)
     assert depth.properties["xnMirror"] == 1
-    assert end == path.stat().st_size - 1000
+    assert (found.end, found.cut, found.max_node) == (len(content), None, 2)
+    assert list(found.order) == [DEPTH_NODE, IMAGE_NODE, DEPTH_NODE]
+    assert list(found.stamps_us) == [0, 1, 2]
 
 
 def test_depth_as_the_depth_camera_sees_it(tmp_path):
-    path = tmp_path / "a.oni"
-    path.write_bytes(recording(number(1, "AlternativeViewPoint", 0)))
-    assert not check_oni(path)[0][0].registered
+    found = read_oni(written(tmp_path, recording(number(1, "AlternativeViewPoint", 0))))
+    assert not found.nodes[1].registered
+
+
+FRAME = 28 + 12 + 50
+END = 28
+
+
+@pytest.mark.parametrize(("content", "frames", "words"), [
+    (recording()[:-1], 3, "without an end record"),
+    (recording()[:-END], 3, "without an end record"),
+    (recording()[:-END - 1], 2, "in the middle of a record"),
+    (recording()[:-END - FRAME + 1], 2, "without an end record"),
+    (recording()[:-END - 2 * FRAME], 1, "without an end record"),
+    (recording()[:-END] + bytes(5000), 3, "no valid record there"),
+])
+def test_what_was_whole_before_a_cut_is_found(tmp_path, content, frames, words):
+    found = read_oni(written(tmp_path, content))
+    assert words in found.cut
+    assert found.end == len(recording()) - END - (3 - frames) * FRAME
+    assert len(found.order) == frames == sum(node.frames for node in found.nodes.values())
 
 
 @pytest.mark.parametrize(("content", "words"), [
     (b"", "empty"),
     (b"hello, I am not a recording at all", "not an .oni recording"),
     (b"NI10", "ends after 4 bytes"),
-    (recording()[:-1], "without an end record"),
+    (recording()[:-END - 3 * FRAME], "without an end record"),
     (recording()[:200], "ends after 200 bytes"),
     (recording().replace(b"NIR\0", b"XXXX"), "damaged at byte 24"),
     (recording().replace(b"xnMirror", b"xnM\xffrror"), "no valid name"),
@@ -62,24 +91,14 @@ def test_what_is_wrong_is_said(tmp_path, content, words):
     path = tmp_path / "bad.oni"
     path.write_bytes(content)
     with pytest.raises(UnreadableSourceError) as caught:
-        check_oni(path)
+        read_oni(path)
     assert "bad.oni: " in str(caught.value)
     assert words in str(caught.value)
 
 
-def test_written_frames_while_a_recorder_is_at_work(tmp_path):
-    path = tmp_path / "part.oni"
-    assert written_frames(path) == 0
-    whole = recording()
-    path.write_bytes(whole[:-28 - 90] + bytes(5000))
-    assert written_frames(path) == 1
-    path.write_bytes(whole[:200])
-    assert written_frames(path) == 0
-
-
 def complaint(path) -> str | None:
     try:
-        check_oni(path)
+        read_oni(path)
     except UnreadableSourceError as error:
         return str(error)
     return None
@@ -87,7 +106,7 @@ def complaint(path) -> str | None:
 
 def test_a_missing_file(tmp_path):
     with pytest.raises(UnreadableSourceError, match=r"none\.oni: No such file"):
-        check_oni(tmp_path / "none.oni")
+        read_oni(tmp_path / "none.oni")
 
 
 @given(st.data())
