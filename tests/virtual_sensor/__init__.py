@@ -2,7 +2,7 @@
 
 A test writes a clip, makes a `Control` for each device, and starts a process in `environment`::
 
-    write_clip(tmp_path / "clip", [(depth, color), ...])             # or `cheap_clip`, `face_clip`
+    write_clip(tmp_path / "clip", [(depth, color), ...])             # or see `scenes`
     sensor = Control(tmp_path / "sensor", tmp_path / "clip", uri="virtual:0", serial="A1")
     env = environment(controls=[sensor])                             # several: several devices
     done = run_python(CODE, env=env)                                 # or a service under that env
@@ -23,7 +23,10 @@ frame, a call, or 5 ms; nothing is told to the process itself::
 
 Before the device is opened: `depth.offer(Mode(320, 240, 60))`, `color.present = False` (a sensor
 without a colour camera), `driver`, `usb_vendor`, `usb_product`, `depth.mirroring = Honesty.SECRET`,
-`registered_at_start`, `color.crop_width`, ... `control.py` lists each field with its meaning.
+`registered_at_start`, `color.crop_width`, `settle_frames`, ... `control.py` lists each field with
+its meaning. `presets.as_xtion(sensor)`, `as_kinect`, `as_astra`, `as_structure_sensor` set all that
+is known of those. Clips: `scenes.cheap_clip` (a ball, outlines where they belong, no face) and
+`scenes.face_clip` (a face that moves, with its truth; kept between runs).
 
 The driver counts what it did: `opens`, `closes`, `loads` (processes), `depth.frames` (sent),
 `depth.lost`, `depth.running`, `hanging` (a call that hangs now). `wait_frames(n)` waits for n more.

@@ -40,7 +40,9 @@ class Driver(enum.IntEnum):
     """ZPD, ZPPS, LDDIS and DCRCDIS as in the clip."""
     FREENECT = 1
     """The constants of libfreenect's driver, whatever the device: ZPPS 0.1052, a colour field of
-    view of 62 degrees; no DCRCDIS, no LDDIS, no serial number, no synchronization."""
+    view of 62 degrees; no DCRCDIS, no serial number, no synchronization. Its faults too: once
+    closed it cannot be opened again in the process, asking for registration before there is a
+    depth stream crashes, AUTO_EXPOSURE switches the white balance, mirroring is off by a pixel."""
     ORBBEC = 2
     """As PrimeSense, and the factory calibration of both cameras as device property 14."""
     BARE = 3
@@ -238,9 +240,17 @@ class Control(Block):
     marks = Flag()
     """Each image carries its number and the time of its exposure in its first rows: `read_mark`."""
     settle_frames = Number()
-    """The colour camera's exposure and white balance settle over so many frames after its start."""
+    """The colour camera's exposure and white balance settle over so many frames after its start:
+    from less than half of the brightness, and too red."""
+    breathing_per_mille = Number()
+    """So much the brightness goes up and down, by its mean, as long as exposure is automatic."""
+    camera_controls = Flag(True)
+    """Whether there are AUTO_EXPOSURE, AUTO_WHITE_BALANCE and EXPOSURE (100 when settled), which
+    can be set while the colour stream runs."""
     registration = Choice(Honesty.MISSING)
     """What the property IMAGE_REGISTRATION does and says."""
+    factory_blank = Flag()
+    """Orbbec's factory calibration is not a number, as of an Astra Pro."""
     registered_at_start = Flag()
     """Depth is in the colour camera's pixels at the start."""
     synchronized = Flag()

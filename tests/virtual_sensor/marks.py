@@ -1,7 +1,7 @@
 """The mark in a frame's first rows: its number and when it was exposed (`Control.marks`).
 
 The image is 80 square blocks wide. The first row of blocks is the time of the exposure, the second
-the number, 64 bits each, the lowest first: depth 2 or 4 m, colour black or white. It outlives JPEG,
+the number, 64 bits each, the lowest first, and 16 that guard them: depth 2 or 4 m, colour black or white. It outlives JPEG,
 other resolutions and YUV, but not cropping.
 """
 
@@ -14,8 +14,8 @@ __all__ = ["Mark", "read_mark"]
 
 _COLUMNS = 80
 """Blocks in the image's width."""
-_BITS = 64
-"""Blocks that are used."""
+_GUARD = 0xA5C3
+"""Of a word and its four sixteen-bit parts: what the last 16 blocks say, exclusive or."""
 _DEPTH_MM = (2000, 4000)
 """Depth of a 0 and of a 1."""
 _TOLERANCE = 0.25
@@ -55,8 +55,8 @@ def read_mark(image: NDArray[Any], *, unit_um: int = 1000) -> Mark:
 
 def _words(image: NDArray[Any], unit_um: int) -> list[int] | None:
     block = max(1, image.shape[1] // _COLUMNS)
-    rows = np.asarray(image[:2 * block, :_BITS * block], np.float64)
-    if rows.shape[:2] != (2 * block, _BITS * block):
+    rows = np.asarray(image[:2 * block, :_COLUMNS * block], np.float64)
+    if rows.shape[:2] != (2 * block, _COLUMNS * block):
         return None
     zero, one = (mm * 1000 / unit_um for mm in _DEPTH_MM)
     if rows.ndim == 3:
@@ -64,10 +64,16 @@ def _words(image: NDArray[Any], unit_um: int) -> list[int] | None:
         rows = rows.mean(axis=2)
     # The middle of each block: its rim may be mixed with its neighbour.
     inner = slice(block // 4, block - block // 4)
-    blocks = rows.reshape(2, block, _BITS, block)[:, inner, :, inner]
+    blocks = rows.reshape(2, block, _COLUMNS, block)[:, inner, :, inner]
     values = (blocks.mean(axis=(1, 3)) - zero) / (one - zero)
     bits = values.round()
     if np.abs(values - bits).max() > _TOLERANCE or not {0, 1} >= set(bits.flat):
         return None
-    shifted = bits.astype(np.uint64) << np.arange(_BITS, dtype=np.uint64)
-    return [int(word) for word in shifted.sum(axis=1)]
+    words = [sum(int(bit) << at for at, bit in enumerate(row)) for row in bits]
+    if any(word >> 64 != _guard(word & 2**64 - 1) for word in words):
+        return None
+    return [word & 2**64 - 1 for word in words]
+
+
+def _guard(word: int) -> int:
+    return (_GUARD ^ word ^ word >> 16 ^ word >> 32 ^ word >> 48) & 0xFFFF

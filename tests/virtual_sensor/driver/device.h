@@ -1,8 +1,10 @@
 // One device: its streams, and the clock that exposes and delivers their frames.
 #pragma once
+#include <csignal>
 #include <deque>
 #include <functional>
 
+#include "factory.h"
 #include "stream.h"
 
 constexpr int64_t kFirstStampUs = 1000000;
@@ -67,11 +69,14 @@ public:
     OniStatus getProperty(int id, void* data, int* size) override;
     OniStatus setProperty(int id, const void* data, int size) override;
     OniBool isPropertySupported(int id) override {
+        if (id == ONI_DEVICE_PROPERTY_IMAGE_REGISTRATION && control().device.driver == Driver::FREENECT)
+            return true;
         char any[256];
         int size = sizeof any;
         return getProperty(id, any, &size) == ONI_STATUS_OK;
     }
     OniBool isImageRegistrationModeSupported(OniImageRegistrationMode mode) override {
+        needsDepthStream();
         return mode == ONI_IMAGE_REGISTRATION_OFF || control().device.registration != Honesty::MISSING;
     }
 
@@ -89,6 +94,12 @@ private:
     int64_t origin_ns_ = 0;  // when number 0 was exposed
     std::thread clock_;
 
+    // Freenect's driver asks its depth stream, and crashes where there is none.
+    void needsDepthStream() {
+        std::lock_guard<std::mutex> lock(shared_.mutex);
+        const bool has = std::any_of(streams_.begin(), streams_.end(), [](const Stream* s) { return s->depth; });
+        if (control().device.driver == Driver::FREENECT && !has) std::raise(SIGSEGV);
+    }
     bool allRunning() const {
         return !streams_.empty() && std::all_of(streams_.begin(), streams_.end(),
                                                 [](const Stream* s) -> bool { return s->running; });
@@ -123,7 +134,10 @@ inline OniStatus Device::getProperty(int id, void* data, int* size) {
         *size = length;
         return ONI_STATUS_OK;
     }
+    if (id == kFactoryCalibration && words.driver == Driver::ORBBEC)
+        return put(factoryCalibration(shared_.clip.head, words.factory_blank), data, size);
     if (id == ONI_DEVICE_PROPERTY_IMAGE_REGISTRATION && words.registration != Honesty::MISSING) {
+        needsDepthStream();
         const bool says = says_registered_ && words.registration != Honesty::SECRET;
         return put(says ? ONI_IMAGE_REGISTRATION_DEPTH_TO_COLOR : ONI_IMAGE_REGISTRATION_OFF, data, size);
     }
@@ -137,6 +151,7 @@ inline OniStatus Device::setProperty(int id, const void* data, int size) {
     if (id != ONI_DEVICE_PROPERTY_IMAGE_REGISTRATION || size != sizeof(OniImageRegistrationMode)
             || words.registration == Honesty::MISSING || words.registration == Honesty::REFUSED)
         return ONI_STATUS_NOT_SUPPORTED;
+    needsDepthStream();
     OniImageRegistrationMode mode;
     std::memcpy(&mode, data, sizeof mode);
     says_registered_ = mode == ONI_IMAGE_REGISTRATION_DEPTH_TO_COLOR;

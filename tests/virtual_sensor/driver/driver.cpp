@@ -21,7 +21,7 @@ public:
                          DeviceStateChangedCallback changed, void* cookie) override {
         DriverBase::initialize(connected, gone, changed, cookie);
         for (Control* control : findControls()) {
-            known_.push_back({control, {}, false, control->device.plugs, 0});
+            known_.push_back({control, {}, false, false, control->device.plugs, 0});
             control->device.loads++;
             if (shown(*control)) connect(known_.back());
         }
@@ -32,7 +32,10 @@ public:
         Known* found = nullptr;
         for (Known& one : known_)
             if (!std::strcmp(one.info.uri, uri)) found = &one;
-        if (!found) return nullptr;
+        if (!found || found->gone) {
+            getServices().errorLoggerAppend("Could not find device %s", uri);
+            return nullptr;
+        }
         Control& control = *found->control;
         mayHang(control, Call::OPEN);
         const int64_t fault = control.device.open_fault;
@@ -59,9 +62,15 @@ public:
         mayHang(control, Call::CLOSE);
         delete static_cast<Device*>(device);
         control.device.closes++;
+        // Freenect's driver forgets what it closed: this process cannot open it a second time.
+        for (Known& one : known_)
+            if (one.control == &control) one.gone = control.device.driver == Driver::FREENECT;
     }
     OniStatus tryDevice(const char*) override { return ONI_STATUS_ERROR; }
     void* enableFrameSync(StreamBase**, int) override {
+        for (Known& one : known_)
+            if (one.control->device.driver == Driver::FREENECT || one.control->device.driver == Driver::BARE)
+                return nullptr;
         for (Known& one : known_) one.control->device.synchronized = true;
         return this;
     }
@@ -78,7 +87,7 @@ private:
     struct Known {
         Control* control;
         OniDeviceInfo info;
-        bool connected;
+        bool connected, gone;
         int64_t plugs;  // how often it had been pulled when it was announced
         int64_t state;
     };

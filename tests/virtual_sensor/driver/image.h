@@ -103,11 +103,16 @@ inline std::vector<uint8_t> scaledColor(const ClipHeader& h, const uint8_t* colo
     return out;
 }
 
-inline void mirror(char* image, int width, int height, int pixel) {
+// Freenect's is off by one: it shows each pixel one column too far to the right, and in the first
+// column the first pixel of the next row.
+inline void mirror(char* image, int width, int height, int pixel, bool freenect) {
     for (int row = 0; row < height; row++) {
         char* start = image + size_t(row) * width * pixel;
         for (int a = 0, b = width - 1; a < b; a++, b--)
             std::swap_ranges(start + a * pixel, start + (a + 1) * pixel, start + b * pixel);
+        if (!freenect) continue;
+        std::memmove(start + pixel, start, size_t(width - 1) * pixel);
+        if (row + 1 < height) std::memcpy(start, start + size_t(width) * pixel, size_t(pixel));
     }
 }
 
@@ -136,6 +141,7 @@ inline std::vector<char> yuv(const std::vector<char>& rgb, bool lumaFirst) {
 
 // A frame's number and the time of its exposure as blocks in the first rows: marks.py reads them.
 constexpr int kMarkBits = 64, kMarkColumns = 80;
+constexpr uint64_t kMarkGuard = 0xA5C3;
 constexpr uint16_t kMarkMm[2] = {2000, 4000};
 
 template <class Pixel, class Paint>
@@ -144,8 +150,11 @@ void mark(Pixel* image, int width, int channels, uint64_t number, uint64_t expos
     const int block = std::max(1, width / kMarkColumns);
     const uint64_t words[2] = {exposedNs, number};
     for (int row = 0; row < 2 * block; row++)
-        for (int column = 0; column < kMarkBits * block; column++) {
-            const bool bit = words[row / block] >> (column / block) & 1;
+        for (int column = 0; column < kMarkColumns * block; column++) {
+            const uint64_t word = words[row / block];
+            const uint64_t guard = kMarkGuard ^ word ^ word >> 16 ^ word >> 32 ^ word >> 48;
+            const int at = column / block;
+            const bool bit = at < kMarkBits ? word >> at & 1 : guard >> (at - kMarkBits) & 1;
             for (int channel = 0; channel < channels; channel++)
                 image[(size_t(row) * width + column) * channels + channel] = paint(bit);
         }

@@ -8,6 +8,7 @@
 #define XN_DELETE(p) delete (p)
 #include "Driver/OniDriverAPI.h"
 #include "PS1080.h"
+#include "exposure.h"
 #include "image.h"
 #include "steering.h"
 
@@ -30,6 +31,11 @@ template <class T> OniStatus put(const T& value, void* data, int* size) {
     std::memcpy(data, &value, sizeof value);
     *size = sizeof value;
     return ONI_STATUS_OK;
+}
+
+inline bool isCameraProperty(int id) {
+    return id == ONI_STREAM_PROPERTY_AUTO_EXPOSURE || id == ONI_STREAM_PROPERTY_AUTO_WHITE_BALANCE
+        || id == ONI_STREAM_PROPERTY_EXPOSURE;
 }
 
 class Stream : public StreamBase {
@@ -83,9 +89,9 @@ private:
     OniVideoMode mode_;
     std::atomic<OniBool> mirrored_, says_mirrored_;
     OniCropping crop_, says_crop_;
+    Exposure exposure_;
     std::vector<char> last_;  // what was sent last: shown again while frozen
     int64_t lastStampUs_ = 0, lastNumber_ = 0;
-    int64_t since_start_ = 0;
     std::map<size_t, std::vector<char>> kept_;
     OniVideoMode kept_mode_{};
     bool kept_registered_ = false;
@@ -94,8 +100,10 @@ private:
         std::lock_guard<std::mutex> lock(shared_.mutex);
         running = on;
         words_.running = on;
-        since_start_ = 0;
-        if (on) joined = false;
+        if (on) {
+            joined = false;
+            exposure_.restart();
+        }
         shared_.changed.notify_all();
         return ONI_STATUS_OK;
     }
@@ -103,6 +111,11 @@ private:
     void picture(int64_t number, int64_t exposedNs);
     void cut(OniFrame& frame, const std::vector<char>& image) const;
     OniStatus answerOfDepth(int id, void* data, int* size);
+    OniStatus answerOfCamera(int id, void* data, int* size);
+    OniStatus setCamera(int id, const void* data, int size);
+    bool hasCamera(int id) const {
+        return !depth && shared_.control.device.camera_controls && isCameraProperty(id);
+    }
 };
 
 inline OniStatus Stream::answerOfDepth(int id, void* data, int* size) {
@@ -114,12 +127,39 @@ inline OniStatus Stream::answerOfDepth(int id, void* data, int* size) {
     case XN_STREAM_PROPERTY_ZERO_PLANE_DISTANCE: return put(freenect ? uint64_t(120) : h.zpd, data, size);
     case XN_STREAM_PROPERTY_ZERO_PLANE_PIXEL_SIZE: return put(freenect ? 0.1052 : h.zpps, data, size);
     }
-    if (!freenect) switch (id) {
-    case XN_STREAM_PROPERTY_EMITTER_DCMOS_DISTANCE: return put(h.lddis, data, size);
-    case XN_STREAM_PROPERTY_DCMOS_RCMOS_DISTANCE: return put(h.dcrcdis, data, size);
+    if (id == XN_STREAM_PROPERTY_EMITTER_DCMOS_DISTANCE) return put(freenect ? 7.5 : h.lddis, data, size);
+    if (id == XN_STREAM_PROPERTY_DCMOS_RCMOS_DISTANCE && !freenect) return put(h.dcrcdis, data, size);
+    return ONI_STATUS_NOT_SUPPORTED;
+}
+
+inline OniStatus Stream::answerOfCamera(int id, void* data, int* size) {
+    switch (id) {
+    case ONI_STREAM_PROPERTY_AUTO_EXPOSURE: return put(OniBool(exposure_.exposes), data, size);
+    case ONI_STREAM_PROPERTY_AUTO_WHITE_BALANCE: return put(OniBool(exposure_.balances), data, size);
+    case ONI_STREAM_PROPERTY_EXPOSURE:
+        return put(exposure_.value(shared_.control.device.breathing_per_mille), data, size);
     }
     return ONI_STATUS_NOT_SUPPORTED;
 }
+
+// PS1080 takes these only while it streams; Freenect confuses the two switches.
+inline OniStatus Stream::setCamera(int id, const void* data, int size) {
+    if (size != sizeof(int)) return ONI_STATUS_BAD_PARAMETER;
+    if (!running) return ONI_STATUS_ERROR;
+    int value;
+    std::memcpy(&value, data, sizeof value);
+    const bool freenect = shared_.control.device.driver == Driver::FREENECT;
+    if (id == ONI_STREAM_PROPERTY_AUTO_EXPOSURE && !freenect) {
+        exposure_.exposes = value != 0;
+    } else if (id == ONI_STREAM_PROPERTY_EXPOSURE) {
+        if (exposure_.exposes || value < 1) return ONI_STATUS_ERROR;
+        exposure_.set(value);
+    } else {
+        exposure_.balances = value != 0;
+    }
+    return ONI_STATUS_OK;
+}
+
 
 inline OniStatus Stream::getProperty(int id, void* data, int* size) {
     mayHang(shared_.control, Call::GET_PROPERTY);
@@ -133,6 +173,7 @@ inline OniStatus Stream::getProperty(int id, void* data, int* size) {
         return put(words_.mirroring == Honesty::SECRET ? OniBool(FALSE) : says_mirrored_.load(), data, size);
     if (id == ONI_STREAM_PROPERTY_CROPPING && words_.cropping != Honesty::MISSING)
         return put(words_.cropping == Honesty::SECRET ? OniCropping{} : says_crop_, data, size);
+    if (hasCamera(id)) return answerOfCamera(id, data, size);
     if (driver == Driver::BARE) return ONI_STATUS_NOT_SUPPORTED;
     switch (id) {
     case ONI_STREAM_PROPERTY_HORIZONTAL_FOV: return put(fov[0], data, size);
@@ -172,7 +213,7 @@ inline OniStatus Stream::setProperty(int id, const void* data, int size) {
                 return ONI_STATUS_OK;
             }
     }
-    return ONI_STATUS_NOT_SUPPORTED;
+    return hasCamera(id) ? setCamera(id, data, size) : OniStatus(ONI_STATUS_NOT_SUPPORTED);
 }
 
 // What is raised here, OpenNI2's recorder stores. Without CROPPING its player drops each frame.
@@ -215,8 +256,13 @@ inline const std::vector<char>& Stream::scene(size_t index) {
 inline void Stream::picture(int64_t number, int64_t exposedNs) {
     const int width = mode_.resolutionX, height = mode_.resolutionY;
     // The clip is 30 frames a second, whatever the stream's rate.
+    const DeviceControl& words = shared_.control.device;
     last_ = scene(size_t(number * periodUs() / kClipPeriodUs) % shared_.clip.head.frames);
-    if (shared_.control.device.marks) {
+    if (!depth) {
+        exposure_.light(last_, words.breathing_per_mille);
+        exposure_.step(words.settle_frames);
+    }
+    if (words.marks) {
         const uint64_t counter = uint64_t(number), when = uint64_t(exposedNs);
         const int unit = mode_.pixelFormat == ONI_PIXEL_FORMAT_DEPTH_100_UM ? 10 : 1;
         if (depth)
@@ -226,7 +272,7 @@ inline void Stream::picture(int64_t number, int64_t exposedNs) {
             mark(reinterpret_cast<uint8_t*>(last_.data()), width, 3, counter, when,
                  [](bool bit) { return uint8_t(bit ? 255 : 0); });
     }
-    if (mirrored_) mirror(last_.data(), width, height, depth ? 2 : 3);
+    if (mirrored_) mirror(last_.data(), width, height, depth ? 2 : 3, words.driver == Driver::FREENECT);
     if (!depth && mode_.pixelFormat != ONI_PIXEL_FORMAT_RGB888)
         last_ = yuv(last_, mode_.pixelFormat == ONI_PIXEL_FORMAT_YUYV);
 }
@@ -276,7 +322,6 @@ inline void Stream::send(int64_t number, int64_t stampUs, int64_t exposedNs) {
     }
     raiseNewFrame(frame);
     getServices().releaseFrame(frame);
-    since_start_++;
     words_.last_exposed_ns = exposedNs;
     words_.frames++;
 }
