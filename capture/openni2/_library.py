@@ -107,6 +107,26 @@ def binding_errors(what: str, kind: type[CaptureError] = SensorError) -> Iterato
         raise kind(f"{what}: {error_text(error)}") from error
 
 
+def open_device(uri: bytes) -> Any:
+    """Open a device of the binding, so that another attempt is possible where this one fails.
+
+    Raises
+    ------
+    OpenNIError
+        It cannot be opened.
+    """
+    device = openni2.Device.__new__(openni2.Device)
+    try:
+        device.__init__(uri)
+    except BaseException:
+        # OpenNI2 makes a handle of a device that it could not open. Once that is closed, as the
+        # binding's finaliser would, it counts minus one opening, does not open the device at the
+        # next attempt, and crashes at the first call.
+        device._handle = None
+        raise
+    return device
+
+
 def close_handle(handle: Any) -> None:
     """Close a device or stream of the binding; one that is gone may refuse."""
     try:

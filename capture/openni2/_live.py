@@ -14,7 +14,12 @@ from denseface.capture.live.ring import Ring
 from denseface.capture.live.sensor import Shot
 from denseface.capture.live.states import LiveFigures
 from denseface.capture.openni2._base import OpenNI2Source
-from denseface.capture.openni2._library import binding_errors, load, lost_devices
+from denseface.capture.openni2._library import (
+    binding_errors,
+    load,
+    lost_devices,
+    open_device,
+)
 from denseface.capture.openni2._streams import COLOR, DEPTH, Streams
 
 _SLICE_S = 0.1
@@ -70,7 +75,7 @@ class LiveSource(OpenNI2Source):
             known = ", ".join(uri.decode("utf-8", "replace") for uri in found)
             raise SensorError(f"{self._name}: no such sensor; found: {known}")
         with binding_errors(f"{self._name}: cannot be opened"):
-            device = openni2.Device(wanted)
+            device = open_device(wanted)
         self._device_uri = bytes(device.uri)
         lost_devices.discard(self._device_uri)
         streams = self._opened = self._open_streams(device)

@@ -1,11 +1,15 @@
 """The virtual sensor, live, through the real OpenNI2 library."""
 
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
+from tests.system.running import REPOSITORY
 from tests.virtual_sensor.clip import write_clip
+from tests.virtual_sensor.control import Control, OpenFault
 from tests.virtual_sensor.process import environment, play, run_python
 
 PERIOD_US = 33_333
@@ -137,6 +141,30 @@ def test_a_missing_stream_is_named(clip, streams, missing):
 def test_no_sensor():
     _, error = failing("openni2:", environment())
     assert error == "denseface.capture.errors.SensorError: openni2: OpenNI2 finds no sensor"
+
+
+def test_a_sensor_that_was_busy_can_be_opened_later_in_the_same_process(clip, tmp_path):
+    """OpenNI2 counts the closing of what it could not open, and then crashes at the next."""
+    code = ("import sys\nfrom denseface.capture.errors import SensorError\n"
+            "from denseface.capture.openni2 import LiveSource\n"
+            "for line in sys.stdin:\n"
+            "    try:\n"
+            "        with LiveSource() as source: source.read()\n"
+            "        print('open', flush=True)\n"
+            "    except SensorError as error: print(error, flush=True)\n")
+    with Control(tmp_path / "sensor", clip, open_fault=OpenFault.BUSY) as sensor, subprocess.Popen(
+            [sys.executable, "-c", code], env=environment(controls=[sensor]), cwd=REPOSITORY,
+            text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        said = []
+        for fault in (OpenFault.BUSY, OpenFault.BUSY, OpenFault.NONE, OpenFault.NONE):
+            sensor.open_fault = fault
+            process.stdin.write("again\n")
+            process.stdin.flush()
+            said.append(process.stdout.readline().strip())
+        process.stdin.close()
+    busy = 'openni2: cannot be opened: Could not open "virtual:0": Failed to set USB interface!'
+    assert said == [busy, busy, "open", "open"]
+    assert process.returncode == 0
 
 
 @pytest.mark.parametrize("uri", ["nothing", "ä", "/dev/null"])

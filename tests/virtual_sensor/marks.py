@@ -1,8 +1,8 @@
 """The mark in a frame's first rows: its number and when it was exposed (`Control.marks`).
 
 The image is 80 square blocks wide. The first row of blocks is the time of the exposure, the second
-the number, 64 bits each, the lowest first, and 16 that guard them: depth 2 or 4 m, colour black or white. It outlives JPEG,
-other resolutions and YUV, but not cropping.
+the number, 64 bits each, the lowest first, and 16 that guard them: depth 2 or 4 m, colour black or
+white. It outlives JPEG, other resolutions and YUV, but not cropping.
 """
 
 from typing import Any, NamedTuple

@@ -7,10 +7,14 @@ binding; `device`, once `open` was called; and the functions below; and answers 
 import json
 import subprocess
 import sys
+import tempfile
 import threading
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tests.waiting import LIMIT_S
 
@@ -50,6 +54,13 @@ class Raw:
         self.tell(code)
         return self.answer()
 
+    def image(self) -> NDArray[Any]:
+        """Give the pixels of the frame that was read last."""
+        with tempfile.TemporaryDirectory() as folder:
+            self.ask(f"np.save('{folder}/image.npy', image)")
+            pixels: NDArray[Any] = np.load(f"{folder}/image.npy")
+            return pixels
+
     def tell(self, code: str) -> None:
         """Have something done, without waiting for it."""
         assert self.process.stdin is not None
@@ -74,7 +85,6 @@ class Raw:
 def _serve() -> None:
     import os
 
-    import numpy as np
     from primesense import _openni2 as c_api
     from primesense import openni2
 
@@ -105,7 +115,14 @@ def _serve() -> None:
         return [uri.decode() for uri in openni2.Device.enumerate_uris()]
 
     def open_device(uri: str | None = None) -> None:
-        names["device"] = openni2.Device(None if uri is None else uri.encode())
+        device = openni2.Device.__new__(openni2.Device)
+        try:
+            device.__init__(None if uri is None else uri.encode())
+        except BaseException:
+            # Closing what was not opened makes the library count to -1, and the next opening crash.
+            device._handle = None
+            raise
+        names["device"] = device
 
     def create(*kinds: str) -> None:
         for kind in kinds or ("depth", "color"):

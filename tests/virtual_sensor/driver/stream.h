@@ -91,7 +91,8 @@ private:
     OniCropping crop_, says_crop_;
     Exposure exposure_;
     std::vector<char> last_;  // what was sent last: shown again while frozen
-    int64_t lastStampUs_ = 0, lastNumber_ = 0;
+    int64_t lastStampUs_ = 0;
+    int index_ = 0;  // counts what is sent, as real drivers do: a frame that is lost leaves no gap
     std::map<size_t, std::vector<char>> kept_;
     OniVideoMode kept_mode_{};
     bool kept_registered_ = false;
@@ -300,13 +301,13 @@ inline void Stream::send(int64_t number, int64_t stampUs, int64_t exposedNs) {
     if (!frozen) picture(number, exposedNs);
     if (!frozen || !words_.frozen_stamps) {
         lastStampUs_ = stampUs;
-        lastNumber_ = number;
+        index_++;
     }
     OniFrame* frame = getServices().acquireFrame();
     if (!frame) return;
     frame->videoMode = mode_;
     frame->sensorType = depth ? ONI_SENSOR_DEPTH : ONI_SENSOR_COLOR;
-    frame->frameIndex = int(lastNumber_) + 1;
+    frame->frameIndex = index_;
     frame->timestamp = uint64_t(lastStampUs_);
     cut(*frame, last_);
     if (take(words_.garbled_next)) {
