@@ -56,16 +56,22 @@ class ClientTimeoutError(ServiceError, TimeoutError):
 
 
 class PressRefusedError(ServiceError, RuntimeError):
-    """The press led to no capture: no sensor, no frame in time, no room on the disk.
+    """The press led to no capture: no sensor, no frame in time or none that is good enough, ...
 
     Attributes
     ----------
-    reason : `no_sensor`, `sensor`, `sensor_gone`, `timeout`, `queue`, `disk` or `purged`
+    reason : `no_sensor`, `sensor`, `sensor_gone`, `quality`, `timeout`, `queue`, `disk` or `purged`
+    codes : what was wrong with the last frame, where the reason is `quality`
+    text : the first of these in words, for the person
     """
 
-    def __init__(self, message: str, reason: str) -> None:
+    def __init__(
+        self, message: str, reason: str, codes: tuple[str, ...] = (), text: str = ""
+    ) -> None:
         super().__init__(message)
         self.reason = reason
+        self.codes = codes
+        self.text = text
 
 
 class CaptureFailedError(ServiceError, RuntimeError):

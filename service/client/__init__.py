@@ -6,9 +6,10 @@ from denseface.service.client.events import (
     Published,
     PublishedFace,
     PublishedFailure,
+    PublishedHint,
     PublishedPreview,
 )
 from denseface.service.client.operator import Operator
 
 __all__ = ["AsyncClient", "Client", "Operator", "Published", "PublishedFace", "PublishedFailure",
-           "PublishedPreview"]
+           "PublishedHint", "PublishedPreview"]

@@ -6,7 +6,7 @@ something may have happened, once: whatever has come must then be taken.
 
 import asyncio
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import closing, suppress
 from datetime import datetime
 from pathlib import Path
@@ -16,12 +16,20 @@ import zmq
 
 from denseface.recon.face import Face
 from denseface.service.client._base import BaseClient
-from denseface.service.client.events import Published, PublishedFace, PublishedPreview, preview_of
+from denseface.service.client.events import (
+    Published,
+    PublishedFace,
+    PublishedHint,
+    PublishedPreview,
+    hint_of,
+    preview_of,
+)
 from denseface.service.client.exchanges import Exchange, SendRequest, Step, deadline
 from denseface.service.client.follower import TOPICS, Follower
 from denseface.service.errors import ClientClosedError, ClientTimeoutError, ProtocolError
 from denseface.service.protocol.message_base import BaseRequest
 from denseface.service.protocol.messages import Status
+from denseface.service.protocol.sensor_messages import DEFAULT_GATE_S, Gate
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, encode
 from denseface.service.transport.connection import receive_packet
@@ -71,9 +79,14 @@ class AsyncClient(BaseClient):
             readable.set()
         self._context.destroy(linger=0)
 
-    async def press(self, capture_id: str | None = None, *, timeout: float = 15.0) -> str:
+    async def press(
+        self, capture_id: str | None = None, *, timeout: float = 15.0, sensor: str | None = None,
+        gate: Gate = "off", gate_timeout: float = DEFAULT_GATE_S, frames: int = 1,
+    ) -> str:
         """Take a frame now; see `Client.press`."""
-        return await self._run(self._exchanges.press(capture_id, timeout))
+        return await self._run(self._exchanges.press(
+            capture_id, timeout, sensor=sensor, gate=gate, gate_timeout=gate_timeout,
+            frames=frames))
 
     async def get(self, capture_id: str, *, timeout: float = 60.0) -> Face:
         """Wait for a capture's face; see `Client.get`."""
@@ -103,16 +116,29 @@ class AsyncClient(BaseClient):
             while True:
                 yield await self._run(follower.next(timeout), subscription)
 
-    async def previews(self, *, timeout: float | None = None) -> AsyncIterator[PublishedPreview]:
-        """Follow what the sensor sees, always the newest; see `Client.previews`."""
-        with suppress(ClientClosedError), closing(self._subscribe(Topic.PREVIEW)) as subscription:
+    def previews(
+        self, *, sensor: str | None = None, timeout: float | None = None
+    ) -> AsyncIterator[PublishedPreview]:
+        """Follow what a sensor sees, always the newest; see `Client.previews`."""
+        return self._newest(Topic.PREVIEW, lambda packet: preview_of(packet, sensor), timeout)
+
+    def hints(
+        self, *, sensor: str | None = None, timeout: float | None = None
+    ) -> AsyncIterator[PublishedHint]:
+        """Follow what could be better in front of a sensor; see `Client.hints`."""
+        return self._newest(Topic.HINTS, lambda packet: hint_of(packet, sensor), timeout)
+
+    async def _newest(
+        self, topic: Topic, read: Callable[[Packet], _T | None], timeout: float | None
+    ) -> AsyncIterator[_T]:
+        with suppress(ClientClosedError), closing(self._subscribe(topic)) as subscription:
             while True:
                 until = deadline(timeout)
-                preview = None
-                while preview is None:
+                newest = None
+                while newest is None:
                     await self._wait(subscription, until - time.monotonic())
-                    preview = preview_of(subscription.receive_latest())
-                yield preview
+                    newest = subscription.receive_latest(read)
+                yield newest
 
     async def _run(self, exchange: Exchange[_T], subscription: Subscription | None = None) -> _T:
         try:

@@ -6,19 +6,27 @@ unnoticed; repeating is safe, for an id is one capture however often it is press
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from datetime import datetime
 from typing import TypeVar
 
 from denseface.recon.face import Face
 from denseface.service.client._base import BaseClient
-from denseface.service.client.events import Published, PublishedFace, PublishedPreview, preview_of
+from denseface.service.client.events import (
+    Published,
+    PublishedFace,
+    PublishedHint,
+    PublishedPreview,
+    hint_of,
+    preview_of,
+)
 from denseface.service.client.exchanges import Exchange, SendRequest, Step, deadline
 from denseface.service.client.follower import TOPICS, Follower
 from denseface.service.errors import ClientTimeoutError, ProtocolError
 from denseface.service.protocol.message_base import BaseRequest
 from denseface.service.protocol.messages import Status
+from denseface.service.protocol.sensor_messages import DEFAULT_GATE_S, Gate
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, encode
 from denseface.service.runtime.closing import Closing
@@ -56,24 +64,35 @@ class Client(Closing, BaseClient):
         if not self._forked():
             self._context.destroy(linger=0)
 
-    def press(self, capture_id: str | None = None, *, timeout: float = 15.0) -> str:
+    def press(
+        self, capture_id: str | None = None, *, timeout: float = 15.0, sensor: str | None = None,
+        gate: Gate = "off", gate_timeout: float = DEFAULT_GATE_S, frames: int = 1,
+    ) -> str:
         """Take a frame now; give the capture's id once the frame is safe at the hub.
 
         Parameters
         ----------
         capture_id : letters, digits, `-`, `_`, at most 64; pressing an id again is the same
             capture; where None, a new one
+        sensor : its name, as `status` has it; where None, the one that is best off
+        gate : `off`, or what becomes of a frame that is not good enough: `refuse` the press, or
+            `wait` for a good one
+        gate_timeout : longest wait for a good one, seconds, at most 120; `timeout` comes to it
+        frames : consecutive frames that are made into one, at most 32
 
         Raises
         ------
         PressRefusedError
-            There is no such capture and none will appear: no sensor, no frame, no room.
+            There is no such capture and none will appear: no sensor, no frame, no room. Where no
+            frame was good enough, its `reason` is `quality`, its `text` says what to do better.
         ClientTimeoutError
             The hub did not answer; press the same id again to be sure.
         LocalProtocolError
-            The id is malformed.
+            The id or another argument is malformed.
         """
-        return self._run(self._exchanges.press(capture_id, timeout))
+        return self._run(self._exchanges.press(
+            capture_id, timeout, sensor=sensor, gate=gate, gate_timeout=gate_timeout,
+            frames=frames))
 
     def get(self, capture_id: str, *, timeout: float = 60.0) -> Face:
         """Wait for a capture's face.
@@ -124,21 +143,41 @@ class Client(Closing, BaseClient):
             while True:
                 yield self._run(follower.next(timeout), subscription)
 
-    def previews(self, *, timeout: float | None = None) -> Iterator[PublishedPreview]:
-        """Follow what the sensor sees, ten times a second at most: always the newest.
+    def previews(
+        self, *, sensor: str | None = None, timeout: float | None = None
+    ) -> Iterator[PublishedPreview]:
+        """Follow what a sensor sees, thirty times a second at most: always the newest.
 
         Nothing is kept of them: what does not come in time is skipped. A live sensor shows its
-        newest picture, a recording the one that the next press gives. `timeout` is the longest wait
-        for the next one, seconds; where None, for ever.
+        newest picture, a recording the one that the next press gives.
+
+        Parameters
+        ----------
+        sensor : its name; where None, of all sensors
+        timeout : longest wait for the next one, seconds; where None, for ever
         """
-        with closing(self._subscribe(Topic.PREVIEW)) as subscription:
+        return self._newest(Topic.PREVIEW, lambda packet: preview_of(packet, sensor), timeout)
+
+    def hints(
+        self, *, sensor: str | None = None, timeout: float | None = None
+    ) -> Iterator[PublishedHint]:
+        """Follow what could be better in front of a sensor, about ten times a second.
+
+        Always the newest, as of `previews`; so are the parameters.
+        """
+        return self._newest(Topic.HINTS, lambda packet: hint_of(packet, sensor), timeout)
+
+    def _newest(
+        self, topic: Topic, read: Callable[[Packet], _T | None], timeout: float | None
+    ) -> Iterator[_T]:
+        with closing(self._subscribe(topic)) as subscription:
             while True:
                 until = deadline(timeout)
-                preview = None
-                while preview is None:
+                newest = None
+                while newest is None:
                     self._wait(subscription, until - time.monotonic())
-                    preview = preview_of(subscription.receive_latest())
-                yield preview
+                    newest = subscription.receive_latest(read)
+                yield newest
 
     def status(self, *, timeout: float = 5.0) -> Status:
         """Ask who is there and what was done."""

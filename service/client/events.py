@@ -1,13 +1,15 @@
-"""What subscribers get: outcomes and previews."""
+"""What subscribers get: outcomes, previews and hints."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.face import Face
 from denseface.service.errors import CaptureFailedError, RemoteProtocolError
-from denseface.service.protocol.messages import CaptureFailed, FaceDone, Preview
+from denseface.service.protocol.messages import CaptureFailed, FaceDone, Hint, Hints, Preview
 from denseface.service.protocol.wire import Packet
 
 
@@ -34,22 +36,75 @@ class PublishedFailure:
 Published = PublishedFace | PublishedFailure
 
 
+@dataclass(frozen=True)
+class PublishedHint:
+    """What a person in front of a sensor could do better.
+
+    Attributes
+    ----------
+    sensor : its name
+    timestamp_us : of the frame, sensor clock, microseconds
+    codes : what is wrong with the frame, the most important first; empty where nothing is
+    text : the first of them in words, "come closer"
+    measures : what was measured, by name; the name ends with the unit
+    """
+
+    sensor: str
+    timestamp_us: int
+    codes: tuple[str, ...]
+    text: str
+    measures: Mapping[str, float]
+
+    @property
+    def ok(self) -> bool:
+        """Nothing is wrong: a press now is worth it."""
+        return not self.codes
+
+
 @dataclass(frozen=True, eq=False)
 class PublishedPreview:
-    """A small picture of what the sensor sees.
+    """A small picture of what a sensor sees.
 
     Attributes
     ----------
     epoch, sequence : count what this run of the hub published; a number that is missing was not
         delivered
     timestamp_us : sensor clock, microseconds
-    image : (h, w, 3) uint8, RGB, no side above 320; read-only
+    sensor : its name
+    size : width and height, pixels, none above 640
+    jpeg : the picture as a JPEG file; None where the sensor sent pixels
+    hint : of the same frame; None where it was not measured
     """
 
     epoch: str
     sequence: int
     timestamp_us: int
-    image: NDArray[np.uint8]
+    sensor: str
+    size: tuple[int, int]
+    jpeg: bytes | None
+    hint: PublishedHint | None
+    _pixels: NDArray[np.uint8] | None = field(repr=False)
+
+    @cached_property
+    def image(self) -> NDArray[np.uint8]:
+        """The picture, (h, w, 3) uint8, RGB, read-only; a JPEG is decoded when first asked for.
+
+        Raises
+        ------
+        RemoteProtocolError
+            Where the JPEG is damaged.
+        """
+        if self._pixels is not None:
+            return self._pixels
+        import cv2
+
+        flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+        image = cv2.imdecode(np.frombuffer(self.jpeg or b"", np.uint8), flags)
+        if image is None or image.shape != (self.size[1], self.size[0], 3):
+            raise RemoteProtocolError(f"preview {self.sequence}: the JPEG cannot be decoded")
+        decoded = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8)
+        decoded.flags.writeable = False
+        return decoded
 
 
 def outcome_of(packet: Packet) -> Published:
@@ -64,10 +119,30 @@ def outcome_of(packet: Packet) -> Published:
             raise RemoteProtocolError(f"the hub answered with {other.kind}, an outcome expected")
 
 
-def preview_of(packet: Packet | None) -> PublishedPreview | None:
-    """Read a `Preview`; None where it is something else or malformed."""
-    if packet is None or not isinstance(packet.message, Preview):
-        return None
+def preview_of(packet: Packet, sensor: str | None) -> PublishedPreview | None:
+    """Read a `Preview` of a sensor, of any where None; None where it is none or malformed."""
     message = packet.message
-    return PublishedPreview(message.epoch, message.sequence, message.preview.timestamp_us,
-                            packet.arrays["image"])
+    if not isinstance(message, Preview) or sensor not in (None, message.preview.sensor):
+        return None
+    header = message.preview
+    try:
+        header.check(packet.arrays)
+    except RemoteProtocolError:
+        return None
+    jpeg = packet.arrays["jpeg"].tobytes() if header.encoding == "jpeg" else None
+    hint = _hint(header.sensor, header.hint) if header.hint else None
+    return PublishedPreview(
+        message.epoch, message.sequence, header.timestamp_us, header.sensor,
+        (header.width, header.height), jpeg, hint, packet.arrays.get("image"))
+
+
+def hint_of(packet: Packet, sensor: str | None) -> PublishedHint | None:
+    """Read `Hints` of a sensor, of any where None; None where it is something else."""
+    message = packet.message
+    if not isinstance(message, Hints) or sensor not in (None, message.sensor):
+        return None
+    return _hint(message.sensor, message.hint)
+
+
+def _hint(sensor: str, hint: Hint) -> PublishedHint:
+    return PublishedHint(sensor, hint.timestamp_us, hint.codes, hint.text, hint.measures)

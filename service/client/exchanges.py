@@ -21,6 +21,7 @@ from denseface.service import errors
 from denseface.service.client.events import PublishedFailure, outcome_of
 from denseface.service.protocol import messages
 from denseface.service.protocol.message_base import BaseRequest
+from denseface.service.protocol.sensor_messages import Gate
 from denseface.service.protocol.wire import Packet
 
 _T = TypeVar("_T")
@@ -79,17 +80,28 @@ class Exchanges:
         self.next_number = itertools.count(1).__next__
         """Gives the number of the next request."""
 
-    def press(self, capture_id: str | None, timeout: float) -> Exchange[str]:
+    def press(
+        self, capture_id: str | None, timeout: float, *, sensor: str | None, gate: Gate,
+        gate_timeout: float, frames: int,
+    ) -> Exchange[str]:
         """See `Client.press`."""
         chosen = uuid.uuid4().hex if capture_id is None else capture_id
         try:
-            message = messages.Press(request=self.next_number(), capture_id=chosen)
+            message = messages.Press(
+                request=self.next_number(), capture_id=chosen, sensor=sensor, gate=gate,
+                gate_timeout=gate_timeout, frames=frames)
         except ValidationError as error:
+            field, why = errors.first_error(error, found=True)
             raise errors.LocalProtocolError(
-                f"capture id {chosen!r}: expected letters, digits, - and _, at most 64") from error
-        answer = (yield from send_request(message, timeout)).message
+                f"capture id {chosen!r}: expected letters, digits, - and _, at most 64"
+                if field == "capture_id" else f"{field}: {why}") from error
+        patience = timeout + (gate_timeout if gate == "wait" else 0.0)
+        answer = (yield from send_request(message, patience)).message
         if isinstance(answer, messages.PressRefused):
-            raise errors.PressRefusedError(f"press refused: {answer.message}", answer.reason)
+            hint = answer.hint
+            raise errors.PressRefusedError(
+                f"press refused: {answer.message}", answer.reason,
+                *((hint.codes, hint.text) if hint else ()))
         expect(answer, messages.PressAccepted)
         return chosen
 

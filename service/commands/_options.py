@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from denseface.service.export import FORMATS
 
 if TYPE_CHECKING:
+    from denseface.recon.face import Face
     from denseface.recon.settings import Settings
     from denseface.service.client import Client, Operator
     from denseface.service.settings import ServiceSettings
@@ -170,6 +171,14 @@ def repeated(args: argparse.Namespace, *names: str) -> list[str]:
         elif value not in (None, False):
             flags += [f"--{name}={one}" for one in (value if isinstance(value, list) else [value])]
     return flags
+
+
+def warn(face: "Face") -> None:
+    """Print what its report doubts on stderr, one line each."""
+    from denseface.service.runtime.terminal import complain
+
+    for warning in face.report.warnings:
+        complain(f"warning: {warning}")
 
 
 def seconds(text: str) -> float:

@@ -8,6 +8,9 @@ from denseface.service.commands import _options
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     _options.add_client(parser)
     _options.add_source(parser)
+    parser.add_argument("--name", metavar="NAME",
+                        help="name of the sensor, for `press --sensor` (default: made of what is "
+                             "known of it: its serial number, USB port or address)")
     _options.add_log(parser)
 
 
@@ -17,4 +20,5 @@ def run(args: argparse.Namespace) -> int:
     supervisor = start_process("capture", args.log)
     from denseface.service.daemons import capture
 
-    return capture.run(_options.service_settings(args), args.source, args.calibration, supervisor)
+    return capture.run(_options.service_settings(args), args.source, args.calibration, supervisor,
+                       args.name)

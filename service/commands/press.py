@@ -12,6 +12,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="id of the capture; the same one again is the same capture")
     parser.add_argument("--timeout", type=_options.seconds, default=60.0, metavar="S",
                         help="longest wait for the face, seconds (default: 60)")
+    parser.add_argument("--sensor", metavar="NAME",
+                        help="take the frame of this one; `denseface status` names them "
+                             "(default: the one that is best off)")
+    parser.add_argument("--gate", choices=("off", "wait", "refuse"), default="off",
+                        help="wait for a frame that is good enough, or refuse one that is not "
+                             "(default: off)")
+    parser.add_argument("--gate-timeout", type=_options.seconds, default=10.0, metavar="S",
+                        help="longest wait for a good frame, seconds (default: 10)")
+    parser.add_argument("--frames", type=_options.count, default=1, metavar="N",
+                        help="make one of N consecutive frames, at most 32 (default: 1)")
     _options.add_outputs(parser, "--save")
     _options.add_mode(parser)
 
@@ -21,8 +31,11 @@ def run(args: argparse.Namespace) -> int:
 
     files = FaceFiles(args.output, args.report, args.rendering, args.mode)
     with _options.client(args) as client:
-        capture_id = client.press(args.capture_id, timeout=args.timeout)
+        capture_id = client.press(
+            args.capture_id, timeout=args.timeout, sensor=args.sensor, gate=args.gate,
+            gate_timeout=args.gate_timeout, frames=args.frames)
         say(capture_id, flush=True)
         face = client.get(capture_id, timeout=args.timeout)
     files.write(face)
+    _options.warn(face)
     return 0

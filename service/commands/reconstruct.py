@@ -30,6 +30,7 @@ def run(args: argparse.Namespace) -> int:
 
     face = reconstruct(frame, settings)
     files.write(face)
+    _options.warn(face)
     report = face.report
     say(f"{report.initial_points} measured points, {report.dense_points} dense points, "
         f"{report.timings_ms['total']:.0f} ms")

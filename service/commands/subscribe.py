@@ -14,7 +14,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="write each face as DIR/ID.ply with its report, DIR/ID.json")
     _options.add_mode(parser)
     parser.add_argument("--count", type=int, metavar="N", help="end after N captures")
+    parser.add_argument("--sensor", metavar="NAME", help="with --hints: of this sensor alone")
     start = parser.add_mutually_exclusive_group()
+    start.add_argument("--hints", action="store_true",
+                       help="follow what could be better in front of the sensor, a line for each "
+                            "change, in place of the faces")
     start.add_argument("--after", type=int, metavar="SEQUENCE",
                        help="start after this sequence number; 0 is all that is kept "
                             "(default: only what comes from now on)")
@@ -27,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from denseface.service.errors import UsageError
-    from denseface.service.tools.follow import follow
+    from denseface.service.tools.follow import changes, follow
 
     for name in ("count", "after", "last"):
         value = getattr(args, name)
@@ -35,7 +39,15 @@ def run(args: argparse.Namespace) -> int:
             raise UsageError(f"--{name} {value}: expected a number that is not negative, or zero")
     if args.save and not args.save.is_dir():
         raise UsageError(f"--save {args.save}: no such folder")
+    if args.hints and args.save:
+        raise UsageError("--save: expected without --hints, which gives no faces")
+    if args.sensor and not args.hints:
+        raise UsageError("--sensor: expected with --hints; faces are of all sensors")
     with _options.client(args) as client:
+        if args.hints:
+            for line in islice(changes(client.hints(sensor=args.sensor)), args.count):
+                say(line, flush=True)
+            return 0
         published = client.published(after=args.after, last=args.last, since=args.since)
         for line in islice(follow(published, args.save, args.mode), args.count):
             say(line, flush=True)

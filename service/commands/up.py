@@ -2,12 +2,18 @@
 
 import argparse
 import os
+from pathlib import Path
 
 from denseface.service.commands import _options
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    _options.add_source(parser)
+    parser.add_argument("--source", action="append", metavar="URI",
+                        help="openni2: for the first sensor, or a .oni or .npz file; several, one "
+                             "for each sensor (default: openni2:)")
+    parser.add_argument("--calibration", type=Path, action="append", metavar="FILE.json",
+                        help="calibration that wins over the source's own; with several sources "
+                             "one for each, in their order")
     parser.add_argument("--workers", type=_worker_count, default=max(1, (os.cpu_count() or 2) - 1),
                         metavar="N", help="reconstruction processes (default: cores less one)")
     _options.add_hub(parser)
@@ -28,9 +34,22 @@ def run(args: argparse.Namespace) -> int:
         common=_options.repeated(args, "address", "log", "debug"),
         hub=_options.repeated(args, "data", "keys", "key", "listen", "retention", "metrics",
                               "preset", "set"),
-        capture=_options.repeated(args, "source", "calibration"))
+        captures=_captures(args.source or ["openni2:"], args.calibration or []))
     with ServiceManager(os.environ) as manager:
         return Supervisor(table, max(settings.hang_timeout_s, settings.silence_s), manager).run()
+
+
+def _captures(sources: list[str], calibrations: list[Path]) -> list[list[str]]:
+    """Give the flags of each capture process."""
+    from denseface.service.errors import UsageError
+
+    if repeated := [one for one in sources if sources.count(one) > 1]:
+        raise UsageError(f"--source {repeated[0]}: given twice, expected another sensor each")
+    if calibrations and len(calibrations) != len(sources):
+        raise UsageError(f"--calibration: {len(calibrations)} given for {len(sources)} sources, "
+                         "expected one for each")
+    return [[f"--source={source}", *(f"--calibration={one}" for one in calibrations[at:at + 1])]
+            for at, source in enumerate(sources)]
 
 
 def _worker_count(text: str) -> int:

@@ -4,8 +4,7 @@ The driver is called in a thread of its own, so that this process answers the hu
 A driver that hangs ends the process; the supervisor starts another.
 """
 
-import os
-import socket
+import re
 import time
 from collections import deque
 from contextlib import suppress
@@ -13,19 +12,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import cv2
-import numpy as np
 import structlog
-from numpy.typing import NDArray
 
 from denseface.capture import CaptureError, RgbdFrame
 from denseface.capture.errors import SensorError
-from denseface.recon.registration import with_shaded_depth
+from denseface.service.daemons.preview_picture import preview_jpeg
 from denseface.service.daemons.sensor import SensorReader
 from denseface.service.errors import FrameTooLargeError
 from denseface.service.log.output import exit_now
 from denseface.service.protocol import messages
 from denseface.service.protocol.payload import (
-    MAX_PREVIEW_SIDE,
     FrameHeader,
     PreviewHeader,
     check_frame_size,
@@ -38,7 +34,7 @@ from denseface.service.runtime.supervisor_link import SupervisorLink
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.hub_connection import HubConnection
 
-__all__ = ["run"]
+__all__ = ["run", "sensor_name"]
 
 _CLOSING_S = 3.0
 """Longest wait for the driver's last call when the process stops, seconds."""
@@ -48,11 +44,11 @@ _log = structlog.get_logger("capture")
 
 
 def run(settings: ServiceSettings, uri: str, calibration: Path | None = None,
-        supervisor: SupervisorLink | None = None) -> int:
+        supervisor: SupervisorLink | None = None, name: str | None = None) -> int:
     """Serve frames of a source until SIGINT or SIGTERM and give the exit status.
 
     A press gets the newest frame of a live sensor; of a recording the next one, which after the
-    last is the first again.
+    last is the first again. `name` is the sensor's; where None, one is made of the source.
 
     Raises
     ------
@@ -64,7 +60,7 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None,
     with StopSignal() as stop, Background[RgbdFrame | None]("sensor") as driver:
         try:
             with HubConnection(settings, "capture", supervisor) as connection:
-                _Capture(settings, connection, sensor, driver).serve(stop)
+                _Capture(settings, connection, sensor, driver, name or sensor_name(uri)).serve(stop)
         finally:
             _close(driver, sensor)
         return stop.exit_status
@@ -98,6 +94,7 @@ class _Capture:
     connection: HubConnection
     sensor: SensorReader
     driver: Background[RgbdFrame | None]
+    name: str = "sensor"
     open: bool = False
     presses: deque[str] = field(default_factory=deque)
     """Captures that wait for their frame, oldest first."""
@@ -145,8 +142,7 @@ class _Capture:
                 self.unacknowledged.pop(capture_id, None)
 
     def _send_ready(self) -> None:
-        self.connection.send(messages.SensorReady(
-            name=f"{socket.gethostname()}/{os.getpid()}", source=self.sensor.uri))
+        self.connection.send(messages.SensorReady(name=self.name, source=self.sensor.uri))
 
     def _finish_call(self) -> None:
         if not self.open:
@@ -196,11 +192,8 @@ class _Capture:
             raise error
 
     def _send_preview(self, frame: RgbdFrame) -> None:
-        image = _preview_image(with_shaded_depth(frame).rgb)
-        height, width, _ = image.shape
-        header = PreviewHeader(
-            width=width, height=height, timestamp_us=frame.color_timestamp_us)
-        self.connection.send(messages.PreviewFrame(preview=header), {"image": image})
+        header, arrays = PreviewHeader.of_jpeg(preview_jpeg(frame), frame.color_timestamp_us)
+        self.connection.send(messages.PreviewFrame(preview=header), arrays)
 
     def _transmit(self, capture_id: str) -> None:
         sent = self.unacknowledged[capture_id]
@@ -220,9 +213,8 @@ class _Capture:
                 self._transmit(capture_id)
 
 
-def _preview_image(color: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Shrink (h, w, 3) by a whole factor, to no side above `MAX_PREVIEW_SIDE`: means of areas."""
-    height, width = color.shape[:2]
-    factor = -(-max(height, width) // MAX_PREVIEW_SIDE)
-    size = max(width // factor, 1), max(height // factor, 1)
-    return np.asarray(cv2.resize(color, size, interpolation=cv2.INTER_AREA), np.uint8)
+def sensor_name(source: str, identity: str = "") -> str:
+    """Make a sensor's name of its identity where that is known, else of its source."""
+    scheme, colon, rest = source.partition(":")
+    known = identity or (rest or scheme if colon else Path(source).stem)
+    return re.sub(r"[^!-~]", "-", known)[:100] or "sensor"

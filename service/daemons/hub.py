@@ -15,7 +15,7 @@ from denseface.recon.numerics.malloc import keep_freed_memory
 from denseface.recon.settings import Settings
 from denseface.service.daemons.opening import Opening
 from denseface.service.errors import LocalProtocolError, RemoteProtocolError
-from denseface.service.hub import PREVIEW_PERIOD_S, Hub
+from denseface.service.hub import Hub
 from denseface.service.monitoring import Observer, Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.message_base import BaseMessage
@@ -108,7 +108,10 @@ class _EventLoop:
         while not stop:
             if (now := time.monotonic()) >= due:
                 due = self._tick(now, due)
-            for incoming in self.listeners.receive(max(0, math.ceil((due - now) * 1000))):
+            elif now >= self.hub.previews_due():
+                self._send_all(self.hub.ask_previews(now))
+            wait_s = min(due, self.hub.previews_due()) - now
+            for incoming in self.listeners.receive(max(0, math.ceil(wait_s * 1000))):
                 self._receive(incoming)
             if self.writer.has_results():
                 self._send_all(self.hub.written(time.monotonic()))
@@ -124,14 +127,14 @@ class _EventLoop:
                 name: Restarts.model_validate(by_reason) for name, by_reason in counts.items()}
         self.hub.loop_stalled(now - due)
         subscriptions = self.listeners.subscriptions()
-        watched = subscriptions[Topic.PREVIEW] > 0
         if self.listeners.tick():
             self._drop_revoked()
-        self.hub.want_previews(wanted=watched)
+        self.hub.want_previews(wanted=subscriptions[Topic.PREVIEW] > 0)
+        self.hub.want_hints(wanted=subscriptions[Topic.HINTS] > 0)
         outputs = self.hub.tick(now)
         self.observer.record_tick(now, outputs, subscriptions, self.listeners.unreachable())
         self._send_all(outputs)
-        return now + (PREVIEW_PERIOD_S if watched else _TICK_S)
+        return now + _TICK_S
 
     def _drop_revoked(self) -> None:
         for peer in self.hub.peers():

@@ -37,15 +37,17 @@ _LOOK_MAX_S = 1.0
 
 
 def process_table(workers: int, common: Sequence[str], hub: Sequence[str],
-                  capture: Sequence[str]) -> list[ProcessSpec]:
+                  captures: Sequence[Sequence[str]]) -> list[ProcessSpec]:
     """Give all processes of the service, in the order of starting; the hub is stopped last.
 
-    `common`, `hub` and `capture` are the flags of all, of the hub and of the capture process.
+    `common`, `hub` and `captures` are the flags of all, of the hub and of each capture process.
     """
     return [
         ProcessSpec("hub", ("hub", *hub, *common)),
         # A sensor may be unplugged for an hour: the hub goes on meanwhile.
-        ProcessSpec("capture", ("capture", *capture, *common), vital=False),
+        *(ProcessSpec(f"capture-{number}" if len(captures) > 1 else "capture",
+                      ("capture", *flags, *common), vital=False)
+          for number, flags in enumerate(captures, 1)),
         *(ProcessSpec(f"worker-{number}", ("worker", *common), ONE_THREAD)
           for number in range(1, workers + 1)),
     ]

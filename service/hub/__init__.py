@@ -2,6 +2,5 @@
 
 from denseface.service.hub.hub import Hub
 from denseface.service.hub.presses import settings_hash
-from denseface.service.hub.previews import PREVIEW_PERIOD_S
 
-__all__ = ["PREVIEW_PERIOD_S", "Hub", "settings_hash"]
+__all__ = ["Hub", "settings_hash"]

@@ -6,7 +6,7 @@ in `service.protocol.states`.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 
 import structlog
@@ -19,13 +19,15 @@ from denseface.service.hub.captures import Captures
 from denseface.service.hub.jobs import Jobs
 from denseface.service.hub.maintenance import Maintenance
 from denseface.service.hub.outcomes import Outcomes
-from denseface.service.hub.peers import Peers
+from denseface.service.hub.peers import Peers, WorkerPeer
 from denseface.service.hub.presses import Presses
-from denseface.service.hub.previews import Previews
+from denseface.service.hub.previews import Hints, Previews
+from denseface.service.hub.sensors import SensorPeer
 from denseface.service.monitoring import Figures, Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, Publish, send
 from denseface.service.protocol.states import CaptureState
+from denseface.service.protocol.status import MAX_SENSOR_STATES
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
@@ -69,7 +71,8 @@ class Hub:
             common, recon, self._jobs.add, opened + settings.silence_s, self._rejections)
         self._maintenance = Maintenance(
             common, self._presses, self._jobs, self._outcomes, self._figures.counters)
-        self._previews = Previews(self._peers, settings.heartbeat_s)
+        self._previews = Previews(self._peers, settings.heartbeat_s, self._rejections)
+        self._hints = Hints(self._peers, settings.heartbeat_s)
         self._status_due = 0.0
         self._log = structlog.get_logger("hub")
 
@@ -150,7 +153,8 @@ class Hub:
             self._jobs.tick(now)
             outputs.extend(self._maintenance.tick(now))
             outputs.extend(self._process_writes(now))
-            outputs.extend(self._previews.ask(now, busy=len(self._presses) > 0))
+            outputs.extend(self._hints.ask(now))
+            outputs.extend(self.ask_previews(now))
             if now >= self._status_due:
                 self._status_due = now + self._settings.heartbeat_s
                 outputs.append(Publish(Topic.STATUS, Packet(self._status())))
@@ -184,8 +188,20 @@ class Hub:
         return stored.pressed_by if stored else None
 
     def want_previews(self, *, wanted: bool) -> None:
-        """Say whether anybody subscribes to previews: then each tick may ask the sensor for one."""
+        """Say whether anybody subscribes to previews: then the sensors are asked for them."""
         self._previews.wanted = wanted
+
+    def want_hints(self, *, wanted: bool) -> None:
+        """Say whether anybody subscribes to hints."""
+        self._hints.wanted = wanted
+
+    def ask_previews(self, now: float) -> list[Output]:
+        """Ask for the previews that are due; to be called when `previews_due`, and in each tick."""
+        return list(self._previews.ask(now, self._presses.asked_sensors()))
+
+    def previews_due(self) -> float:
+        """Return when the next preview is to be asked for, seconds; infinite where none is."""
+        return self._previews.next_due(self._presses.asked_sensors())
 
     def peers(self) -> list[bytes]:
         """Return the routing ids of all sensors and workers."""
@@ -207,8 +223,10 @@ class Hub:
                 yield from self._purge(now, peer, message)
             case messages.GetStatus(request=request):
                 yield send(peer, self._status(request))
-            case messages.SensorReady() | messages.WorkerReady() as message:
-                yield from self._peer_ready(now, peer, message, key)
+            case messages.SensorReady() | messages.SensorState() as message:
+                yield from self._sensor_ready(now, peer, message, key)
+            case messages.WorkerReady() as message:
+                yield from self._worker_ready(now, peer, message, key)
             case messages.Heartbeat(holding=holding):
                 if not self._peers.heartbeat(peer, holding, now):
                     self._peers.ask_for_ready(peer)
@@ -221,6 +239,8 @@ class Hub:
                 yield from self._presses.frame(now, peer, message, packet)
             case messages.PreviewFrame() as message:
                 yield from self._previews.receive(peer, message, packet)
+            case messages.QualityHint() as message:
+                yield from self._hints.receive(now, peer, message)
             case messages.FrameFailed() as message:
                 yield from self._presses.frame_failed(peer, message)
             case messages.Result() as message:
@@ -239,25 +259,29 @@ class Hub:
     def _requeue_damaged(self, error: errors.DamagedFaceError, kept_before: bool) -> None:
         self._jobs.requeue_damaged(error.capture_id, str(error), reset_attempts=kept_before)
 
-    def _peer_ready(
-        self, now: float, peer: bytes, message: messages.SensorReady | messages.WorkerReady,
+    def _sensor_ready(
+        self, now: float, peer: bytes, message: messages.SensorReady | messages.SensorState,
         key: str,
     ) -> Iterator[Output]:
-        """Take a sensor or worker, or tell it that there are too many."""
-        sensor = isinstance(message, messages.SensorReady)
-        known = self._peers.sensors if sensor else self._peers.workers
-        limit = self._peers.too_many(peer, key, known)
-        if limit is not None:
-            why = f"{limit} {'sensors' if sensor else 'workers'} are there already"
-            self._rejections.note("limit", key=key or LOCAL, name=message.name, detail=why)
-            yield send(peer, messages.Denied(message=why))
-        elif isinstance(message, messages.WorkerReady):
-            self._worker_ready(now, peer, message.name, message.credit, key)
-        elif self._peers.sensor_ready(peer, message.name, now, key):
-            self._log.info("sensor ready", name=message.name, source=message.source,
-                           key=key or LOCAL)
+        """Take a sensor, or tell it that there are too many; note what it says of itself."""
+        if refused := self._refused(peer, message.name, key, self._peers.sensors, "sensors"):
+            yield refused
+        elif isinstance(message, messages.SensorReady):
+            if self._peers.sensor_ready(peer, message.name, now, key):
+                self._log.info("sensor ready", name=message.name, source=message.source,
+                               key=key or LOCAL)
+        elif self._peers.sensor_state(peer, message, now, key):
+            self._log.info("sensor state", name=message.name, state=message.state,
+                           reason=message.reason, identity=message.identity, key=key or LOCAL)
 
-    def _worker_ready(self, now: float, peer: bytes, name: str, credit: int, key: str) -> None:
+    def _worker_ready(
+        self, now: float, peer: bytes, message: messages.WorkerReady, key: str
+    ) -> Iterator[Output]:
+        """Take a worker, or tell it that there are too many."""
+        name, credit = message.name, message.credit
+        if refused := self._refused(peer, name, key, self._peers.workers, "workers"):
+            yield refused
+            return
         known, asked = self._peers.workers.get(peer), self._peers.was_asked(peer)
         if known is None:
             self._log.info("worker ready", name=name, key=key or LOCAL)
@@ -265,6 +289,18 @@ class Hub:
             self._rejections.note(
                 "replayed", key=key or LOCAL, name=name, detail=f"credit {credit}")
         self._peers.worker_ready(peer, name, credit, now, key)
+
+    def _refused(
+        self, peer: bytes, name: str, key: str, known: Mapping[bytes, SensorPeer | WorkerPeer],
+        kind: str,
+    ) -> Output | None:
+        """Give the message to a peer for which there is no room."""
+        limit = self._peers.too_many(peer, key, known)
+        if limit is None:
+            return None
+        why = f"{limit} {kind} are there already"
+        self._rejections.note("limit", key=key or LOCAL, name=name, detail=why)
+        return send(peer, messages.Denied(message=why))
 
     def _disconnected(self, peer: bytes, reason: str) -> Iterator[Output]:
         say = self._log.info if reason == "goodbye" else self._log.warning
@@ -284,10 +320,12 @@ class Hub:
 
     def _make_status(self, request: int) -> messages.Status:
         counts, counters = self._store.counts(), self._figures.counters
+        known = list(self._peers.sensors.values())
         return messages.Status(
             request=request, epoch=self._store.epoch, sequence=self._store.last_sequence(),
             hub_version=_VERSION,
-            sensors=tuple(sensor.name for sensor in self._peers.sensors.values()),
+            sensors=tuple(one.name for one in known if one.can_be_asked),
+            sensor_states=tuple(one.status() for one in known[:MAX_SENSOR_STATES]),
             workers=tuple(worker.name for worker in self._peers.workers.values()),
             pressed=len(self._presses), queued=self._jobs.queued, working=self._jobs.working,
             done=counts.get(CaptureState.DONE, 0), failed=counts.get(CaptureState.FAILED, 0),

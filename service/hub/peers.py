@@ -4,7 +4,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from denseface.service.hub import sensors
+from denseface.service.hub.sensors import SensorPeer
 from denseface.service.protocol.message_base import MAX_JOBS
+from denseface.service.protocol.sensor_messages import SensorState
 from denseface.service.runtime.bounded_dict import BoundedDict
 
 MAX_PEERS = 256
@@ -13,18 +16,6 @@ MAX_PEERS_PER_KEY = 64
 """Most sensors, and most workers, that connect with one key: one key is one machine."""
 _MAX_ANNOUNCED = 2 * MAX_PEERS
 """Peers of which it is remembered that they were asked to say that they are ready."""
-
-
-@dataclass
-class SensorPeer:
-    """A capture process with its source open."""
-
-    peer: bytes
-    name: str
-    seen: float
-    """When it last said something, seconds."""
-    key: str = ""
-    """Fingerprint of its key; empty where it needed none."""
 
 
 @dataclass
@@ -61,9 +52,19 @@ class Peers:
 
     def sensor_ready(self, peer: bytes, name: str, now: float, key: str = "") -> bool:
         """Add a sensor; True where it is new."""
-        new = peer not in self.sensors
+        if known := self.sensors.get(peer):
+            known.name, known.seen, known.key = name, now, key
+            return False
+        same = [one.peer for one in self.sensors.values() if (one.name, one.key) == (name, key)]
         self.sensors[peer] = SensorPeer(peer, name, now, key)
-        return new
+        for older in same:  # its process may have died, and this be the next
+            self.put_last(older)
+        return True
+
+    def sensor_state(self, peer: bytes, message: SensorState, now: float, key: str = "") -> bool:
+        """Note what a sensor says of itself, add it where it is new; True where it is another."""
+        new = self.sensor_ready(peer, message.name, now, key)
+        return self.sensors[peer].note(message, now) or new
 
     def worker_ready(self, peer: bytes, name: str, credit: int, now: float, key: str = "") -> None:
         """Mark a worker as free, unless this credit was used before."""
@@ -116,9 +117,9 @@ class Peers:
                 and (not worker.jobs or not (alone or worker.alone))]
         return min(free, key=lambda worker: len(worker.jobs), default=None)
 
-    def sensor(self) -> SensorPeer | None:
-        """Return the sensor that connected first, of those that were not `put_last`."""
-        return next(iter(self.sensors.values()), None)
+    def sensor(self, name: str | None = None) -> SensorPeer | None:
+        """Return the sensor to ask, the first of those that were not `put_last`; see `choose`."""
+        return sensors.choose(self.sensors.values(), name)
 
     def put_last(self, peer: bytes) -> None:
         """Ask a sensor only where no other is connected: it lives and gives no frames."""

@@ -11,6 +11,7 @@ import structlog
 
 from denseface.recon.settings import Settings
 from denseface.service.errors import FrameTooLargeError, ServiceError, StoreError
+from denseface.service.hub import sensors
 from denseface.service.hub._common import LOCAL, Common
 from denseface.service.monitoring import Rejections
 from denseface.service.protocol import messages
@@ -56,6 +57,10 @@ class _Press:
     sensor: bytes
     deadline: float
     """Until then the frame is to come, and then to be written; seconds."""
+    patience_s: float
+    """How long the frame was waited for."""
+    gated: bool
+    """Whether the sensor may wait for a frame that is good enough."""
     key: str
     """Fingerprint of the first presser's key; empty where it needed none."""
     pressers: dict[bytes, _Presser] = field(default_factory=dict)
@@ -121,20 +126,36 @@ class Presses:
         if not self._captures.allows(capture_id, CaptureEvent.PRESSED):
             yield send(peer, messages.PressAccepted(request=request, capture_id=capture_id))
             return
-        sensor = self._peers.sensor()
-        if sensor is None and now < self._sensors_due:
+        sensor = self._peers.sensor(message.sensor)
+        missing = None if sensor else sensors.why_none(self._peers.sensors.values(), message.sensor)
+        if sensor is None and missing is None and now < self._sensors_due:
             return  # the client repeats it in a moment
         presser = _Presser(request, key)
         obstacle = self._obstacle(queued, key)
         if sensor is None or obstacle:
-            reason, why = obstacle or ("no_sensor", "no sensor is connected")
+            reason, why = obstacle or ("no_sensor", missing or self._not_there(message.sensor))
             yield from self._refuse_all(capture_id, {peer: presser}, reason, why)
             return
         self._captures.advance(capture_id, CaptureEvent.PRESSED)
         self._log.info("pressed", capture_id=capture_id, sensor=sensor.name, key=key or LOCAL)
-        deadline = now + self._settings.take_timeout_s
-        self._presses[capture_id] = _Press(sensor.peer, deadline, key, {peer: presser})
-        yield send(sensor.peer, messages.Take(capture_id=capture_id))
+        waits = message.gate == "wait"
+        patience_s = self._settings.take_timeout_s + (message.gate_timeout if waits else 0.0)
+        self._presses[capture_id] = _Press(
+            sensor.peer, now + patience_s, patience_s, waits, key, {peer: presser})
+        yield send(sensor.peer, messages.Take(
+            capture_id=capture_id, gate=message.gate, gate_timeout=message.gate_timeout,
+            frames=message.frames))
+
+    def asked_sensors(self) -> set[bytes]:
+        """Return the sensors that are to send a frame at once."""
+        return {press.sensor for press in self._presses.values()
+                if press.frame_sender is None and not press.gated}
+
+    def _not_there(self, name: str | None) -> str:
+        if name is None:
+            return "no sensor is connected"
+        there = sensors.names_of(self._peers.sensors.values())
+        return f"no sensor {name} is connected; there: {there}"
 
     def _press_again(self, press: _Press, peer: bytes, presser: _Presser) -> Iterator[Output]:
         if peer in press.pressers or len(press.pressers) < _MAX_PRESSERS:
@@ -246,7 +267,8 @@ class Presses:
         if peer != self._presses[message.capture_id].sensor:
             self._not_asked(message.capture_id)
             return
-        yield from self._refuse(message.capture_id, "sensor", message.message)
+        yield from self._refuse(
+            message.capture_id, message.reason, message.message, hint=message.hint)
 
     def _not_asked(self, capture_id: str) -> None:
         self._rejections.note(
@@ -254,22 +276,22 @@ class Presses:
 
     def _refuse(
         self, capture_id: str, reason: messages.PressReason, why: str,
-        event: CaptureEvent = CaptureEvent.REFUSED,
+        event: CaptureEvent = CaptureEvent.REFUSED, hint: messages.Hint | None = None,
     ) -> Iterator[Output]:
         """End a press without a capture and tell all who pressed."""
         if press := self._presses.pop(capture_id, None):
             self._captures.advance(capture_id, event)
-            yield from self._refuse_all(capture_id, press.pressers, reason, why)
+            yield from self._refuse_all(capture_id, press.pressers, reason, why, hint)
 
     def _refuse_all(
         self, capture_id: str, pressers: Mapping[bytes, _Presser], reason: messages.PressReason,
-        why: str,
+        why: str, hint: messages.Hint | None = None,
     ) -> Iterator[Output]:
         whose = next((one.key for one in pressers.values()), "") or LOCAL
         self._log.warning("press refused", capture_id=capture_id, reason=why, key=whose)
         for peer, (request, key) in pressers.items():
             refused = messages.PressRefused(
-                request=request, capture_id=capture_id, reason=reason, message=why)
+                request=request, capture_id=capture_id, reason=reason, message=why, hint=hint)
             self._refused[key][peer, capture_id, request] = refused
             yield send(peer, refused)
 
@@ -288,11 +310,11 @@ class Presses:
         """Refuse presses whose frame is late; let nobody wait for a disk that does not answer."""
         with suppress(StoreError):
             yield from self.refuse_failed()
-        why = f"no frame from the sensor in {self._settings.take_timeout_s:g} s"
-        for capture_id in [key for key, press in self._presses.items()
-                           if now >= press.deadline and press.frame_sender is None]:
-            self._peers.put_last(self._presses[capture_id].sensor)
-            yield from self._refuse(capture_id, "timeout", why)
+        for capture_id, press in list(self._presses.items()):
+            if now >= press.deadline and press.frame_sender is None:
+                self._peers.put_last(press.sensor)
+                yield from self._refuse(
+                    capture_id, "timeout", f"no frame from the sensor in {press.patience_s:g} s")
         for capture_id, press in self._presses.items():
             if now < press.deadline or press.late or press.frame_sender is None:
                 continue

@@ -60,7 +60,8 @@ class Health:
             found.append(
                 f"disk: {status.free_bytes // _MIB} MiB free, {reserve} MiB are to stay free")
         if not status.sensors:
-            found.append("sensor: none is alive")
+            found += [f"sensor: {one.name} is {one.state}{one.reason and f': {one.reason}'}"
+                      for one in status.sensor_states] or ["sensor: none is alive"]
         if not status.workers:
             found.append("worker: none is alive")
         return found

@@ -66,6 +66,8 @@ class MessageWatch:
                         self._counters.add("fetched")
                 case messages.Preview():
                     self._counters.add("previews")
+                case messages.Hints():
+                    self._counters.add("hints")
         for one in refused.values():  # one for each capture, however many pressed
             self._captures.pop(one.capture_id, None)
             self._counters.add("press_refused", one.reason)

@@ -1,13 +1,16 @@
 """The hub's figures as Prometheus metrics."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from itertools import accumulate
+from typing import get_args
 
 from prometheus_client import CollectorRegistry, ProcessCollector, core
 from prometheus_client.registry import Collector
 
 from denseface.service.monitoring.figures import BUCKETS_S, Histogram
 from denseface.service.monitoring.observer import Snapshot
+from denseface.service.protocol.sensor_messages import LiveStateName
+from denseface.service.protocol.status import SensorStatus
 
 __all__ = ["COUNTERS", "Metrics"]
 
@@ -25,8 +28,18 @@ COUNTERS: dict[str, tuple[str, str | None, str]] = {
               "Publications at which a subscriber's queue was found full."),
     "fetched": ("fetched", None, "Outcomes that subscribers requested."),
     "previews": ("previews", None, "Previews published."),
+    "hints": ("hints", None, "Hints published."),
 }
 """Name in `Counters` -> name of the metric, its label, its help text."""
+
+_SENSOR_COUNTERS = {
+    "frames": "Pairs of depth and colour.",
+    "drops": "Images that were lost or had no partner.",
+    "stalls": "Times that the stream fell silent.",
+    "reconnects": "Times that the sensor was opened again.",
+    "wrong_size": "Images of another size than the mode's.",
+}
+"""Field of `SensorFigures` -> help text of its metric."""
 
 _PREFIX = "denseface_"
 
@@ -48,6 +61,7 @@ class Metrics(Collector):
             yield from _counters(snapshot)
             yield _restarts(snapshot)
             yield from _gauges(snapshot)
+            yield from _sensors(snapshot)
             yield _latencies(snapshot.stages)
 
 
@@ -90,11 +104,33 @@ def _gauges(snapshot: Snapshot) -> Iterator[core.Metric]:
     yield _gauge_family("build", "Always 1.", "version", {status.hub_version: 1})
 
 
+def _sensors(snapshot: Snapshot) -> Iterator[core.Metric]:
+    """Give what each sensor says of itself; of two with one name the first, which is asked."""
+    by_name: dict[str, SensorStatus] = {}
+    for one in snapshot.status.sensor_states:
+        by_name.setdefault(one.name, one)
+    state = core.GaugeMetricFamily(
+        _PREFIX + "sensor_state", "1 for the state of a sensor, else 0.",
+        labels=["sensor", "state"])
+    for name, one in by_name.items():
+        for known in get_args(LiveStateName):
+            state.add_metric([name, known], one.state == known)
+    yield state
+    for field, text in _SENSOR_COUNTERS.items():
+        family = core.CounterMetricFamily(f"{_PREFIX}sensor_{field}", text, labels=["sensor"])
+        for name, one in by_name.items():
+            family.add_metric([name], getattr(one.figures, field))
+        yield family
+    yield _gauge_family(
+        "sensor_skew_seconds", "Between depth and colour of the newest pair.", "sensor",
+        {name: one.figures.skew_us / 1e6 for name, one in by_name.items()})
+
+
 def _gauge(name: str, text: str, value: int) -> core.Metric:
     return core.GaugeMetricFamily(_PREFIX + name, text, value=value)
 
 
-def _gauge_family(name: str, text: str, label: str, values: dict[str, int]) -> core.Metric:
+def _gauge_family(name: str, text: str, label: str, values: Mapping[str, float]) -> core.Metric:
     family = core.GaugeMetricFamily(_PREFIX + name, text, labels=[label])
     for one, value in values.items():
         family.add_metric([one], value)

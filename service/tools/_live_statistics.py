@@ -1,5 +1,6 @@
 """Counts and times of a live run."""
 
+import re
 import time
 from collections import Counter, deque
 from collections.abc import Callable
@@ -40,6 +41,8 @@ class LiveStatistics:
         self._times: dict[str, deque[float]] = {}
         self._points: deque[tuple[int, int]] = deque(maxlen=_MAX_TIMES)
         self.failures: Counter[str] = Counter()
+        self.warnings: Counter[str] = Counter()
+        """Of the faces' reports; a number counts as any other."""
         self.frames = 0
 
     def add(self, frame: LiveFrame) -> None:
@@ -49,6 +52,8 @@ class LiveStatistics:
         self.frames += 1
         if isinstance(frame.outcome, Face):
             self._points.append((len(frame.outcome.initial), len(frame.outcome.dense)))
+            self.warnings.update(
+                re.sub(r"\d+(\.\d+)?", "N", one) for one in frame.outcome.report.warnings)
         else:
             self.failures[type(frame.outcome).__name__] += 1
         for stage, ms in frame.timings_ms.items():

@@ -10,7 +10,7 @@ from denseface.capture import RgbdFrame, Source, open_source
 from denseface.capture.errors import UnreadableSourceError
 from denseface.recon import Face, ReconstructionError, Settings, reconstruct, warm
 from denseface.service.runtime.signals import StopSignal
-from denseface.service.runtime.terminal import say
+from denseface.service.runtime.terminal import complain, say
 from denseface.service.tools._live_report import StatusLine, json_summary, text_summary
 from denseface.service.tools._live_statistics import Clock, LiveFrame, LiveStatistics
 
@@ -48,6 +48,8 @@ def run(
             if statistics.frames:
                 say(*(json_summary(uri, settings, warm_ms, statistics) if as_json
                       else text_summary(warm_ms, statistics)).split("\n"))
+                for warning, number in statistics.warnings.most_common():
+                    complain(f"warning, {number} of {statistics.frames} frames: {warning}")
         return stop.exit_status
 
 

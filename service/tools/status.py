@@ -6,6 +6,7 @@ import time
 from denseface.service.client import Client
 from denseface.service.errors import ClientTimeoutError
 from denseface.service.protocol.messages import Status
+from denseface.service.protocol.status import SensorStatus
 from denseface.service.runtime.terminal import printable
 
 __all__ = ["as_json", "as_text", "ready_status"]
@@ -28,11 +29,29 @@ def ready_status(client: Client, timeout: float) -> Status:
         left = deadline - time.monotonic()
         if left <= 0:
             missing = ("no hub" if status.state != "serving" else
-                       "no sensor" if not status.sensors else "no worker")
+                       _no_sensor(status) if not status.sensors else "no worker")
             raise ClientTimeoutError(f"{missing} is ready after {timeout:g} s")
         time.sleep(min(_POLL_S, left))
         status = client.status()
     return status
+
+
+def _no_sensor(status: Status) -> str:
+    return "no sensor" + "".join(
+        f" ({one.name} is {one.state}{one.reason and f': {one.reason}'})"
+        for one in status.sensor_states)
+
+
+def _sensor(one: SensorStatus) -> str:
+    """Say of a sensor how it is, and what went wrong since its process began."""
+    figures = one.figures
+    identity = f" ({one.identity})" if one.identity not in ("", one.name) else ""
+    state = f"{one.state}{one.reason and f': {one.reason}'}"
+    counts = {"frames": figures.frames, "dropped": figures.drops, "stalls": figures.stalls,
+              "reconnects": figures.reconnects, "of a wrong size": figures.wrong_size}
+    counted = "".join(f", {count} {name}" for name, count in counts.items() if count)
+    skew = f", skew {figures.skew_us / 1000:.1f} ms" if figures.skew_us else ""
+    return f"{one.name}{identity} {state}{counted}{skew}"
 
 
 def as_json(address: str, status: Status) -> str:
@@ -45,7 +64,8 @@ def as_text(address: str, status: Status) -> str:
     """Give the status as lines of a name and what it says, escaped."""
     rows = {
         "hub": f"{status.hub_version} at {address}",
-        "sensors": ", ".join(status.sensors) or "none",
+        "sensors": "; ".join(map(_sensor, status.sensor_states)) or (
+            ", ".join(status.sensors) or "none"),
         "workers": ", ".join(status.workers) or "none",
         "now": f"{status.pressed} pressed, {status.queued} queued, {status.working} working",
         "kept": f"{status.done} faces, {status.failed} without a face, {status.dead} given up",

@@ -1,6 +1,8 @@
 """A subscription's socket, read without waiting."""
 
 import os
+from collections.abc import Callable
+from typing import TypeVar
 
 import zmq
 
@@ -10,6 +12,8 @@ from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import MAX_HEADER_BYTES, MAX_PARTS, Packet, decode_from_hub
 from denseface.service.transport.connection import Credentials, connect
 from denseface.service.transport.sockets import Context, receive_parts
+
+_T = TypeVar("_T")
 
 CHECK_INTERVAL_S = 1.0
 """Interval at which a client asks whether the hub still accepts its key, seconds."""
@@ -41,11 +45,12 @@ class Subscription:
         except ProtocolError:
             return None
 
-    def receive_latest(self) -> Packet | None:
-        """Give the last of what has come, pass over the rest; raises as `receive`."""
-        packet = self.receive()
+    def receive_latest(self, read: Callable[[Packet], _T | None]) -> _T | None:
+        """Give the last of what has come that `read` makes something of, pass over the rest."""
+        latest = None
         try:
             while True:
                 packet = self.receive()
+                latest = (read(packet) if packet else None) or latest
         except zmq.Again:
-            return packet
+            return latest

@@ -111,7 +111,7 @@ def test_previews_go_on_while_pressing_and_end_with_the_subscriber(running):
 
     found, face = asyncio.run(asyncio.wait_for(main(), LIMIT_S))
     assert face.report.dense_points > 0
-    assert {one.image.shape for one in found} == {(240, 320, 3)}
+    assert {one.image.shape for one in found} == {(480, 640, 3)}
     assert len({one.epoch for one in found}) == 1
     numbers = [one.sequence for one in found]
     assert numbers == sorted(set(numbers))

@@ -9,6 +9,7 @@ import numpy as np
 import zmq
 
 from denseface.service.protocol import messages
+from denseface.service.protocol.hint import Hint
 from denseface.service.protocol.message_base import BaseMessage
 from denseface.service.protocol.payload import FaceHeader, PreviewHeader
 from denseface.service.protocol.topics import Topic
@@ -26,6 +27,9 @@ class FakeHub:
         self.outcomes: list[Packet] = []
         self.ignored: set[str] = set()
         self.refuse: str | None = None
+        self.refuse_reason: messages.PressReason = "disk"
+        self.hint: Hint | None = None
+        self.presses: list[messages.Press] = []
         self.removals: list[tuple[int, bool]] = []
         """What the next purges are told."""
         self.received: list[str] = []
@@ -70,6 +74,12 @@ class FakeHub:
             preview=PreviewHeader(width=2, height=1, timestamp_us=sequence)),
             {"image": np.full((1, 2, 3), sequence, np.uint8)}))
 
+    def jpeg(self, sequence: int, data: bytes, sensor: str, hint: Hint | None = None) -> None:
+        header, arrays = PreviewHeader.of_jpeg(data, sequence, hint)
+        self.publish(Topic.PREVIEW, Packet(messages.Preview(
+            epoch="0f", sequence=sequence,
+            preview=header.model_copy(update={"sensor": sensor})), arrays))
+
     def publish(self, topic: Topic, packet: Packet) -> None:
         self._calls.append(
             lambda: self._publisher.send_multipart([topic.encode(), *encode(packet)]))
@@ -101,10 +111,11 @@ class FakeHub:
         request = getattr(message, "request", 0)
         match message:
             case messages.Press(capture_id=capture_id):
+                self.presses.append(message)
                 if self.refuse:
                     yield Packet(messages.PressRefused(
-                        request=request, capture_id=capture_id, reason="disk",
-                        message=self.refuse))
+                        request=request, capture_id=capture_id, reason=self.refuse_reason,
+                        message=self.refuse, hint=self.hint))
                 else:
                     yield Packet(messages.PressAccepted(request=request, capture_id=capture_id))
             case messages.GetStatus():

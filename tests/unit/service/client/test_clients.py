@@ -2,8 +2,10 @@
 
 import asyncio
 import threading
-from contextlib import aclosing
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import aclosing, closing
 
+import cv2
 import numpy as np
 import psutil
 import pytest
@@ -15,9 +17,14 @@ from denseface.service.errors import (
     ClientTimeoutError,
     LocalProtocolError,
     PressRefusedError,
+    RemoteProtocolError,
     UnknownCaptureError,
 )
+from denseface.service.protocol import messages
+from denseface.service.protocol.hint import Hint
 from denseface.service.protocol.topics import Topic
+from denseface.service.protocol.wire import Packet
+from tests.unit.service.faces import jpeg
 from tests.unit.service.fake_hub import fake_hub
 from tests.waiting import LIMIT_S, until
 
@@ -168,6 +175,94 @@ def test_the_blocking_client_s_previews_pass_over_what_is_old(hub):
         hub.wait(lambda: hub.subscribers(Topic.PREVIEW) == 0)
         with pytest.raises(ClientTimeoutError):
             next(client.previews(timeout=0.05))
+
+
+HINT = Hint(timestamp_us=4, codes=("too_far",), text="come closer", measures={"distance_mm": 9.0})
+
+
+def test_a_jpeg_is_decoded_when_it_is_asked_for(hub):
+    red = np.full((30, 40, 3), (0, 0, 255), np.uint8)
+    data = cv2.imencode(".jpg", red)[1].tobytes()
+    with Client(hub.address) as client:
+        previews = client.previews(timeout=LIMIT_S)
+        with ThreadPoolExecutor() as pool:
+            first = pool.submit(next, previews)
+            hub.wait(lambda: hub.subscribers(Topic.PREVIEW) == 1)
+            hub.jpeg(1, data, "s", HINT)
+            shown = first.result()
+        assert (shown.jpeg, shown.sensor, shown.size) == (data, "s", (40, 30))
+        assert (shown.hint.text, shown.hint.ok) == ("come closer", False)
+        assert shown.image.shape == (30, 40, 3)
+        assert np.abs(shown.image.astype(int) - (255, 0, 0)).max() < 5
+        assert shown.image is shown.image
+        with pytest.raises(ValueError, match="read-only"):
+            shown.image[0] = 0
+        hub.jpeg(2, data[:-200] + bytes(200), "s")
+        until(lambda: next(previews).sequence == 2)
+        hub.jpeg(3, data[:data.index(b"\xff\xda")] + b"\xff\xd9", "s")
+        damaged = next(previews)
+        with pytest.raises(RemoteProtocolError, match="preview 3: the JPEG cannot be decoded"):
+            _ = damaged.image
+
+
+@pytest.mark.parametrize("kind", ["previews", "hints"])
+def test_of_several_sensors_the_one_that_is_asked_for_is_followed(hub, kind):
+    topic = {"previews": Topic.PREVIEW, "hints": Topic.HINTS}[kind]
+
+    def publish():
+        for number, sensor in enumerate("sososo"):
+            if kind == "hints":
+                hub.publish(topic, Packet(messages.Hints(sensor=sensor, hint=HINT)))
+            else:
+                hub.jpeg(number, jpeg(4, 3), sensor)
+
+    async def main():
+        async with AsyncClient(hub.address) as client, \
+                aclosing(getattr(client, kind)(sensor="s")) as following:
+            first = asyncio.ensure_future(anext(following))
+            await waited(hub, lambda: hub.subscribers(topic) == 1)
+            publish()
+            return await first
+
+    assert run(main()).sensor == "s"
+    with Client(hub.address) as client, closing(getattr(client, kind)(sensor="o")) as following, \
+            ThreadPoolExecutor() as pool:
+        first = pool.submit(next, following)
+        hub.wait(lambda: hub.subscribers(topic) == 1)
+        publish()
+        assert first.result().sensor == "o"
+
+
+def test_gate_and_sensor_are_said_and_a_refusal_says_what_to_do(hub):
+    async def main():
+        async with AsyncClient(hub.address) as client:
+            return await client.press("b", gate="refuse", frames=3)
+
+    hub.refuse, hub.refuse_reason, hub.hint = "come closer", "quality", HINT
+    with Client(hub.address) as client:
+        with pytest.raises(PressRefusedError, match="press refused: come closer") as refused:
+            client.press("a", sensor="kinect", gate="wait", gate_timeout=3)
+        assert (refused.value.reason, refused.value.codes, refused.value.text) == (
+            "quality", ("too_far",), "come closer")
+    with pytest.raises(PressRefusedError):
+        run(main())
+    first, second = hub.presses
+    assert (first.sensor, first.gate, first.gate_timeout, first.frames) == ("kinect", "wait", 3, 1)
+    assert (second.sensor, second.gate, second.frames) == (None, "refuse", 3)
+
+
+def test_a_gated_press_is_waited_for_as_much_longer(hub):
+    hub.ignored = {"press"}
+    with Client(hub.address) as client, pytest.raises(ClientTimeoutError, match=r"within 0\.3 s"):
+        client.press("a", gate="wait", gate_timeout=0.2, timeout=0.1)
+
+
+@pytest.mark.parametrize(("how", "words"), [
+    ({"sensor": "a b"}, "sensor: .* 'a b'"), ({"gate": "maybe"}, "gate: .* 'maybe'"),
+    ({"gate_timeout": 121}, "gate_timeout: .* 121"), ({"frames": 0}, "frames: .* 0")])
+def test_what_is_wrong_with_a_press_is_named(hub, how, words):
+    with Client(hub.address) as client, pytest.raises(LocalProtocolError, match=words):
+        client.press("a", **how)
 
 
 def test_a_call_that_is_cancelled_leaves_the_client_as_it_was(hub):

@@ -1,12 +1,14 @@
 """Flags that several commands share."""
 
 import argparse
+from dataclasses import replace
 
 import pytest
 
 from denseface.recon import Preset, Settings
 from denseface.service.commands import _options
 from denseface.service.export import FORMATS
+from tests.unit.service.faces import small_face
 
 
 def test_flags_are_given_again_to_a_child_as_they_were_given():
@@ -18,6 +20,15 @@ def test_flags_are_given_again_to_a_child_as_they_were_given():
     names = ("debug", "listen", "key", "preset", "set", "log")
     assert _options.repeated(parser.parse_args(given), *names) == given
     assert _options.repeated(parser.parse_args([]), *names) == ["--log=text"]
+
+
+def test_what_a_report_doubts_is_one_line_each_on_stderr(capsys):
+    face = small_face()
+    report = face.report.model_copy(update={"warnings": ("depth lies\n", "12 ms apart")})
+    _options.warn(replace(face, report=report))
+    captured = capsys.readouterr()
+    assert captured.err == "warning: depth lies\\n\nwarning: 12 ms apart\n"
+    assert captured.out == ""
 
 
 def test_the_help_names_every_format():

@@ -1,11 +1,11 @@
 """The capture process: a press goes before a preview, whatever the driver is at."""
 
-import numpy as np
 import pytest
 
 from denseface.capture.errors import SensorError, UnreadableSourceError
-from denseface.service.daemons.capture import _Capture, _preview_image
+from denseface.service.daemons.capture import _Capture, sensor_name
 from denseface.service.protocol import messages
+from denseface.service.protocol.messages import SensorReady
 from denseface.service.protocol.wire import Packet
 from denseface.service.settings import ServiceSettings
 from tests.unit.service.faces import small_frame
@@ -163,25 +163,6 @@ def test_a_sensor_that_went_away_ends_the_process_at_a_preview_too():
         served(FakeReader(SensorError("unplugged"), live=True), PREVIEW, ENDED)
 
 
-@pytest.mark.parametrize(("shape", "small"), [
-    ((480, 640), (240, 320)), ((1024, 1280), (256, 320)), ((240, 320), (240, 320)),
-    ((7, 10), (7, 10)), ((1000, 3), (250, 1)), ((321, 321), (160, 160)), ((1, 5000), (1, 312))])
-def test_a_preview_is_small_enough_to_send(shape, small):
-    image = np.full((*shape, 3), (1, 100, 255), np.uint8)
-    found = _preview_image(image)
-    assert (found.shape, found.dtype) == ((*small, 3), np.uint8)
-    assert (found == (1, 100, 255)).all()
-
-
-@pytest.mark.parametrize("factor", [2, 3, 4])
-def test_a_pixel_of_a_preview_is_the_mean_of_those_it_covers(factor):
-    rng = np.random.default_rng(factor)
-    image = rng.integers(0, 256, (240 * factor, 320 * factor, 3), np.uint8)
-    image.flags.writeable = False  # as those of a frame are
-    means = image.reshape(240, factor, 320, factor, 3).mean((1, 3))
-    assert np.abs(_preview_image(image) - means).max() <= 0.5
-
-
 def test_a_frame_larger_than_allowed_is_not_sent():
     driver = Driver()
     connection = Connection(driver, [take("a"), ENDED, 100.0])
@@ -190,3 +171,11 @@ def test_a_frame_larger_than_allowed_is_not_sent():
     _, said = connection.sent
     assert (said.kind, said.capture_id) == ("frame_failed", "a")
     assert said.message.startswith("color has 10 x 7 pixels, at most 69 allowed")
+
+
+@pytest.mark.parametrize(("source", "identity", "name"), [
+    ("openni2:", "", "openni2"), ("openni2:", "B0012", "B0012"), ("OpenNI2:usb 1/2", "", "usb-1/2"),
+    ("/a/face 1.oni", "", "face-1"), ("", "", "sensor"), ("x" * 200 + ".oni", "", "x" * 100)])
+def test_a_sensor_without_a_name_is_named_after_its_identity_or_its_source(source, identity, name):
+    assert sensor_name(source, identity) == name
+    SensorReady(name=name, source=source)

@@ -39,11 +39,18 @@ def run_in_turn(tmp_path, monkeypatch):
 
 
 def test_the_table_names_what_runs():
-    table = process_table(2, ["--address=ipc:///x"], hub=["--data=d"], capture=["--source=x.oni"])
+    table = process_table(
+        2, ["--address=ipc:///x"], hub=["--data=d"], captures=[["--source=x.oni"]])
     assert [row.name for row in table] == ["hub", "capture", "worker-1", "worker-2"]
     assert table[0].arguments == ("hub", "--data=d", "--address=ipc:///x")
     assert table[1].arguments == ("capture", "--source=x.oni", "--address=ipc:///x")
     assert table[2].environment["OMP_NUM_THREADS"] == "1"
+
+
+def test_each_source_has_a_capture_process_of_its_own():
+    table = process_table(1, [], hub=[], captures=[["--source=a"], ["--source=b"]])
+    assert [(one.name, one.arguments) for one in table[1:3]] == [
+        ("capture-1", ("capture", "--source=a")), ("capture-2", ("capture", "--source=b"))]
 
 
 def test_restarts_come_later_and_later_until_it_is_a_storm():

@@ -9,6 +9,8 @@ from denseface.service.monitoring.health import Health, write_error
 from denseface.service.monitoring.observer import Snapshot
 from denseface.service.monitoring.prometheus import COUNTERS, Metrics
 from denseface.service.protocol.messages import Status
+from denseface.service.protocol.sensor_messages import SensorFigures
+from denseface.service.protocol.status import SensorStatus
 from denseface.service.settings import ServiceSettings
 
 SETTINGS = ServiceSettings(address="ipc:///unused", reserve_mib=100)
@@ -63,6 +65,23 @@ def test_all_that_the_snapshot_holds_is_rendered(snapshot):
     assert found["denseface_latency_seconds_sum", "press_to_published"] == pytest.approx(100.6)
 
 
+SENSORS = (
+    SensorStatus(name="a", state="streaming", figures=SensorFigures(
+        frames=9, drops=2, skew_us=1500, stalls=3, reconnects=4, wrong_size=5)),
+    SensorStatus(name="b", state="blocked", reason="busy"),
+    SensorStatus(name="a", state="absent"))
+
+
+def test_each_sensor_has_its_state_and_its_counts_once():
+    found = samples(Snapshot(100.0, status(sensor_states=SENSORS), (), {}))
+    assert [found[f"denseface_sensor_{name}_total", "a"] for name in (
+        "frames", "drops", "stalls", "reconnects", "wrong_size")] == [9, 2, 3, 4, 5]
+    assert found["denseface_sensor_skew_seconds", "a"] == 0.0015
+    assert found["denseface_sensor_drops_total", "b"] == 0
+    assert {state for (name, *labels), value in found.items() if name == "denseface_sensor_state"
+            and value and (state := tuple(labels))} == {("a", "streaming"), ("b", "blocked")}
+
+
 def test_what_never_happened_is_zero_so_that_alarms_can_be_set(snapshot):
     found = samples(snapshot)
     plain = [metric for metric, label, _ in COUNTERS.values() if label is None]
@@ -86,6 +105,7 @@ def test_all_is_well(snapshot):
 
 @pytest.mark.parametrize(("changed", "missing"), [
     ({"sensors": ()}, "sensor: none is alive"),
+    ({"sensors": (), "sensor_states": SENSORS[1:2]}, "sensor: b is blocked: busy"),
     ({"workers": ()}, "worker: none is alive"),
     ({"free_bytes": 99 * 2**20}, "disk: 99 MiB free, 100 MiB are to stay free"),
     ({"free_bytes": None}, "disk: its free room is not known"),

@@ -1,6 +1,7 @@
 """The figures of a live run."""
 
 from collections import deque
+from dataclasses import replace
 
 import pytest
 
@@ -29,6 +30,15 @@ def test_faces_and_named_failures_are_counted():
     assert statistics.rate == statistics.recent_rate == 2
     face = small_face()
     assert statistics.points() == (len(face.initial), len(face.dense))
+
+
+def test_warnings_are_counted_whatever_their_numbers_are():
+    statistics = LiveStatistics(SteppingClock(0.5))
+    for number in range(3):
+        face = small_face()
+        report = face.report.model_copy(update={"warnings": (f"only {number}.5 seeds",)})
+        statistics.add(succeeded(replace(face, report=report)))
+    assert statistics.warnings == {"only N seeds": 3}
 
 
 def test_without_a_frame_there_are_no_figures():

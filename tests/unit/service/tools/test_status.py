@@ -6,6 +6,8 @@ import pytest
 
 from denseface.service.errors import ClientTimeoutError
 from denseface.service.protocol.messages import Status
+from denseface.service.protocol.sensor_messages import SensorFigures
+from denseface.service.protocol.status import SensorStatus
 from denseface.service.tools import status as module
 from denseface.service.tools.status import as_json, as_text, ready_status
 
@@ -47,6 +49,19 @@ def test_json_and_text_say_the_same():
         "hub      1 at ipc:///x", "sensors  s", "workers  none",
         "now      0 pressed, 0 queued, 0 working",
         "kept     2 faces, 1 without a face, 0 given up"]
+
+
+def test_sensors_are_told_with_their_states_and_what_went_wrong():
+    states = (SensorStatus(name="B0012", state="streaming", identity="B0012",
+                           figures=SensorFigures(frames=5400, drops=12, stalls=2, skew_us=12400)),
+              SensorStatus(name="door", state="blocked", reason="no permission for /dev/bus/usb",
+                           identity="usb 1-2"))
+    assert as_text("ipc:///x", status("B0012", sensor_states=states)).splitlines()[1] == (
+        "sensors  B0012 streaming, 5400 frames, 12 dropped, 2 stalls, skew 12.4 ms; "
+        "door (usb 1-2) blocked: no permission for /dev/bus/usb")
+    with pytest.raises(ClientTimeoutError, match=(
+            r"no sensor \(door is blocked: no permission for /dev/bus/usb\) is ready after")):
+        ready_status(Client(status(sensor_states=states[1:])), 0.01)
 
 
 def test_lost_lines_of_the_log_are_shown_and_names_obey_no_terminal():
