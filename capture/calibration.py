@@ -37,6 +37,8 @@ _FOCAL_PER_SIDE = (1e-2, 1e3)
 """Focal length by the longer side: fields of view of 179 to 0.06 degrees."""
 _MAX_ASPECT = 10.0
 """Of a pixel; of a sensor's, binned or not, it is 0.5 to 2."""
+_WIDEST, _HIGHEST = 0.5, 0.8
+"""Height by width of images of a sensor: 2:1 to 5:4."""
 _CENTER_PER_SIDE = 1e3
 """How far the principal point may be off by the longer side: a small part of a large image."""
 _RAYS_BYTES = 64 * 2**20
@@ -128,6 +130,27 @@ class CameraModel(_Model):
             "cx": (self.cx + 0.5) * factor - 0.5, "cy": (self.cy + 0.5) * factor - 0.5,
         })
 
+    def cut_to(self, width: int, height: int) -> Self:
+        """Give the same camera in another mode of its sensor, by how these sensors cut their modes.
+
+        The modes of a sensor have its full width. Those of 4:3 and wider are centred on one
+        another; an image of 5:4 (1280x1024) has its further rows at the bottom, so that 640x480 is
+        its upper 960 rows (openni2_camera: the principal point of both is at 3/8 of the width).
+
+        Raises
+        ------
+        ValueError
+            One of both sizes is neither 5:4 nor 4:3 nor wider.
+        """
+        if (width, height) == (self.width, self.height):
+            return self
+        factor = width / self.width
+        top = _rows_above(self.width, self.height) * factor - _rows_above(width, height)
+        return self.model_copy(update={
+            "width": width, "height": height, "fx": self.fx * factor, "fy": self.fy * factor,
+            "cx": (self.cx + 0.5) * factor - 0.5, "cy": (self.cy + 0.5) * factor - 0.5 + top,
+        })
+
     def _distort(self, x: _Array, y: _Array) -> tuple[_Array, _Array]:
         if not any(self.distortion):
             return x, y
@@ -183,6 +206,13 @@ class CameraModel(_Model):
         if _folds(self):
             raise ValueError("distortion cannot be inverted over the whole image")
         return self
+
+
+def _rows_above(width: int, height: int) -> float:
+    """Give how many rows of the 4:3 image of that width lie above an image of it."""
+    if not _WIDEST <= height / width <= _HIGHEST:
+        raise ValueError(f"{width}x{height} is no known cut of a sensor's image")
+    return max(0.75 * width - height, 0) / 2
 
 
 @lru_cache(maxsize=32)  # every frame that is read brings equal cameras

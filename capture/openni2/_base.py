@@ -1,5 +1,6 @@
 """What recordings and live sensors share: a device, its streams, a calibration, pairs."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.errors import FrameError, SensorError
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
-from denseface.capture.openni2._calibration import derive_calibration
+from denseface.capture.openni2._calibration import Size, derive_calibration, fit
 from denseface.capture.openni2._library import close_handle, open_sources
 from denseface.capture.openni2._streams import COLOR, DEPTH, Image, Streams
 from denseface.capture.pairing import Pair, Pairer
@@ -29,7 +30,8 @@ class OpenNI2Source(Source):
         self.pairer: Pairer[Any, Any] = Pairer()
         self._chosen = chosen
         self._registered = False
-        self._unit_um = 1000
+        self._fitted: tuple[tuple[Size, Size | None], ChosenCalibration] | None = None
+        """The calibration of the modes in use, and their sizes."""
 
     def __del__(self) -> None:
         self.close()
@@ -48,36 +50,48 @@ class OpenNI2Source(Source):
         open_sources.add(self)
         try:
             streams = self._streams = Streams(device, self._name, live=self._live)
-            self._unit_um = streams.depth_unit_um
-            if self._chosen is None:
-                calibration, derivation = derive_calibration(
-                    streams.properties, streams.size(DEPTH), streams.size(COLOR))
-                origin = "device" if self._live else "recording"
-                self._chosen = ChosenCalibration(calibration, f"{origin}: {derivation}")
         except BaseException:
             self.close()
             raise
         return streams
 
     def _add(self, kind: str, image: Image) -> Pair[Any, Any] | None:
+        if self._streams is not None and COLOR not in self._streams.kinds:
+            return Pair(image[1], None, image[0], image[0])
         return (self.pairer.add_depth if kind == DEPTH else self.pairer.add_color)(*image)
 
     def _frame(self, pair: Pair[Any, Any]) -> RgbdFrame:
-        return self._make_frame(pair.depth, pair.color, (pair.depth_us, pair.color_us),
-                                FrameOrigin())
+        if self._streams is None:
+            raise SensorError(f"{self._name}: is closed")
+        return self._make_frame(self._streams, pair.depth, pair.color,
+                                (pair.depth_us, pair.color_us), FrameOrigin())
 
     def _make_frame(
-        self, depth: NDArray[np.uint16], color: NDArray[np.uint8] | None,
+        self, streams: Streams, depth: NDArray[np.uint16], color: NDArray[np.uint8] | None,
         stamps_us: tuple[int, int], origin: FrameOrigin,
     ) -> RgbdFrame:
-        """Make a frame; `stamps_us` are of depth and of colour."""
-        if self._chosen is None:
-            raise SensorError(f"{self._name}: is closed")
-        calibration, chosen = self._chosen
+        """Make a frame; `streams` may be closed, `stamps_us` are of depth and of colour."""
+        calibration, chosen = self._calibration(streams)
         try:
             # PrimeSense's drivers, and the recordings made through them, cut the fraction off.
-            return RgbdFrame(depth, color, *stamps_us, calibration, self._registered,
-                             calibration_origin=chosen, origin=origin,
-                             depth_meaning=DepthMeaning(self._unit_um, DepthRounding.CUT))
+            return RgbdFrame(
+                depth, color, *stamps_us, calibration, self._registered or streams.registered,
+                calibration_origin=chosen,
+                depth_meaning=DepthMeaning(streams.depth_unit_um, DepthRounding.CUT),
+                origin=replace(origin, notes=streams.notes + origin.notes))
         except FrameError as error:
             raise FrameError(f"{self._name}: {error} (calibration: {chosen})") from error
+
+    def _calibration(self, streams: Streams) -> ChosenCalibration:
+        """Give the chosen calibration, or what the device says, for the modes that are sent."""
+        depth = streams.size(DEPTH)
+        color = streams.size(COLOR) if COLOR in streams.kinds else None
+        if self._fitted is None or self._fitted[0] != (depth, color):
+            if self._chosen is None:
+                calibration, derivation = derive_calibration(streams.properties, depth, color)
+                origin = "device" if self._live else "recording"
+                chosen = ChosenCalibration(calibration, f"{origin}: {derivation}")
+            else:
+                chosen = fit(self._chosen, depth, color)
+            self._fitted = (depth, color), chosen
+        return self._fitted[1]

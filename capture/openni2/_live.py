@@ -50,7 +50,7 @@ class LiveSource(OpenNI2Source):
     Raises
     ------
     SensorError
-        No such device, no depth or colour stream, or the library is missing; while iterating, the
+        No such device, no depth stream, or the library is missing; while iterating, the
         device went away.
     SensorTimeoutError
         No pair came in time.
@@ -79,7 +79,7 @@ class LiveSource(OpenNI2Source):
         self._device_uri = bytes(device.uri)
         lost_devices.discard(self._device_uri)
         streams = self._opened = self._open_streams(device)
-        self._rings = {kind: Ring(_SLOTS, streams.frame_bytes(kind)) for kind in (DEPTH, COLOR)}
+        self._rings = {kind: Ring(_SLOTS, streams.frame_bytes(kind)) for kind in streams.kinds}
         self.pairs: LivePairs | None = None
         if start:
             self.start()
@@ -88,7 +88,7 @@ class LiveSource(OpenNI2Source):
         """Start both streams of a source that was made with `start=False`."""
         started_s = time.monotonic()
         self.streams.start()
-        self.pairs = LivePairs({DEPTH: started_s, COLOR: started_s})
+        self.pairs = LivePairs(dict.fromkeys(self.streams.kinds, started_s))
 
     def __iter__(self) -> Iterator[RgbdFrame]:
         while self._streams is not None:
@@ -111,7 +111,7 @@ class LiveSource(OpenNI2Source):
                 pair.release()
         clocks = self.pairs.clocks if self.pairs is not None else {}
         raise SensorTimeoutError(
-            f"{self._name}: no depth and color pair within {self.timeout_s:g} s (received "
+            f"{self._name}: no {' and '.join(clocks)} pair within {self.timeout_s:g} s (received "
             + " and ".join(f"{clock.frames} {kind}" for kind, clock in clocks.items()) + " frames)")
 
     def flush(self) -> None:
@@ -143,6 +143,8 @@ class LiveSource(OpenNI2Source):
         except WrongSizeError:
             self.wrong_size += 1
             slot.release()
+            if slot.memory.nbytes != streams.frame_bytes(kind):  # it keeps to another size
+                self._rings[kind] = Ring(_SLOTS, streams.frame_bytes(kind))
             return None
         except BaseException:
             slot.release()
@@ -159,7 +161,7 @@ class LiveSource(OpenNI2Source):
             sensor=self.identity, captured_at=taken.isoformat(timespec="milliseconds"),
             exposure_known_by=pair.exposure_known_by, skew_known_by=pair.skew_known_by,
             notes=pair.notes)
-        frame = self._make_frame(streams.image(DEPTH, pair.depth.memory), color,
+        frame = self._make_frame(streams, streams.image(DEPTH, pair.depth.memory), color,
                                  (pair.depth_us, pair.color_us), origin)
         return Shot(frame, pair.number, pair.earliest_s, pair.latest_s)
 

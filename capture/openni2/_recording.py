@@ -106,8 +106,10 @@ class RecordingSource(OpenNI2Source):
         super().close()
 
     def _frame(self, pair: Pair[Any, Any]) -> RgbdFrame:
-        return replace(super()._frame(pair), depth_meaning=self._recorded.meaning(self._unit_um),
-                       origin=self._recorded.origin(pair.depth_us))
+        frame = super()._frame(pair)
+        origin = self._recorded.origin(pair.depth_us)
+        return replace(frame, depth_meaning=self._recorded.meaning(frame.depth_meaning.unit_um),
+                       origin=replace(origin, notes=frame.origin.notes + origin.notes))
 
     def _open(self) -> Streams:
         load()

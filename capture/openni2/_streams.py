@@ -1,6 +1,12 @@
-"""A device's depth and colour streams: opened, started, and read by copy."""
+"""A device's depth and colour streams: opened, started, and read by copy.
+
+A driver is asked for the best pair of modes that it offers and for images as the cameras see them:
+not cropped, not mirrored, not registered. That it agrees proves nothing. Each frame is read by its
+own word on its size and format, and what was not done is undone or said.
+"""
 
 import ctypes
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -12,73 +18,118 @@ from primesense.utils import OpenNIError
 
 from denseface.capture.calibration import MAX_SIDE
 from denseface.capture.errors import SensorError, WrongSizeError
+from denseface.capture.modes import COLOR_FORMATS, DEPTH_FORMATS, Mode, listed, rank
+from denseface.capture.openni2 import _orbbec
 from denseface.capture.openni2._calibration import SensorProperties
+from denseface.capture.openni2._exposure import Exposure
 from denseface.capture.openni2._library import binding_errors, close_handle
+from denseface.capture.openni2._pixels import (
+    Layout,
+    copy_raw,
+    format_name,
+    format_number,
+    image_of,
+    layout_of,
+    raw_bytes,
+)
 
 DEPTH, COLOR = "depth", "color"
 """Kinds of stream."""
 Image = tuple[int, NDArray[Any]]
 """Stamp (sensor clock, microseconds) and pixels: (H, W) uint16 counts or (H, W, 3) uint8 RGB."""
 
-_FOV, _MIRRORING = 1, 7
+_CROPPING, _FOV, _MIRRORING = 0, 1, 7
 """OpenNI2's numbers of stream properties."""
+_REGISTRATION = 5
+"""OpenNI2's number of a device's property: 1 where depth comes in the colour camera's pixels."""
 _ZPD, _ZPPS, _DCRCDIS = 0x1080100C, 0x1080100D, 0x1080100F
 """PrimeSense's numbers of stream properties (PS1080.h); see `_calibration`."""
-_LIVE_SIZE, _LIVE_FPS = (640, 480), 30
-"""Video mode of live sensors: pixels, frames a second."""
-_PIXEL_BYTES = {DEPTH: 2, COLOR: 3}
-"""Of a frame as it is read."""
+_FORMATS = {DEPTH: DEPTH_FORMATS, COLOR: COLOR_FORMATS}
+_MAX_TRIES = 16
+"""Pairs of modes that a driver is asked for, at most."""
+_ADOPTED = 3
+"""Frames in a row of one other size after which that is the stream's, whatever its mode says."""
 _C = TypeVar("_C", bound="ctypes._SimpleCData[Any]")
-_1_MM, _100_UM = int(openni2.PIXEL_FORMAT_DEPTH_1_MM), int(openni2.PIXEL_FORMAT_DEPTH_100_UM)
-_PIXEL_FORMATS = {DEPTH: {_1_MM: "depth in 1 mm", _100_UM: "depth in 100 um"},
-                  COLOR: {int(openni2.PIXEL_FORMAT_RGB888): "RGB888"}}
-"""What can be read of each kind of stream, the best first, and how messages name it."""
 
 
 @dataclass
 class _Stream:
     kind: str
     handle: Any
-    size: tuple[int, int]
-    pixel_format: int
-    mirrored: bool
+    mode: Mode
+    mirrored: bool = False
+    other: Layout | None = None
+    """The last frame's, where it was not of the mode's size."""
+    others: int = 0
+    """How many of the last frames were like that one."""
+    note: str = ""
 
 
 class Streams:
-    """Both streams of an open device, started.
+    """The streams of an open device, started by `start`; a sensor may have no colour camera.
 
     Parameters
     ----------
     device : an open `openni2.Device`; it stays the caller's
     name : of the source, for messages
-    live : ask for 640x480 at 30 frames a second; a recording has its own modes
+    live : choose modes and switch off what changes the images; a recording is as it is
+
+    Attributes
+    ----------
+    kinds : DEPTH, and COLOR where there is a colour camera
+    offered : the modes that each of a live sensor offers
+    registered : the driver says that depth comes in the colour camera's pixels, also after it was
+        told not to
+    exposure : of the colour camera
 
     Raises
     ------
     SensorError
-        A stream is missing or has no mode that can be used.
+        There is no depth stream, or no mode that can be read.
     """
 
     def __init__(self, device: Any, name: str, *, live: bool) -> None:
         self._name = name
         self._streams: dict[str, _Stream] = {}
+        self._notes: list[str] = []
+        self.offered: dict[str, list[Mode]] = {}
+        self._pairs: Iterator[dict[str, Mode]] = iter(())
+        self.registered = False
         try:
-            # Both are created before either starts: a sensor may send from the first start on.
+            # All are created before one starts: a sensor may send from the first start on.
             for kind in (DEPTH, COLOR):
-                self._streams[kind] = self._create(device, kind, live=live)
-            self.properties = self._read_properties(device)
+                self._create(device, kind)
+            if live:
+                self._pairs = self._ranked(device)
+                self._choose_modes()
+                self._switch_off(device)
+            self._check_modes()
+            self.properties = self._read_properties(device, live=live)
         except BaseException:
             self.close()
             raise
+        self.kinds = tuple(self._streams)
+        color = self._streams.get(COLOR)
+        self.exposure = Exposure(None if color is None else color.handle,
+                                 by_freenect=self.properties.by_freenect)
 
     def start(self) -> None:
-        """Start both, before any `wait` or `read`."""
-        for kind, stream in self._streams.items():
-            with binding_errors(f"{self._name}: the {kind} stream does not start"):
-                stream.handle.start()
+        """Start all, before any `wait` or `read`; in the next best modes where they do not."""
+        while True:
+            try:
+                for kind, stream in self._streams.items():
+                    with binding_errors(f"{self._name}: the {kind} stream does not start"):
+                        stream.handle.start()
+            except SensorError:
+                self.stop()
+                if not self._choose_modes():
+                    raise
+                self._check_modes()
+            else:
+                return
 
     def stop(self) -> None:
-        """Stop both; a device that is gone may refuse."""
+        """Stop all; a device that is gone may refuse."""
         for stream in self._streams.values():
             with suppress(OpenNIError):
                 stream.handle.stop()
@@ -87,20 +138,30 @@ class Streams:
         """Give the binding's own stream, for its recorder."""
         return self._streams[kind].handle
 
-    @property
-    def depth_unit_um(self) -> int:
-        """Micrometres of one count of a depth."""
-        return 100 if self._streams[DEPTH].pixel_format == _100_UM else 1000
+    def mode(self, kind: str) -> Mode:
+        """Give the mode that the frames have."""
+        return self._streams[kind].mode
 
     def size(self, kind: str) -> tuple[int, int]:
         """Give (width, height), pixels."""
-        return self._streams[kind].size
+        return self._streams[kind].mode.size
 
-    def wait(self, timeout_s: float, kinds: tuple[str, ...] = (DEPTH, COLOR)) -> str | None:
+    @property
+    def depth_unit_um(self) -> int:
+        """Micrometres of one count of a depth."""
+        return 100 if self._streams[DEPTH].mode.pixel_format == "DEPTH_100_UM" else 1000
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the frames are not as they should be, for `FrameOrigin.notes`."""
+        return *self._notes, *(s.note for s in self._streams.values() if s.note)
+
+    def wait(self, timeout_s: float, kinds: tuple[str, ...] | None = None) -> str | None:
         """Wait until a stream has a frame; None where none came in time, or the file is at its end.
 
         A `read` of what was not announced here may block for ever.
         """
+        kinds = self.kinds if kinds is None else kinds
         handles = [self.handle(kind) for kind in kinds]
         with binding_errors(f"{self._name}: waiting for a frame failed"):
             ready = openni2.wait_for_any_stream(handles, timeout_s)
@@ -112,19 +173,22 @@ class Streams:
         Raises
         ------
         WrongSizeError
-            It is not of the size that the stream's mode says.
+            It is garbled or of another size than the stream's: the next may be right.
         """
         memory = np.empty(self.frame_bytes(kind), np.uint8)
         stamp_us = self.copy_frame(kind, memory)
         return stamp_us, self.image(kind, memory)
 
     def frame_bytes(self, kind: str) -> int:
-        """Give the size of a frame as the driver sends it, bytes."""
-        width, height = self.size(kind)
-        return width * height * _PIXEL_BYTES[kind]
+        """Give the size of a whole frame as the driver sends it, bytes; see `copy_frame`."""
+        mode = self._streams[kind].mode
+        return raw_bytes(mode.size, mode.pixel_format)
 
     def copy_frame(self, kind: str, memory: NDArray[np.uint8]) -> int:
         """Copy the frame that `wait` announced, as it is, and give its stamp, microseconds.
+
+        A driver that keeps to another size or format than its mode's is believed after some frames:
+        then `mode` and `frame_bytes` change.
 
         Parameters
         ----------
@@ -133,105 +197,157 @@ class Streams:
         Raises
         ------
         WrongSizeError
-            It is not of the size that the stream's mode says; it is read all the same.
+            It is garbled or of another size than the stream's; it is read all the same.
         """
+        stream = self._streams[kind]
         with binding_errors(f"{self._name}: reading a {kind} frame failed"):
-            frame = self._streams[kind].handle.read_frame()
+            frame = stream.handle.read_frame()
         try:
-            self._copy(kind, frame, memory)
+            self._copy(stream, frame, memory)
             return int(frame.timestamp)
         finally:
             frame.close()
 
     def image(self, kind: str, memory: NDArray[np.uint8]) -> NDArray[Any]:
-        """Make an image of what `copy_frame` copied: an array of its own, not mirrored."""
+        """Make an image of what `copy_frame` copied: an array of its own, RGB, not mirrored.
+
+        Raises
+        ------
+        WrongSizeError
+            It was copied before the mode changed.
+        """
         stream = self._streams[kind]
-        width, height = stream.size
-        if kind == COLOR:
-            image: NDArray[Any] = memory.reshape(height, width, 3)
-        else:
-            image = memory.view(np.uint16).reshape(height, width)
-        return (image[:, ::-1] if stream.mirrored else image).copy()
+        if memory.nbytes != self.frame_bytes(kind):
+            raise WrongSizeError(f"{self._name}: a {kind} frame from before its mode changed")
+        return image_of(memory, stream.mode.pixel_format, stream.mode.size,
+                        mirrored=stream.mirrored)
 
     def close(self) -> None:
-        """Stop and destroy both, also of a device that is gone; `image` still works."""
+        """Stop and destroy all, also of a device that is gone; `image` still works."""
         for stream in self._streams.values():
             close_handle(stream.handle)
 
-    def _create(self, device: Any, kind: str, *, live: bool) -> _Stream:
+    def _create(self, device: Any, kind: str) -> None:
         make = device.create_depth_stream if kind == DEPTH else device.create_color_stream
         with binding_errors(f"{self._name}: the {kind} stream cannot be opened"):
             handle = make()
-        if handle is None:
-            raise SensorError(f"{self._name}: has no {kind} stream; depth and color are needed")
-        try:
+        if handle is not None:
+            self._streams[kind] = _Stream(kind, handle, Mode(0, 0, 0, ""))
+        elif kind == DEPTH:
+            raise SensorError(f"{self._name}: has no depth stream; depth is needed")
+
+    def _ranked(self, device: Any) -> Iterator[dict[str, Mode]]:
+        """Give the pairs of modes to be tried, the best first.
+
+        Raises SensorError where there is none.
+        """
+        offered = self.offered = {kind: [_mode(m) for m in device.get_sensor_info(
+            stream.handle.sensor_type).videoModes] for kind, stream in self._streams.items()}
+        pairs = rank(offered[DEPTH], offered.get(COLOR))
+        if not pairs and all(offered.values()):
+            raise SensorError(f"{self._name}: offers no modes that can be read: " + ", ".join(
+                f"{kind} {listed(modes)} (expected {' or '.join(_FORMATS[kind])})"
+                for kind, modes in offered.items()))
+        return iter([{DEPTH: depth} | ({} if color is None else {COLOR: color})
+                     for depth, color in pairs[:_MAX_TRIES]])
+
+    def _choose_modes(self) -> bool:
+        """Set the best pair of modes that the driver takes; False where it takes no more."""
+        for pair in self._pairs:
+            with suppress(OpenNIError):
+                for kind, mode in pair.items():
+                    self._streams[kind].handle.configure_mode(
+                        *mode.size, mode.fps, format_number(mode.pixel_format))
+                return True
+        return False
+
+    def _check_modes(self) -> None:
+        """Read the modes back; raises SensorError where one cannot be read."""
+        for kind, stream in self._streams.items():
             with binding_errors(f"{self._name}: the {kind} stream has no video mode"):
-                return self._configure(device, kind, handle, live=live)
-        except BaseException:
-            close_handle(handle)
-            raise
+                stream.mode = _mode(stream.handle.video_mode)
+            if stream.mode.pixel_format not in _FORMATS[kind]:
+                raise SensorError(f"{self._name}: the {kind} stream is {stream.mode.pixel_format}, "
+                                  f"expected {' or '.join(_FORMATS[kind])}")
+            if not all(0 < side <= MAX_SIDE for side in stream.mode.size):
+                raise SensorError(
+                    f"{self._name}: the {kind} stream is {stream.mode.width}x"
+                    f"{stream.mode.height}, expected sides of 1 to {MAX_SIDE}")
+            stream.mirrored = bool(_property(stream.handle, _MIRRORING, ctypes.c_int))
 
-    def _configure(self, device: Any, kind: str, handle: Any, *, live: bool) -> _Stream:
-        if live:
-            self._choose_mode(device, kind, handle)
-        mode = handle.video_mode
-        if int(mode.pixelFormat) not in _PIXEL_FORMATS[kind]:
-            found = repr(mode.pixelFormat).split("PIXEL_FORMAT_")[-1]
-            raise SensorError(f"{self._name}: the {kind} stream is {found}, "
-                              f"expected {' or '.join(_PIXEL_FORMATS[kind].values())}")
-        if not (0 < mode.resolutionX <= MAX_SIDE and 0 < mode.resolutionY <= MAX_SIDE):
-            raise SensorError(f"{self._name}: the {kind} stream is {mode.resolutionX}x"
-                              f"{mode.resolutionY}, expected sides of 1 to {MAX_SIDE}")
-        return _Stream(kind, handle, (int(mode.resolutionX), int(mode.resolutionY)),
-                       int(mode.pixelFormat), self._mirrored(handle))
-
-    def _choose_mode(self, device: Any, kind: str, handle: Any) -> None:
-        modes = [(int(m.resolutionX), int(m.resolutionY), int(m.fps), int(m.pixelFormat))
-                 for m in device.get_sensor_info(handle.sensor_type).videoModes]
-        for pixel_format in _PIXEL_FORMATS[kind]:
-            wanted = (*_LIVE_SIZE, _LIVE_FPS, pixel_format)
-            if wanted in modes:
-                handle.configure_mode(*wanted)
-                return
-        raise SensorError(
-            f"{self._name}: the {kind} stream does not offer 640x480 at 30 frames a second as "
-            f"{' or '.join(_PIXEL_FORMATS[kind].values())}")
-
-    def _mirrored(self, handle: Any) -> bool:
-        """Switch mirroring off; where that fails, as on recordings, say whether it is on."""
+    def _switch_off(self, device: Any) -> None:
+        """Ask for images as the cameras see them."""
+        for kind, stream in self._streams.items():
+            with suppress(OpenNIError):
+                stream.handle.reset_cropping()
+            with suppress(OpenNIError):
+                stream.handle.set_mirroring_enabled(False)
+            if _property(stream.handle, _MIRRORING, ctypes.c_int) is None:
+                self._notes.append(f"the driver does not say whether its {kind} is mirrored")
+        # After the depth stream exists: Freenect's driver crashes otherwise.
         with suppress(OpenNIError):
-            handle.set_mirroring_enabled(False)
-        return bool(_property(handle, _MIRRORING, ctypes.c_int))
+            device.set_property(_REGISTRATION, ctypes.c_int(0))
+        self.registered = bool(_property(device, _REGISTRATION, ctypes.c_int))
+        if self.registered:
+            self._notes.append("the driver keeps registering depth to the color camera")
 
-    def _read_properties(self, device: Any) -> SensorProperties:
-        depth, color = self.handle(DEPTH), self.handle(COLOR)
+    def _read_properties(self, device: Any, *, live: bool) -> SensorProperties:
+        depth = self.handle(DEPTH)
+        info = device.device_info
+        color = self._streams.get(COLOR)
+        orbbec = info.usbVendorId == _orbbec.VENDOR or b"orbbec" in bytes(info.vendor).lower()
         return SensorProperties(
             zpd_mm=_property(depth, _ZPD, ctypes.c_uint64),
             zpps_mm=_property(depth, _ZPPS, ctypes.c_double),
             dcrcdis_cm=_property(depth, _DCRCDIS, ctypes.c_double),
             depth_fov=_property(depth, _FOV, ctypes.c_float),
-            color_fov=_property(color, _FOV, ctypes.c_float),
-            usb_vendor=int(device.device_info.usbVendorId),
+            color_fov=None if color is None else _property(color.handle, _FOV, ctypes.c_float),
+            usb_vendor=int(info.usbVendorId),
+            uri=bytes(info.uri).decode("utf-8", "replace") if live else "",
+            orbbec=_factory_calibration(device) if live and orbbec else None,
         )
 
-    def _copy(self, kind: str, frame: Any, memory: NDArray[np.uint8]) -> None:
-        """Copy at once: the next read reuses the driver's memory, and closing frees it."""
-        width, height = self.size(kind)
-        row, stride, size = width * _PIXEL_BYTES[kind], int(frame.stride), int(frame.dataSize)
-        if ((int(frame.width), int(frame.height)) != (width, height) or stride < row
-                or size < stride * (height - 1) + row):
-            raise WrongSizeError(
-                f"{self._name}: a {kind} frame of {frame.width}x{frame.height} in {size} "
-                f"bytes, expected {width}x{height} (cropping is not supported)")
-        if stride == row:
-            ctypes.memmove(memory.ctypes.data, int(frame.data), row * height)
-            return
-        for y in range(height):  # a driver that pads its rows
-            ctypes.memmove(memory.ctypes.data + y * row, int(frame.data) + y * stride, row)
+    def _copy(self, stream: _Stream, frame: Any, memory: NDArray[np.uint8]) -> None:
+        mode = stream.mode
+        layout = layout_of(frame, mode.pixel_format)
+        try:
+            copy_raw(int(frame.data or 0), layout, mode.size, mode.pixel_format, memory)
+        except WrongSizeError as error:
+            self._adopt(stream, layout)
+            raise WrongSizeError(f"{self._name}: {stream.kind}: {error}") from error
+        stream.other = None
+        stream.note = "" if layout.crop is None else (
+            f"the driver sends {layout.width}x{layout.height} pixels of {stream.kind} from "
+            f"{layout.crop[0]}, {layout.crop[1]}, cropped")
+
+    def _adopt(self, stream: _Stream, layout: Layout) -> None:
+        """Take a size and format that the frames keep to for the stream's."""
+        stream.others = stream.others + 1 if layout == stream.other else 1
+        stream.other = layout
+        mode = Mode(layout.width, layout.height, stream.mode.fps, layout.pixel_format)
+        if (stream.others >= _ADOPTED and layout.crop is None and mode != stream.mode
+                and mode.pixel_format in _FORMATS[stream.kind]
+                and all(0 < side <= MAX_SIDE for side in mode.size)):
+            self._notes.append(f"the driver says that {stream.kind} is {stream.mode}, and sends "
+                               f"{mode.width}x{mode.height} as {mode.pixel_format}")
+            stream.mode = mode
+
+
+def _mode(mode: Any) -> Mode:
+    return Mode(int(mode.resolutionX), int(mode.resolutionY), int(mode.fps),
+                format_name(int(mode.pixelFormat)))
 
 
 def _property(handle: Any, number: int, kind: type[_C]) -> Any:
-    """Give a stream's property, None where it has none."""
+    """Give a property of a stream or device, None where it has none."""
     with suppress(OpenNIError):
         return handle.get_property(number, kind).value
+    return None
+
+
+def _factory_calibration(device: Any) -> tuple[float, ...] | None:
+    for size in _orbbec.PROPERTY_BYTES:
+        with suppress(OpenNIError):
+            return _orbbec.unpack(bytes(device.get_property(_orbbec.PROPERTY,
+                                                            ctypes.c_char * size)))
     return None

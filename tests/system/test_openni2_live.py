@@ -131,11 +131,19 @@ def test_what_waited_in_the_library_is_not_given(clip):
     assert done.stdout == "True\n", done.stderr
 
 
-@pytest.mark.parametrize(("streams", "missing"), [("depth", "color"), ("color", "depth")])
-def test_a_missing_stream_is_named(clip, streams, missing):
-    _, error = failing("openni2:", environment(clip, streams=streams))
-    assert error == (f"denseface.capture.errors.SensorError: openni2: has no {missing} stream; "
-                     "depth and color are needed")
+def test_a_sensor_without_depth_is_refused(clip):
+    _, error = failing("openni2:", environment(clip, streams="color"))
+    assert error == ("denseface.capture.errors.SensorError: openni2: has no depth stream; "
+                     "depth is needed")
+
+
+def test_a_sensor_without_a_color_camera(clip, shown):
+    frames, origin = play("openni2:", environment(clip, streams="depth"), max_frames=3)
+    assert origin == "device: ZPD 120, ZPPS 0.1042"
+    for frame in frames:
+        assert frame.color is None
+        assert frame.calibration.color == frame.calibration.depth
+        np.testing.assert_array_equal(frame.depth, shown[number(frame.depth_timestamp_us) % 3][0])
 
 
 def test_no_sensor():

@@ -168,3 +168,25 @@ def test_camera_model_refuses_wrong_shapes():
         camera().project(np.zeros((3, 2)))
     with pytest.raises(ValueError, match="pixels"):
         CameraModel.back_project(camera(), np.zeros((3, 3)), 1.0)
+
+
+VGA = CameraModel(width=640, height=480, fx=575.8, fy=574.0, cx=321.0, cy=243.0)
+
+
+@pytest.mark.parametrize(("size", "focal", "center"), [
+    ((640, 480), 575.8, (321, 243)), ((320, 240), 287.9, (160.25, 121.25)),
+    ((640, 400), 575.8, (321, 203)), ((1280, 960), 1151.6, (642.5, 486.5)),
+    ((1280, 1024), 1151.6, (642.5, 486.5)), ((640, 512), 575.8, (321, 243)),
+    ((640, 360), 575.8, (321, 183)), ((1280, 800), 1151.6, (642.5, 406.5))])
+def test_a_camera_in_another_mode(size, focal, center):
+    cut = VGA.cut_to(*size)
+    assert (cut.width, cut.height) == size
+    assert cut.fx == pytest.approx(focal)
+    assert (cut.cx, cut.cy) == pytest.approx(center)
+    back = cut.cut_to(640, 480)
+    assert (back.fx, back.fy, back.cx, back.cy) == pytest.approx((575.8, 574, 321, 243))
+
+
+def test_a_mode_that_no_sensor_has():
+    with pytest.raises(ValueError, match="480x640 is no known cut of a sensor's image"):
+        VGA.cut_to(480, 640)
