@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
 from denseface.capture.errors import FrameError
 
-__all__ = ["DepthMeaning", "DepthRounding", "FrameOrigin", "RgbdFrame"]
+__all__ = ["MAX_BURST", "DepthMeaning", "DepthRounding", "FrameOrigin", "RgbdFrame"]
 
 _UNITS_UM = (1, 100_000)
 """Least and most micrometres of one count of a depth."""
-_MOST_FUSED = 64
-"""Frames that one frame is made of, at most."""
+MAX_BURST = 32
+"""Frames that one frame is made of, at most: a second of a sensor, in which few hold still."""
 
 
 class DepthRounding(StrEnum):
@@ -93,8 +93,8 @@ class FrameOrigin:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if not 1 <= self.fused <= _MOST_FUSED:
-            raise FrameError(f"fused must be 1 to {_MOST_FUSED}, found {self.fused}")
+        if not 1 <= self.fused <= MAX_BURST:
+            raise FrameError(f"fused must be 1 to {MAX_BURST}, found {self.fused}")
 
 
 @dataclass(frozen=True, eq=False)

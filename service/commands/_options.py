@@ -197,6 +197,14 @@ def count(text: str) -> int:
     return int(text)
 
 
+def burst(text: str) -> int:
+    from denseface.capture import MAX_BURST
+
+    if not 1 <= (value := count(text)) <= MAX_BURST:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected 1 to {MAX_BURST} frames")
+    return value
+
+
 def timestamp(text: str) -> datetime:
     from denseface.service.runtime.parsing import parse_time
 

@@ -11,6 +11,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("input", metavar="INPUT", help="a .npz frame or a .oni recording")
     parser.add_argument("--frame", type=int, default=0, metavar="N",
                         help="which frame of the recording, from 0 (default: 0)")
+    parser.add_argument("--frames", type=_options.burst, default=1, metavar="N",
+                        help="average the depth of N frames from there on (default: 1)")
     _options.add_outputs(parser, "-o", "--output")
     parser.add_argument("--calibration", type=Path, metavar="FILE.json",
                         help="calibration that wins over the file's own")
@@ -24,7 +26,7 @@ def run(args: argparse.Namespace) -> int:
     files = FaceFiles(args.output, args.report, args.rendering)
     settings = _options.recon_settings(args)
     frame = read_frame(args.input, args.frame, args.calibration,
-                       _options.service_settings(args).max_frame_pixels)
+                       _options.service_settings(args).max_frame_pixels, args.frames)
 
     from denseface.recon import reconstruct
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, FailFast, Field, ValidationError, model_validator
 
 from denseface.capture import (
+    MAX_BURST,
     Calibration,
     CaptureError,
     DepthMeaning,
@@ -119,7 +120,7 @@ class FrameHeader(_PayloadHeader):
     exposed_after_press_ms: float | None = None
     exposure_known_by: _Line = ""
     skew_known_by: _Line = ""
-    fused: Annotated[int, Field(ge=1, le=64)] = 1
+    fused: Annotated[int, Field(ge=1, le=MAX_BURST)] = 1
     notes: Annotated[tuple[_Note, ...], Field(max_length=32), FailFast()] = ()
 
     def layout(self) -> tuple[ArrayInfo, ...]:

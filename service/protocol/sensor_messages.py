@@ -4,6 +4,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from denseface.capture import MAX_BURST
 from denseface.service.protocol.hint import Hint
 from denseface.service.protocol.message_base import (
     CaptureId,
@@ -17,9 +18,6 @@ from denseface.service.protocol.payload import FrameHeader, PreviewHeader
 
 DEFAULT_GATE_S = 10.0
 """How long a gated press waits for a frame that is good enough, unless it says so, seconds."""
-MAX_BURST = 32
-"""Frames of one burst: a second of a sensor, in which nobody keeps still for longer."""
-
 Gate = Literal["off", "wait", "refuse"]
 """Whether the frame has to be good enough: no; wait for one that is; refuse the press if not."""
 GateSeconds = Annotated[float, Field(ge=0, le=120)]

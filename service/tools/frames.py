@@ -1,8 +1,10 @@
 """One frame out of a file."""
 
+from itertools import islice
 from pathlib import Path
 
 from denseface.capture import RgbdFrame, open_source
+from denseface.capture.burst import fuse
 from denseface.service.errors import UsageError
 from denseface.service.protocol.payload import check_frame_size
 
@@ -10,9 +12,11 @@ __all__ = ["read_frame"]
 
 
 def read_frame(
-    path: str, number: int, calibration: Path | None, max_pixels: int
+    path: str, number: int, calibration: Path | None, max_pixels: int, burst: int = 1
 ) -> RgbdFrame:
     """Read a frame of a `.npz` or `.oni` file by its number, from 0.
+
+    With `burst`, it is the mean of so many frames from that one on.
 
     Raises
     ------
@@ -30,8 +34,13 @@ def read_frame(
         if count is not None and not 0 <= number < count:
             raise UsageError(f"{path}: has {count} frames (0 to {count - 1}), --frame asks for "
                              f"{number}")
-        for index, frame in enumerate(source):
-            if index == number:
-                check_frame_size(frame, max_pixels)
-                return frame
-    raise UsageError(f"{path}: has fewer than {number + 1} pairs of depth and colour")
+        frames: list[RgbdFrame] = []
+        for frame in islice(source, number, number + burst):
+            check_frame_size(frame, max_pixels)
+            frames.append(frame)
+    if not frames:
+        raise UsageError(f"{path}: has fewer than {number + 1} pairs of depth and colour")
+    if len(frames) < burst:
+        raise UsageError(f"{path}: has {len(frames)} frames from frame {number} on, --frames asks "
+                         f"for {burst}")
+    return fuse(frames)

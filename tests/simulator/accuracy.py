@@ -82,7 +82,7 @@ def _elsewhere(
 
 def _lost(face: Face, truth: Truth, frame: RgbdFrame) -> float:
     readings = frame.depth > 0
-    z = frame.depth[readings]
+    z = frame.depth[readings] * (frame.depth_meaning.unit_um / 1000)
     points = np.concatenate([frame.depth_camera.rays()[readings] * z[:, None], z[:, None]], axis=1)
     with np.errstate(invalid="ignore"):
         of_face = (truth.labels_at(points) == Label.FACE) & (

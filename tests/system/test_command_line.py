@@ -32,8 +32,16 @@ def test_a_recording_becomes_a_face_a_report_and_a_picture(tmp_path):
     assert (tmp_path / "face.png").stat().st_size > 50_000
 
 
+def test_three_frames_are_averaged(tmp_path):
+    done = denseface("reconstruct", FRONTAL, "--frames", 3, "--report", tmp_path / "r.json")
+    assert done.returncode == 0
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert (report["fused"], report["depth_rounding"]) == (3, "none")
+
+
 @pytest.mark.parametrize(("arguments", "message"), [
     ([FRONTAL, "--frame", "99"], "--frame asks for 99"),
+    ([FRONTAL, "--frame", "1", "--frames", "3"], "--frames asks for 3"),
     (["missing.oni"], "missing.oni: no such file"),
     (["README.md"], "README.md"),
 ])

@@ -11,6 +11,7 @@ from hypothesis import Phase, example, find, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from denseface.capture import MAX_BURST
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin
 from denseface.recon.settings import Preset, Settings
 from denseface.service.errors import LocalProtocolError, ProtocolError, RemoteProtocolError
@@ -24,7 +25,6 @@ from denseface.service.protocol.payload import (
     PreviewHeader,
 )
 from denseface.service.protocol.sensor_messages import (
-    MAX_BURST,
     Gate,
     LiveStateName,
     SensorFigures,
