@@ -35,7 +35,9 @@ _NO_DEPTH_SHARE = 0.35
 """Of the middle of the depth image: with more of it unmeasured, something may be too near."""
 
 
-def measure(frame: RgbdFrame, previous: Quality | None = None) -> Quality:
+def measure(
+    frame: RgbdFrame, previous: Quality | None = None, at_us: int | None = None
+) -> Quality:
     """Measure a frame.
 
     Depth decides first whether anybody is there; only then is a face looked for, at first where it
@@ -46,6 +48,8 @@ def measure(frame: RgbdFrame, previous: Quality | None = None) -> Quality:
     frame : the frame; `color` may be None
     previous : the measurement of an earlier frame of the same stream. Without it nothing is known
         of motion, and sharpness is 1.
+    at_us : when it was exposed, by any clock, microseconds; by the depth's stamp where None, which
+        some sensors do not give
     """
     memory = previous.memory if previous else Memory()
     memory = replace(memory, count=memory.count + 1)
@@ -63,7 +67,9 @@ def measure(frame: RgbdFrame, previous: Quality | None = None) -> Quality:
     if found.face is None or (found.sight is Sight.DEPTH and still > _STILL):
         somebody = too_near or (found.possible and still <= _STILL)
         return _without_face(frame, depth, memory, still, somebody=somebody, too_near=too_near)
-    quality = _of_face(frame, found, found.face, memory, too_near=too_near, colored=colored)
+    exposed_us = frame.depth_timestamp_us if at_us is None else at_us
+    quality = _of_face(frame, found, found.face, memory, exposed_us, too_near=too_near,
+                       colored=colored)
     if found.sight is not Sight.DEPTH:
         return quality
     return replace(quality, memory=replace(
@@ -129,14 +135,14 @@ def _find(frame: RgbdFrame, memory: Memory) -> _Found:
 
 
 def _of_face(
-    frame: RgbdFrame, found: _Found, chosen: FaceCandidate, memory: Memory, *, too_near: bool,
-    colored: bool,
+    frame: RgbdFrame, found: _Found, chosen: FaceCandidate, memory: Memory, exposed_us: int, *,
+    too_near: bool, colored: bool,
 ) -> Quality:
     """Measure the face itself."""
     box, distance = chosen.box, _depth(chosen)
     x, y, w, h = box
     image = frame.calibration.color
-    patch = Patch.of(frame, box, distance, shaded=not colored)
+    patch = Patch.of(frame, box, distance, exposed_us, shaded=not colored)
     motion = None if patch is None else motion_mm(frame, patch, memory.patch)
     sharp = None if patch is None or not colored else sharpness(patch.image)
     best = max(sharp or 0.0, memory.best_sharpness * _RECENT_BEST)

@@ -45,7 +45,7 @@ class Patch:
     depth_roi : the same in the depth image
     depth : (32, 32) float32, mm, 0 where nothing was measured
     box, distance_mm : the face's
-    timestamp_us : of the depth image
+    exposed_us : when, by any clock
     """
 
     roi: Box
@@ -54,10 +54,12 @@ class Patch:
     depth: Floats
     box: Box
     distance_mm: float
-    timestamp_us: int
+    exposed_us: int
 
     @classmethod
-    def of(cls, frame: RgbdFrame, box: Box, distance_mm: float, *, shaded: bool) -> Self | None:
+    def of(
+        cls, frame: RgbdFrame, box: Box, distance_mm: float, exposed_us: int, *, shaded: bool
+    ) -> Self | None:
         """Cut a face out of colour or shaded depth; None where none of its box is inside."""
         roi = _inside(box, frame.calibration.color.width, frame.calibration.color.height)
         x, y, w, h = box
@@ -72,14 +74,14 @@ class Patch:
             return None
         return cls(roi, _image(frame, roi, _SHADED_SIDE if shaded else _SIDE), depth_roi,
                    _depth(frame, depth_roi), box, distance_mm,
-                   frame.depth_timestamp_us)
+                   exposed_us)
 
 
 def motion_mm(frame: RgbdFrame, now: Patch, before: Patch | None) -> float | None:
     """Give how far a face moved in a thirtieth of a second, mm; None where that cannot be told."""
     if before is None:
         return None
-    elapsed = now.timestamp_us - before.timestamp_us
+    elapsed = now.exposed_us - before.exposed_us
     if not 0 < elapsed <= _LONGEST_US:
         return None
     mm_per_px = now.distance_mm / frame.calibration.color.fx

@@ -100,8 +100,11 @@ def _direction(points: Doubles, middle: Doubles) -> tuple[float | None, float | 
         return None, None
     z = z - percentile(z[core], 50)
     core &= np.abs(z) < _PLANE_DEPTH_MM
-    _, dx, dy = np.linalg.lstsq(
-        np.stack([np.ones(core.sum()), x[core], y[core]], axis=1), z[core], rcond=None)[0]
+    terms = np.stack([np.ones(core.sum()), x[core], y[core]])
+    try:
+        _, dx, dy = np.linalg.solve(terms @ terms.T, terms @ z[core])
+    except np.linalg.LinAlgError:  # all on a line
+        return None, None
     low, high = _SIDES_DEPTH_MM
     band = (np.abs(y) < _SIDES_ROWS_MM) & (np.abs(x) < _SIDES_MM) & (z > low) & (z < high)
     sides = (percentile(x[band], _SIDES_PERCENT) + percentile(x[band], 100 - _SIDES_PERCENT)) / 2

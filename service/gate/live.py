@@ -1,0 +1,161 @@
+"""The gate of a live sensor: its frames are judged in a thread, some of them, while anybody asks.
+
+The loop of the capture process decides which: about ten a second for hints and previews, each new
+one while a press waits for a good one. The press gets the very frame that was judged.
+"""
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+
+from denseface.capture.live.sensor import LiveSensor, Shot
+from denseface.service.gate.frame_judge import FrameJudge
+from denseface.service.gate.hinting import Judged
+from denseface.service.gate.pressing import Decision, GatedPress
+from denseface.service.protocol import messages
+from denseface.service.protocol.hint import Hint
+
+__all__ = ["Hinted", "LiveGate", "NotPassed", "Passed"]
+
+_PERIOD_S = 0.1
+"""Between two frames that are judged for hints, seconds."""
+_SLACK_S = 0.005
+"""The third frame of thirty a second counts as after that, also where its time jitters."""
+_WARM_S = 0.5
+"""A gate that judged a frame so lately knows how a face moves; another needs so long, seconds."""
+
+
+@dataclass(frozen=True)
+class Passed:
+    """A press gets this frame."""
+
+    capture_id: str
+    shot: Shot
+
+
+@dataclass(frozen=True)
+class NotPassed:
+    """A press gets none: this was the last that was judged."""
+
+    capture_id: str
+    judged: Judged
+
+
+@dataclass(frozen=True)
+class Hinted:
+    """What to tell the person now."""
+
+    hint: Hint
+
+
+@dataclass
+class _Waiting:
+    press: GatedPress
+    next_s: float
+    """Its next frame is exposed then at the earliest, monotonic clock."""
+
+
+class LiveGate:
+    """Judges frames of a sensor; nothing here waits.
+
+    Parameters
+    ----------
+    sensor : whose frames
+    wake : called in another thread when `step` has something to give
+    clock : the sensor's
+    """
+
+    def __init__(
+        self, sensor: LiveSensor, wake: Callable[[], object],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._sensor = sensor
+        self._wake = wake
+        self._clock = clock
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix="gate")
+        self._judge = FrameJudge(clock)
+        self._call: Future[Judged] | None = None
+        self._shot: Shot | None = None
+        """The one that is judged, or was judged last."""
+        self._judged: Judged | None = None
+        self._hints_until_s = self._looked_until_s = 0.0
+        self._waiting: dict[str, _Waiting] = {}
+
+    def send_hints(self, seconds: float) -> None:
+        """Give hints from now on, for so long."""
+        self._hints_until_s = self._clock() + seconds
+
+    def look(self, seconds: float) -> None:
+        """Judge frames for so long, for the sake of `hint_of`."""
+        self._looked_until_s = self._clock() + seconds
+
+    def press(self, take: messages.Take) -> None:
+        """Let a press wait for a frame that its gate lets through."""
+        now = self._clock()
+        warm = self._shot is not None and now - self._shot.latest_s < _WARM_S
+        press = GatedPress(take.gate, now if warm else now + _WARM_S, now + take.gate_timeout)
+        self._waiting[take.capture_id] = _Waiting(press, now)
+
+    def withdraw(self, capture_id: str) -> None:
+        """Forget a press, where it waits."""
+        self._waiting.pop(capture_id, None)
+
+    def hint_of(self, shot: Shot) -> Hint | None:
+        """Give the hint of a frame, where it was judged last."""
+        same = self._shot is not None and shot.earliest_s == self._shot.earliest_s
+        return self._judged.hint if same and self._judged is not None else None
+
+    def judges(self, shot: Shot) -> bool:
+        """Whether a frame is being judged: `hint_of` will know in a moment."""
+        return (self._call is not None and self._shot is not None
+                and shot.earliest_s == self._shot.earliest_s)
+
+    def step(self) -> Iterator[Passed | NotPassed | Hinted]:
+        """Give what became of presses, and hints; begin to judge the next frame that is due."""
+        if self._call is not None and self._call.done() and self._shot is not None:
+            judged = self._judged = self._call.result()
+            self._call = None
+            yield from self._decide(self._shot, judged)
+            if self._clock() < self._hints_until_s:
+                yield Hinted(judged.hint)
+        if self._call is None and (due_s := self._due_s()) is not None:
+            shot = self._sensor.first_after(due_s)
+            if shot is not None:
+                self._shot, self._judged = shot, None
+                self._call = self._pool.submit(self._judge_shot, shot)
+                self._call.add_done_callback(lambda _: self._wake())
+
+    def close(self) -> None:
+        """Wait for the frame that is judged and end the thread."""
+        self._pool.shutdown()
+
+    def _due_s(self) -> float | None:
+        """Say when the next frame to judge is exposed at the earliest; None for no frame."""
+        if self._waiting:
+            return min(waiting.next_s for waiting in self._waiting.values())
+        now = self._clock()
+        if now >= max(self._hints_until_s, self._looked_until_s):
+            return None
+        last_s = self._shot.earliest_s if self._shot is not None else -math.inf
+        return max(last_s + _PERIOD_S - _SLACK_S, now - _PERIOD_S)
+
+    def _decide(self, shot: Shot, judged: Judged) -> Iterator[Passed | NotPassed]:
+        now = self._clock()
+        for capture_id, waiting in [*self._waiting.items()]:
+            if shot.earliest_s < waiting.next_s:
+                continue  # judged for hints, and older than the press
+            decision = waiting.press.decide(judged, now)
+            if decision is Decision.WAIT:
+                waiting.next_s = math.nextafter(shot.earliest_s, math.inf)
+                continue
+            del self._waiting[capture_id]
+            if decision is Decision.TAKE:
+                yield Passed(capture_id, shot)
+            else:
+                yield NotPassed(capture_id, judged)
+
+    def _judge_shot(self, shot: Shot) -> Judged:
+        """Judge a frame, in the thread."""
+        return self._judge.judge(shot.frame, round(shot.earliest_s * 1e6))
