@@ -6,7 +6,6 @@ in pixels with (0, 0) the centre of the top left pixel.
 
 from collections import OrderedDict
 from functools import lru_cache
-from pathlib import Path
 from threading import Lock
 from typing import Annotated, Any, NamedTuple, Self
 
@@ -15,15 +14,11 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from denseface.capture.errors import CalibrationError
-from denseface.files import read_bounded
 
-__all__ = ["MAX_SIDE", "Calibration", "CameraModel", "ChosenCalibration", "DepthToColor",
-           "choose_calibration"]
+__all__ = ["MAX_SIDE", "Calibration", "CameraModel", "ChosenCalibration", "DepthToColor"]
 
 MAX_SIDE = 16384
 """Pixels: the widest and the highest image."""
-_MAX_FILE_BYTES = 2**20
-"""Of a calibration file; a thousand times what one has."""
 
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -54,6 +49,8 @@ _INVERTIBLE_PX = 1e-6
 """Pixels: a distortion is refused where undoing it is off by more."""
 _ROTATION_TOLERANCE = 1e-4
 """Largest entry of R R^T - I."""
+_SAME_SHAPE = 0.005
+"""By which two images' sides may differ in ratio: 1296x968 of 640x480 is off by 0.4 %."""
 
 
 class _Model(BaseModel):
@@ -150,6 +147,31 @@ class CameraModel(_Model):
             "width": width, "height": height, "fx": self.fx * factor, "fy": self.fy * factor,
             "cx": (self.cx + 0.5) * factor - 0.5, "cy": (self.cy + 0.5) * factor - 0.5 + top,
         })
+
+    def for_size(self, width: int, height: int) -> Self:
+        """Give the same camera for images of another resolution and the same shape.
+
+        640x480 and 1280x1024 are the one exception, see `cut_to`.
+
+        Raises
+        ------
+        CalibrationError
+            An image of another shape shows another part of the scene.
+        """
+        if (width, height) == (self.width, self.height):
+            return self
+        across, down = width / self.width, height / self.height
+        if abs(across / down - 1) > _SAME_SHAPE:
+            shapes = {width / height, self.width / self.height}
+            if shapes == {4 / 3, 5 / 4}:
+                return self.cut_to(width, height)
+            raise CalibrationError(
+                f"is for images of {self.width}x{self.height}, the image is {width}x{height}: "
+                "not the same shape, so not the same part of the scene")
+        return type(self)(
+            width=width, height=height, fx=self.fx * across, fy=self.fy * down,
+            cx=(self.cx + 0.5) * across - 0.5, cy=(self.cy + 0.5) * down - 0.5,
+            distortion=self.distortion)
 
     def _distort(self, x: _Array, y: _Array) -> tuple[_Array, _Array]:
         if not any(self.distortion):
@@ -309,6 +331,8 @@ class Calibration(_Model):
         CalibrationError
             One line that names `name`, the field, and what is wrong with it.
         """
+        if isinstance(text, bytes):
+            text = text.removeprefix(b"\xef\xbb\xbf")  # the mark that some editors put before UTF-8
         try:
             return cls.model_validate_json(text)
         except ValidationError as error:
@@ -316,24 +340,41 @@ class Calibration(_Model):
             where = ".".join(str(part) for part in first["loc"]) or "JSON"
             raise CalibrationError(f"{name}: {where}: {first['msg']}") from error
 
-    @classmethod
-    def from_file(cls, path: str | Path) -> Self:
-        """Read a `*.calibration.json` file.
+    def to_json(self) -> str:
+        """Write the JSON of the frame format."""
+        return self.model_dump_json()
+
+    def for_images(
+        self, depth: tuple[int, int], color: tuple[int, int] | None, registered: bool
+    ) -> tuple[Self, bool]:
+        """Fit the cameras to images of these sizes, (width, height) pixels.
+
+        Gives the calibration, and whether the depth is in the colour image's pixels. A depth that
+        was registered at another resolution than the colour's is not: it is what the colour camera
+        sees in fewer or more pixels, so its camera stands in the same place.
 
         Raises
         ------
         CalibrationError
-            Where the file cannot be read, has more than 1 MiB or is not a calibration.
+            An image has another shape than its camera's, in words that begin with its name.
         """
-        try:
-            text = read_bounded(path, _MAX_FILE_BYTES)
-        except OSError as error:
-            raise CalibrationError(f"{path}: {error.strerror or error}") from error
-        return cls.from_json(text, name=str(path))
+        def fitted(name: str, camera: CameraModel, size: tuple[int, int]) -> CameraModel:
+            try:
+                return camera.for_size(*size)
+            except ValueError as error:
+                raise CalibrationError(f"the {name} camera's calibration {error}") from error
 
-    def to_json(self) -> str:
-        """Write the JSON of the frame format."""
-        return self.model_dump_json()
+        if color is None:
+            camera = fitted("depth", self.depth, depth)
+            return self.model_copy(update={"depth": camera, "color": camera}), False
+        of_color = fitted("color", self.color, color)
+        if registered and depth == color:
+            return self.model_copy(update={"color": of_color}), True
+        if registered:
+            return type(self)(depth=fitted("color", self.color, depth), color=of_color,
+                              depth_to_color=DepthToColor()), False
+        return self.model_copy(
+            update={"depth": fitted("depth", self.depth, depth), "color": of_color}), False
 
 
 class ChosenCalibration(NamedTuple):
@@ -341,23 +382,5 @@ class ChosenCalibration(NamedTuple):
 
     calibration: Calibration
     origin: str
-
-
-def choose_calibration(
-    path: Path | None, argument: Calibration | str | Path | None
-) -> ChosenCalibration | None:
-    """Take the argument, else ``NAME.calibration.json`` beside the file, else none.
-
-    Raises
-    ------
-    CalibrationError
-        The chosen file cannot be read.
-    """
-    if isinstance(argument, Calibration):
-        return ChosenCalibration(argument, "argument")
-    if argument is not None:
-        return ChosenCalibration(Calibration.from_file(argument), f"argument {argument}")
-    beside = path and path.with_name(f"{path.stem}.calibration.json")
-    if beside and beside.exists():
-        return ChosenCalibration(Calibration.from_file(beside), f"beside: {beside.name}")
-    return None
+    notes: tuple[str, ...] = ()
+    """What was assumed when it was read."""

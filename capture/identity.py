@@ -13,7 +13,8 @@ from pathlib import Path
 
 import platformdirs
 
-from denseface.capture.calibration import Calibration, ChosenCalibration
+from denseface.capture.calibration import ChosenCalibration
+from denseface.capture.calibration_files import read_calibration
 
 __all__ = [
     "Identity",
@@ -220,7 +221,7 @@ def find_calibration(sensor: Identity, folder: Path | None = None) -> ChosenCali
                        ("URI", sensor.uri)):
         path = folder / file_name(name)
         if name and path.exists():
-            return ChosenCalibration(Calibration.from_file(path), f"by {what}: {path.name}")
+            return read_calibration(path)._replace(origin=f"by {what}: {path.name}")
     return None
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.capture.calibration import MAX_SIDE, Calibration, ChosenCalibration
-from denseface.capture.errors import FrameError
+from denseface.capture.calibration_files import doubts_of
+from denseface.capture.errors import CalibrationError, FrameError
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
 from denseface.capture.source import Source
 from denseface.capture.zipped_arrays import ArrayKind, read_arrays
@@ -74,20 +75,32 @@ def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> Rgb
         (missing,) = _COLOR - arrays.keys()
         raise FrameError(f"{path}: key {missing!r} is missing; color and color_timestamp_us: "
                          "expected both or neither")
-    calibration, origin = chosen or (_own_calibration(path, arrays["calibration"]), "npz file")
+    calibration, origin, notes = chosen or ChosenCalibration(
+        _own_calibration(path, arrays["calibration"]), "npz file")
+    depth, color = arrays["depth"], arrays.get("color")
+    registered = bool(arrays.get("registered", False))
+    notes += doubts_of(calibration, registered or color is None)
     stamp = int(arrays["depth_timestamp_us"])
     try:
+        # A file's own calibration is of its images; one that was chosen may be of others.
+        if chosen or (registered and color is not None):
+            calibration, registered = calibration.for_images(
+                _size(depth), None if color is None else _size(color), registered)
         return RgbdFrame(
-            arrays["depth"], arrays.get("color"), stamp,
-            int(arrays.get("color_timestamp_us", stamp)),
-            calibration, bool(arrays.get("registered", False)), calibration_origin=origin,
+            depth, color, stamp, int(arrays.get("color_timestamp_us", stamp)),
+            calibration, registered, calibration_origin=origin,
             depth_meaning=DepthMeaning(
                 int(arrays.get("depth_unit_um", 1000)),
                 _rounding(_text(path, arrays, "depth_rounding", DepthRounding.ROUND))),
-            origin=FrameOrigin(_text(path, arrays, "sensor"), _text(path, arrays, "captured_at")),
+            origin=FrameOrigin(_text(path, arrays, "sensor"), _text(path, arrays, "captured_at"),
+                               notes=notes),
         )
-    except FrameError as error:
-        raise FrameError(f"{path}: {error} (calibration: {origin})") from error
+    except (FrameError, CalibrationError) as error:
+        raise type(error)(f"{path}: {error} (calibration: {origin})") from error
+
+
+def _size(image: NDArray[Any]) -> tuple[int, int]:
+    return image.shape[1], image.shape[0]
 
 
 def save_frame(path: str | Path, frame: RgbdFrame) -> None:

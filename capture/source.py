@@ -5,6 +5,7 @@ URI                what it opens
 ================== ===============================================================================
 ``NAME.npz``       one frame in the project's own format
 ``NAME.oni``       a recording, through OpenNI2
+``FOLDER``         image pairs, as data sets have them (TUM RGB-D, ScanNet, Open3D)
 ``openni2:``       the first live sensor that OpenNI2 finds
 ``openni2:URI``    the live sensor of that OpenNI2 URI
 ================== ===============================================================================
@@ -15,7 +16,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Protocol, Self, runtime_checkable
 
-from denseface.capture.calibration import Calibration, choose_calibration
+from denseface.capture.calibration import Calibration
+from denseface.capture.calibration_files import choose_calibration
 from denseface.capture.errors import UnreadableSourceError
 from denseface.capture.frame import RgbdFrame
 
@@ -24,9 +26,11 @@ __all__ = ["Source", "open_source"]
 _SOURCES = {
     ".npz": "npz:NpzSource",
     ".oni": "openni2:RecordingSource",
+    "/": "image_pair:FolderSource",
     "openni2:": "openni2:LiveSource",
 }
-"""A file's ending or a sensor's scheme, and which class of which module of `capture` opens it.
+"""A file's ending (`/` of a folder) or a sensor's scheme, and which class of which module of
+`capture` opens it.
 
 The class is imported when first needed, and called with the file's path (of a sensor: with what
 follows the scheme, or None) and the chosen calibration or None.
@@ -85,9 +89,11 @@ def open_source(uri: str | Path, calibration: Calibration | str | Path | None = 
     if not colon or kind not in _SOURCES:
         path = Path(text)
         kind = path.suffix.lower()
+        if kind not in _SOURCES and text and path.is_dir():
+            kind = "/"
         if kind not in _SOURCES:
             raise UnreadableSourceError(f"{text}: not a known kind of source; {_accepted()}")
-        if not path.is_file():
+        if not path.is_file() and kind != "/":
             found = ("is a folder, not a file" if path.is_dir() else
                      "is not a regular file" if path.exists() else "no such file")
             raise UnreadableSourceError(f"{text}: {found}")
@@ -99,5 +105,6 @@ def open_source(uri: str | Path, calibration: Calibration | str | Path | None = 
 
 def _accepted() -> str:
     forms = [form for kind in _SOURCES
-             for form in ((f"NAME{kind}",) if kind.startswith(".") else (kind, f"{kind}URI"))]
+             for form in ((f"NAME{kind}",) if kind.startswith(".") else
+                          ("a folder of image pairs",) if kind == "/" else (kind, f"{kind}URI"))]
     return f"accepted: {', '.join(forms[:-1])} or {forms[-1]}"

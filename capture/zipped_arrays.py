@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from denseface.capture.errors import CaptureError, FrameError, UnreadableSourceError
 from denseface.files import open_regular
 
-__all__ = ["ArrayKind", "read_arrays"]
+__all__ = ["ArrayKind", "read_arrays", "read_npy_header"]
 
 _MAX_BYTES = 256 * 2**20
 """Bytes of an array of numbers."""
@@ -107,7 +107,14 @@ def _read_members(
     return arrays
 
 
-def _read_array(name: str, file: IO[bytes], kind: ArrayKind) -> NDArray[Any]:
+def read_npy_header(name: str, file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Read the header of an array: shape, whether in Fortran's order, and dtype; never a pickle.
+
+    Raises
+    ------
+    UnreadableSourceError
+        Not the header of an array of plain values.
+    """
     try:
         version = npy.read_magic(file)
         shape, fortran, dtype = _HEADERS[version](file, max_header_size=_MAX_HEADER_BYTES)
@@ -115,6 +122,11 @@ def _read_array(name: str, file: IO[bytes], kind: ArrayKind) -> NDArray[Any]:
         raise
     except Exception as error:  # the header is parsed as Python, which may raise anything
         raise UnreadableSourceError(f"{name}: not a NumPy array") from error
+    return shape, fortran, dtype
+
+
+def _read_array(name: str, file: IO[bytes], kind: ArrayKind) -> NDArray[Any]:
+    shape, fortran, dtype = read_npy_header(name, file)
     found = f"found {dtype} {shape}"
     right_dtype = dtype.kind == "U" if kind.dtype == "str" else dtype == np.dtype(kind.dtype)
     # NumPy takes True for a side: to Python it is the integer 1.

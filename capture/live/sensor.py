@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Protocol
 
-from denseface.capture.calibration import choose_calibration
+from denseface.capture.calibration_files import choose_calibration
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.live.states import LiveFigures, LiveState
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.capture.calibration import ChosenCalibration
+from denseface.capture.calibration_files import doubts_of
 from denseface.capture.errors import FrameError, SensorError
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
 from denseface.capture.openni2._calibration import Size, derive_calibration, fit
@@ -71,14 +72,20 @@ class OpenNI2Source(Source):
         stamps_us: tuple[int, int], origin: FrameOrigin,
     ) -> RgbdFrame:
         """Make a frame; `streams` may be closed, `stamps_us` are of depth and of colour."""
-        calibration, chosen = self._calibration(streams)
+        calibration, chosen, said = self._calibration(streams)
+        registered = self._registered or streams.registered
+        notes = (*streams.notes, *origin.notes, *said,
+                 *doubts_of(calibration, registered or color is None))
+        if registered and color is not None and depth.shape != color.shape[:2]:
+            calibration, registered = calibration.for_images(
+                (depth.shape[1], depth.shape[0]), (color.shape[1], color.shape[0]), registered)
         try:
             # PrimeSense's drivers, and the recordings made through them, cut the fraction off.
             return RgbdFrame(
-                depth, color, *stamps_us, calibration, self._registered or streams.registered,
+                depth, color, *stamps_us, calibration, registered,
                 calibration_origin=chosen,
                 depth_meaning=DepthMeaning(streams.depth_unit_um, DepthRounding.CUT),
-                origin=replace(origin, notes=streams.notes + origin.notes))
+                origin=replace(origin, notes=notes))
         except FrameError as error:
             raise FrameError(f"{self._name}: {error} (calibration: {chosen})") from error
 

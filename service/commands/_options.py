@@ -75,7 +75,7 @@ def add_source(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--source", default="openni2:", metavar="URI",
                         help="openni2: for the first sensor, or a .oni or .npz file "
                              "(default: openni2:)")
-    parser.add_argument("--calibration", type=Path, metavar="FILE.json",
+    parser.add_argument("--calibration", type=Path, metavar="FILE",
                         help="calibration that wins over the source's own")
 
 

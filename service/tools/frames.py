@@ -1,27 +1,34 @@
-"""One frame out of a file."""
+"""One frame out of a file, a folder or a pair of image files."""
 
 from itertools import islice
 from pathlib import Path
 
-from denseface.capture import RgbdFrame, open_source
+from denseface.capture import RgbdFrame, Source, open_source
 from denseface.capture.burst import fuse
+from denseface.capture.calibration_files import choose_calibration
+from denseface.capture.image_pair import FolderSource, ImagePairSource, PairReading
 from denseface.service.errors import UsageError
 from denseface.service.protocol.payload import check_frame_size
 
-__all__ = ["read_frame"]
+__all__ = ["read_frame", "read_image_pair"]
 
 
 def read_frame(
-    path: str, number: int, calibration: Path | None, max_pixels: int, burst: int = 1
+    path: str, number: int, calibration: Path | None, max_pixels: int, burst: int = 1,
+    reading: PairReading | None = None,
 ) -> RgbdFrame:
-    """Read a frame of a `.npz` or `.oni` file by its number, from 0.
+    """Read a frame of a `.npz` or `.oni` file, or of a folder of image pairs, by its number from 0.
 
-    With `burst`, it is the mean of so many frames from that one on.
+    Parameters
+    ----------
+    burst : of how many frames from that one on it is the mean
+    reading : how the pairs of a folder are to be understood; None where nothing was said
 
     Raises
     ------
     UsageError
-        Where the path names a sensor, or there is no frame of that number.
+        Where the path names a sensor, there is no frame of that number, or `reading` is said of
+        what has no image pairs.
     CaptureError
         Where the file cannot be read.
     FrameTooLargeError
@@ -29,13 +36,15 @@ def read_frame(
     """
     if path.startswith("openni2:"):
         raise UsageError(f"{path}: expected a .npz or .oni file; `denseface up` serves a sensor")
-    with open_source(path, calibration=calibration) as source:
+    with _opened(path, calibration, max_pixels, reading) as source:
         count = source.frame_count
         if count is not None and not 0 <= number < count:
             raise UsageError(f"{path}: has {count} frames (0 to {count - 1}), --frame asks for "
                              f"{number}")
         frames: list[RgbdFrame] = []
-        for frame in islice(source, number, number + burst):
+        following = (source.frames_from(number) if isinstance(source, FolderSource)
+                     else islice(source, number, None))
+        for frame in islice(following, burst):
             check_frame_size(frame, max_pixels)
             frames.append(frame)
     if not frames:
@@ -44,3 +53,34 @@ def read_frame(
         raise UsageError(f"{path}: has {len(frames)} frames from frame {number} on, --frames asks "
                          f"for {burst}")
     return fuse(frames)
+
+
+def read_image_pair(
+    depth: Path, color: Path | None, calibration: Path | None, reading: PairReading
+) -> RgbdFrame:
+    """Read the frame that two image files make.
+
+    Parameters
+    ----------
+    calibration : its file; None for `NAME.calibration.json` beside the depth image, if there is one
+
+    Raises
+    ------
+    CaptureError
+        Where a file cannot be read, or is not what it should be.
+    """
+    chosen = choose_calibration(depth, calibration)
+    with ImagePairSource(depth, color, reading._replace(chosen=chosen)) as source:
+        return next(iter(source))
+
+
+def _opened(
+    path: str, calibration: Path | None, max_pixels: int, reading: PairReading | None
+) -> Source:
+    if Path(path).is_dir():
+        return FolderSource(Path(path), choose_calibration(Path(path), calibration),
+                            (reading or PairReading())._replace(max_pixels=max_pixels))
+    if reading is not None:
+        raise UsageError(f"{path}: --unit and --registered are for image files: a folder of pairs, "
+                         "or --depth")
+    return open_source(path, calibration=calibration)

@@ -14,6 +14,7 @@ from denseface.capture.calibration import (
     _RayMaps,
     _rays,
 )
+from denseface.capture.calibration_files import doubts_of, read_calibration
 from denseface.capture.errors import CalibrationError
 from tests.unit.frames import calibration, camera, cameras, poses
 
@@ -143,7 +144,7 @@ def test_bad_json_is_a_calibration_error(text):
 
 def test_missing_calibration_file(tmp_path):
     with pytest.raises(CalibrationError, match=r"nowhere\.json: No such file"):
-        Calibration.from_file(tmp_path / "nowhere.json")
+        read_calibration(tmp_path / "nowhere.json")
 
 
 @pytest.mark.parametrize("bad", [{"fx": float("nan")}, {"cy": float("inf")}, {"width": 2.5}])
@@ -190,3 +191,40 @@ def test_a_camera_in_another_mode(size, focal, center):
 def test_a_mode_that_no_sensor_has():
     with pytest.raises(ValueError, match="480x640 is no known cut of a sensor's image"):
         VGA.cut_to(480, 640)
+
+
+def test_a_camera_for_images_of_another_resolution():
+    cam = camera()
+    double = cam.for_size(cam.width * 2, cam.height * 2)
+    point = np.array([40.0, -30.0, 700.0])
+    np.testing.assert_allclose((double.project(point) + 0.5) / 2 - 0.5, cam.project(point))
+    assert cam.for_size(cam.width, cam.height) is cam
+    assert double.for_size(cam.width, cam.height) == cam
+
+
+@pytest.mark.parametrize("size", [(640, 400), (1280, 1024), (480, 640), (848, 480)])
+def test_an_image_of_another_shape_shows_something_else(size):
+    cam = CameraModel(width=1920, height=1080, fx=1081, fy=1081, cx=959.5, cy=539.5)
+    with pytest.raises(CalibrationError, match=f"of 1920x1080, the image is {size[0]}x{size[1]}"):
+        cam.for_size(*size)
+
+
+def test_vga_is_the_upper_part_of_1280x1024():
+    vga = CameraModel(width=640, height=480, fx=525, fy=525, cx=319.5, cy=239.5)
+    large = vga.for_size(1280, 1024)
+    assert (large.width, large.height, large.fx, large.cx, large.cy) == (1280, 1024, 1050, 639.5,
+                                                                         479.5)
+    assert large.for_size(640, 480) == vga
+
+
+def test_cameras_are_fitted_to_a_depth_registered_at_another_resolution():
+    calib = calibration()
+    width, height = calib.color.width, calib.color.height
+    same, registered = calib.for_images((width, height), (width, height), registered=True)
+    assert (same, registered) == (calib, True)
+    half, registered = calib.for_images((width // 2, height // 2), (width, height), registered=True)
+    assert not registered
+    assert half.color == calib.color
+    assert half.depth == calib.color.for_size(width // 2, height // 2)
+    assert half.depth_to_color == DepthToColor()
+    assert doubts_of(half) == ()

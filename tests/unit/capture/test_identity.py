@@ -107,7 +107,7 @@ def test_the_calibration_of_a_sensor(tmp_path):
         path = tmp_path / f"{name}.calibration.json"
         path.write_text(calibration().to_json())
         assert find_calibration(sensor, tmp_path) == (
-            calibration(), f"{origin}: {name}.calibration.json")
+            calibration(), f"{origin}: {name}.calibration.json", ())
     path.write_text("{}")
     with pytest.raises(CalibrationError, match=r"S_1\.calibration\.json: depth: Field required"):
         find_calibration(sensor, tmp_path)

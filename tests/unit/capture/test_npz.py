@@ -238,7 +238,8 @@ def test_a_failed_save_leaves_the_old_file(tmp_path, monkeypatch):
 
 def test_calibration_of_another_size_names_both(tmp_path):
     path = write(tmp_path / "f.npz")
-    other = Calibration(depth=frames.camera(), color=frames.camera())
-    (tmp_path / "f.calibration.json").write_text(other.to_json())
-    with pytest.raises(FrameError, match=r"f\.npz: depth is 8x6.*160x120.*f\.calibration\.json"):
+    camera = frames.camera().model_copy(update={"height": 100})
+    (tmp_path / "f.calibration.json").write_text(Calibration(depth=camera, color=camera).to_json())
+    with pytest.raises(CalibrationError,
+                       match=r"f\.npz: .* of 160x100, the image is 8x6.*f\.calibration\.json"):
         open_source(path)

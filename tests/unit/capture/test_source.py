@@ -54,7 +54,8 @@ def test_unknown_kinds_are_named_with_those_accepted(uri):
         open_source(uri)
     assert str(caught.value).startswith(uri)
     assert str(caught.value).endswith(
-        "not a known kind of source; accepted: NAME.npz, NAME.oni, openni2: or openni2:URI")
+        "not a known kind of source; accepted: NAME.npz, NAME.oni, a folder of image pairs, "
+            "openni2: or openni2:URI")
 
 
 @pytest.mark.parametrize("kind", ["npz", "oni", "ONI"])

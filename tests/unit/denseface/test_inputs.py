@@ -6,7 +6,7 @@ import tracemalloc
 import pytest
 
 from denseface import load_face, open_source
-from denseface.capture.calibration import Calibration
+from denseface.capture.calibration_files import read_calibration
 from denseface.capture.errors import CaptureError
 from denseface.capture.oni.file import read_oni
 from denseface.service.errors import ServiceError
@@ -31,7 +31,7 @@ READERS = {
     "input.oni": open_source,
     "records.oni": read_oni,
     "face.npz": load_face,
-    "calibration.json": Calibration.from_file,
+    "calibration.json": read_calibration,
     "beside.json": calibration_beside,
     "hub.secret": read_pair,
     "hub.public": read_public,

@@ -46,7 +46,7 @@ def outcome(capfd, *arguments):
 @pytest.mark.parametrize(("arguments", "message"), [
     ([], "required: COMMAND"),
     (["fly"], "invalid choice: 'fly'"),
-    (["reconstruct"], "required: INPUT"),
+    (["reconstruct"], "expected INPUT or --depth, found neither"),
     (["reconstruct", "{tmp}/no.npz"], "no.npz"),
     (["reconstruct", "{tmp}/no.oni"], "no.oni"),
     (["reconstruct", "{tmp}/garbage.npz"], "garbage.npz"),
