@@ -130,7 +130,7 @@ def test_who_needs_no_key_may_have_more():
     [(b"nonsense", False)], [(b"", False)], [(b"two ", True), (b"\1parts", False)]])
 def test_nonsense_takes_nobody_s_subscription(listener, connect, until, rejections, frames):
     """What follows a message that is no subscription, libzmq takes for another connection's."""
-    foe, victims = connect(), [connect() for _ in range(3)]
+    foe, victims = connect(), [connect() for _ in Topic]
     names = [topic.encode() for topic in Topic]
     for frame, more in frames:
         foe.send(frame, more=more)
