@@ -5,7 +5,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,8 +81,15 @@ def kind_of(process: psutil.Process) -> str:
 
 
 @contextmanager
-def running(source: Path, workers: int) -> Iterator[Running]:
-    """Run the service with the settings of every day, in folders of its own."""
+def running(
+    source: Path | str, workers: int, env: Mapping[str, str] | None = None
+) -> Iterator[Running]:
+    """Run the service with the settings of every day, in folders of its own.
+
+    Parameters
+    ----------
+    env : its environment; by default this process's
+    """
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="df-")))
         address = f"ipc://{folder}/hub"
@@ -91,7 +98,7 @@ def running(source: Path, workers: int) -> Iterator[Running]:
                 [sys.executable, "-m", "denseface", "up", "--source", str(source), "--address",
                  address, "--data", str(folder / "data"), "--workers", str(workers)],
                 stdin=subprocess.DEVNULL, stderr=log,
-                env=os.environ | {"DENSEFACE_CORE_DUMPS": "1"})  # or nobody may measure its memory
+                env={**(os.environ if env is None else env), "DENSEFACE_CORE_DUMPS": "1"})  # or nobody may measure its memory
         stack.callback(_stop, process)
         client = stack.enter_context(Client(address))
         until = time.monotonic() + _START_S

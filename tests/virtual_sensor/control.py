@@ -225,6 +225,8 @@ class Control(Block):
     """These calls do not come back until this is cleared."""
     refuse = Choice(Call.NONE)
     """These calls fail at once (start, createStream, getProperty, setProperty)."""
+    first_frame_us = Number()
+    """From the start of the streams to the first exposure, beside one period, microseconds."""
     pipeline_us = Number()
     """From a frame's exposure to its delivery, microseconds."""
     jitter_us = Number()

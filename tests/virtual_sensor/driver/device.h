@@ -185,6 +185,10 @@ inline void Device::begin() {
     const int64_t period = periodNs(*streams_[0]);
     if (!origin_ns_ || !control().device.skips)
         origin_ns_ = now + period - number * period;
+    // The sensor takes its time, as real ones do; on the grid that it is on.
+    const int64_t wait = control().device.first_frame_us * 1000;
+    for (Stream* stream : streams_) stream->next = std::max(
+        stream->next, (now + period + wait - origin_ns_) / periodNs(*stream));
 }
 
 // A stream that starts takes its place on the grid: its next exposure is to come.
@@ -245,6 +249,7 @@ inline void Device::deliver(std::unique_lock<std::mutex>& lock) {
 }
 
 inline void Device::play() {
+    nameThread();
     const DeviceControl& words = control().device;
     const auto there = [&] { return words.plugged && words.plugs == session; };
     std::unique_lock<std::mutex> lock(shared_.mutex);

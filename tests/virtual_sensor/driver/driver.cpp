@@ -120,6 +120,7 @@ private:
         }
     }
     void watch() {
+        nameThread();
         while (!closing_) {
             look();
             std::this_thread::sleep_for(std::chrono::milliseconds(5));

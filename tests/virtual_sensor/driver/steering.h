@@ -1,6 +1,7 @@
 // The control channel as the driver sees it: mapped files, or memory filled from the environment.
 #pragma once
 #include <fcntl.h>
+#include <pthread.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -19,6 +20,9 @@ inline std::string env(const char* name, const char* otherwise = "") {
     const char* value = std::getenv((std::string("VIRTUAL_SENSOR_") + name).c_str());
     return value && *value ? value : otherwise;
 }
+
+// So that a measurement can leave the sensor's own work out.
+inline void nameThread() { pthread_setname_np(pthread_self(), "virtual-sensor"); }
 
 inline int64_t nowNs() {
     return std::chrono::duration_cast<std::chrono::nanoseconds>(
