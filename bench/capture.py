@@ -1,4 +1,4 @@
-"""A live sensor, on the virtual one: how fresh a press's frame is, what it costs, how long it lasts.
+"""A live sensor, on the virtual one: how fresh a press's frame is, what it costs, if it lasts.
 
 The virtual sensor tells in each frame's pixels when it was exposed. Its own threads are left out of
 the processor time.
@@ -50,11 +50,11 @@ def _print_presses(folder: Path, clip: Path, count: int) -> None:
 
 
 def _print_presses_of(folder: Path, clip: Path, count: int, first_frame_us: int) -> None:
-    print(f"\nA sensor whose first frame is exposed {first_frame_us / 1000:g} ms and a period after "
-          f"the start of its streams. From the press to the true exposure of the frame it gets, in "
-          f"frame periods of {_PERIOD_MS:.1f} ms; {count:,} presses each, at any phase; up to {_JITTER_US / 1000:g} "
-          "ms of jitter in the delivery. Stale: exposed before the press. The estimate is how much "
-          "too early the exposure was taken to be, at most:\n")
+    print(f"\nA sensor whose first frame is exposed {first_frame_us / 1000:g} ms and a period "
+          "after its streams were started. From the press to the true exposure of the frame it gets, in "
+          f"frame periods of {_PERIOD_MS:.1f} ms; {count:,} presses each, at any phase; up to "
+          f"{_JITTER_US / 1000:g} ms of jitter in the delivery. Stale: exposed before the press. "
+          "The estimate is how much too early the exposure was taken to be, at most:\n")
     print("| from exposure to delivery, ms | stale | p50 | p99 | goal | answered after, ms, p50 | "
           "p99 | largest true skew, ms | estimate, ms |")
     print("|" + " --- |" * 9)
@@ -75,7 +75,9 @@ def _print_presses_of(folder: Path, clip: Path, count: int, first_frame_us: int)
 def _print_copies(folder: Path, clip: Path, pairs: int) -> None:
     copies = Copies(**_probe(folder, clip, "copies", pairs))  # type: ignore[arg-type]
     print(f"\nReading a pair takes the thread {copies.read_ms:.2f} ms of processor time, one copy "
-          f"of its bytes {copies.copy_ms:.2f} ms ({pairs:,} pairs).")
+          f"of its bytes {copies.copy_ms:.2f} ms ({pairs:,} pairs). At most "
+          f"{copies.allocated_kb:.0f} kB are allocated meanwhile: each image is copied once, into "
+          "memory that was there before.")
 
 
 def _print_costs(folder: Path, clip: Path, seconds: float) -> None:

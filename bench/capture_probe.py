@@ -8,6 +8,7 @@ import json
 import sys
 import threading
 import time
+import tracemalloc
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -21,6 +22,7 @@ __all__ = ["PRESS_PAUSE_S", "Copies", "PressTimes"]
 
 PRESS_PAUSE_S = 0.15
 """Longest pause between two presses, seconds: they fall on every phase of a frame's period."""
+_TRACED_PAIRS = 30
 _START_S = 60.0
 """Longest wait for the sensor, seconds."""
 
@@ -47,6 +49,8 @@ class Copies:
     """Processor time of the reading thread for a pair."""
     copy_ms: float
     """Of one copy of a pair's bytes."""
+    allocated_kb: float
+    """Largest memory that was allocated while reading: a second copy would need some."""
 
 
 def _presses(count: int) -> list[PressTimes]:
@@ -92,13 +96,20 @@ def _copies(pairs: int) -> Copies:
     while left:
         left -= _release(source)
     used = time.thread_time() - used
+    tracemalloc.start()
+    before, left = tracemalloc.get_traced_memory()[0], _TRACED_PAIRS
+    while left:
+        left -= _release(source)
+    allocated = tracemalloc.get_traced_memory()[1] - before
+    tracemalloc.stop()
     source.close()
     images = [(np.ones(size, np.uint8), np.ones(size, np.uint8)) for size in sizes]
     start = time.thread_time()
     for _ in range(pairs):
         for out, image in images:
             out[:] = image
-    return Copies(1e3 * used / pairs, 1e3 * (time.thread_time() - start) / pairs)
+    return Copies(1e3 * used / pairs, 1e3 * (time.thread_time() - start) / pairs,
+                  allocated / 1000)
 
 
 def _release(source: LiveSource) -> bool:

@@ -98,7 +98,8 @@ def running(
                 [sys.executable, "-m", "denseface", "up", "--source", str(source), "--address",
                  address, "--data", str(folder / "data"), "--workers", str(workers)],
                 stdin=subprocess.DEVNULL, stderr=log,
-                env={**(os.environ if env is None else env), "DENSEFACE_CORE_DUMPS": "1"})  # or nobody may measure its memory
+                # Else nobody may measure its memory.
+                env={**(os.environ if env is None else env), "DENSEFACE_CORE_DUMPS": "1"})
         stack.callback(_stop, process)
         client = stack.enter_context(Client(address))
         until = time.monotonic() + _START_S
