@@ -51,10 +51,10 @@ def _print_presses(folder: Path, clip: Path, count: int) -> None:
 
 def _print_presses_of(folder: Path, clip: Path, count: int, first_frame_us: int) -> None:
     print(f"\nA sensor whose first frame is exposed {first_frame_us / 1000:g} ms and a period "
-          "after its streams were started. From the press to the true exposure of the frame it gets, in "
-          f"frame periods of {_PERIOD_MS:.1f} ms; {count:,} presses each, at any phase; up to "
-          f"{_JITTER_US / 1000:g} ms of jitter in the delivery. Stale: exposed before the press. "
-          "The estimate is how much too early the exposure was taken to be, at most:\n")
+          "after its streams were started. From the press to the true exposure of the frame it "
+          f"gets, in frame periods of {_PERIOD_MS:.1f} ms; {count:,} presses each, at any phase; "
+          f"up to {_JITTER_US / 1000:g} ms of jitter in the delivery. Stale: exposed before the "
+          "press. The estimate is how much too early the exposure was taken to be, at most:\n")
     print("| from exposure to delivery, ms | stale | p50 | p99 | goal | answered after, ms, p50 | "
           "p99 | largest true skew, ms | estimate, ms |")
     print("|" + " --- |" * 9)
