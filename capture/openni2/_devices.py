@@ -16,6 +16,7 @@ from denseface.capture.identity import (
     known_as,
     usb_devices,
 )
+from denseface.capture.openni2._library import open_device
 
 __all__ = ["available", "choose", "identity_of"]
 
@@ -82,7 +83,7 @@ def _serial_of(uri: str) -> str | None:
     """Open a sensor for its serial number; None where it is in use or has none."""
     if uri.startswith(_OPENED_ONCE):
         return None
-    with suppress(OpenNIError), closing(openni2.Device(uri.encode())) as device:
+    with suppress(OpenNIError), closing(open_device(uri.encode())) as device:
         return _serial(device)
     return None
 

@@ -151,16 +151,23 @@ def test_no_sensor():
     assert error == "denseface.capture.errors.SensorError: openni2: OpenNI2 finds no sensor"
 
 
-def test_a_sensor_that_was_busy_can_be_opened_later_in_the_same_process(clip, tmp_path):
+@pytest.mark.parametrize(("opens", "busy"), [
+    ("with LiveSource() as source: source.read()",
+     'openni2: cannot be opened: Could not open "virtual:0": Failed to set USB interface!'),
+    ("load(); choose('S1', 'openni2:S1')", "openni2:S1: no such sensor; found: virtual:0")])
+def test_a_sensor_that_was_busy_can_be_opened_later_in_the_same_process(
+        clip, tmp_path, opens, busy):
     """OpenNI2 counts the closing of what it could not open, and then crashes at the next."""
     code = ("import sys\nfrom denseface.capture.errors import SensorError\n"
             "from denseface.capture.openni2 import LiveSource\n"
+            "from denseface.capture.openni2._devices import choose\n"
+            "from denseface.capture.openni2._library import load\n"
             "for line in sys.stdin:\n"
             "    try:\n"
-            "        with LiveSource() as source: source.read()\n"
+            f"        {opens}\n"
             "        print('open', flush=True)\n"
             "    except SensorError as error: print(error, flush=True)\n")
-    with Control(tmp_path / "sensor", clip, open_fault=OpenFault.BUSY) as sensor, subprocess.Popen(
+    with Control(tmp_path / "sensor", clip, serial="S1") as sensor, subprocess.Popen(
             [sys.executable, "-c", code], env=environment(controls=[sensor]), cwd=REPOSITORY,
             text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         said = []
@@ -170,7 +177,6 @@ def test_a_sensor_that_was_busy_can_be_opened_later_in_the_same_process(clip, tm
             process.stdin.flush()
             said.append(process.stdout.readline().strip())
         process.stdin.close()
-    busy = 'openni2: cannot be opened: Could not open "virtual:0": Failed to set USB interface!'
     assert said == [busy, busy, "open", "open"]
     assert process.returncode == 0
 
