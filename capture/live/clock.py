@@ -101,11 +101,6 @@ class StreamClock:
         """The very first stamp, as long as the transport is measured."""
         self._begin_segment()
 
-    @property
-    def last_arrival_s(self) -> float:
-        """When the last frame came; at first, when the stream was started."""
-        return self._samples[-1][1] if self._samples else self._started_s
-
     def _begin_segment(self) -> None:
         """Forget what was measured: from here on the sensor's clock is another one."""
         self.kind = StampKind.UNKNOWN

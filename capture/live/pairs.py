@@ -76,6 +76,7 @@ class LivePairs:
     clocks : of the streams
     count : of the pairs
     repeats : images that the driver gave twice
+    last_new_s : when the last new image of each stream came, monotonic clock; at first, its start
     skew_us : of the last pair: how much later the depth was taken, microseconds
     """
 
@@ -87,6 +88,7 @@ class LivePairs:
             dropped=lambda arrived: arrived.slot.release())
         self._freshness = {kind: Freshness() for kind in started_s}
         self.count = self.repeats = self.skew_us = 0
+        self.last_new_s = dict(started_s)
 
     def add(self, kind: str, slot: Slot, stamp_us: int, arrival_s: float) -> LivePair | None:
         """Take an image, with the caller's hold on its slot; give the pair that it completes.
@@ -100,6 +102,7 @@ class LivePairs:
             self.repeats += 1
             slot.release()
             return None
+        self.last_new_s[kind] = arrival_s
         arrived = _Arrived(slot, exposure)
         if len(self.clocks) == 1:
             return self._pair(arrived, None)

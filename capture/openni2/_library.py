@@ -2,10 +2,11 @@
 
 import atexit
 import os
+import sys
 import sysconfig
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from weakref import WeakSet
@@ -18,13 +19,17 @@ from denseface.capture.errors import CaptureError, SensorError
 
 open_sources: WeakSet[Any] = WeakSet()
 """Sources that may be open: closed before the library is unloaded, where their owner forgets to."""
+watched_sensors: WeakSet[Any] = WeakSet()
+"""What looks after sensors in threads of their own: closed before the sources."""
 lost_devices: set[bytes] = set()
-"""URIs of the devices that were unplugged or failed since they were opened."""
+"""URIs of the devices that were unplugged since they were opened."""
 
 _NAME = "libOpenNI2.so"
 """File name of the library."""
 _VARIABLES = ("OPENNI2_REDIST64", "OPENNI2_REDIST")
 """Environment variables that name its folder."""
+_LEAVING_S = 3.0
+"""Longest time to close everything when the process ends, seconds."""
 _ERRORS_ONLY = 3
 """OpenNI2's log severity."""
 
@@ -89,13 +94,42 @@ def load() -> None:
             raise SensorError(f"{folder / _NAME}: OpenNI2 cannot be loaded: "
                               f"{error_text(error)}") from error
         # Before the binding's own clean-up, which destroys streams in any order.
-        atexit.register(_close_all)
+        atexit.register(_Leaving().leave)
         _loaded_pid = os.getpid()
 
 
-def _close_all() -> None:
-    for source in list(open_sources):
-        source.close()
+class _Leaving:
+    """Closes everything when the process ends, and ends it where the driver hangs in that.
+
+    The thread is there from the start: an interpreter that ends starts none.
+    """
+
+    def __init__(self) -> None:
+        self._due, self._done = threading.Event(), threading.Event()
+        self._pid = os.getpid()
+        threading.Thread(target=self._close_all, name="openni2-end", daemon=True).start()
+
+    def leave(self) -> None:
+        """Have everything closed; does not return where that takes too long."""
+        if os.getpid() != self._pid:
+            return  # a forked child: OpenNI2 and the thread are its parent's
+        self._due.set()
+        if not self._done.wait(_LEAVING_S):
+            with suppress(OSError, ValueError):
+                print(f"denseface: OpenNI2 or its driver hangs; ended without it after "
+                      f"{_LEAVING_S:g} s", file=sys.stderr)
+                sys.stdout.flush()
+                sys.stderr.flush()
+            os._exit(1)
+
+    def _close_all(self) -> None:
+        self._due.wait()
+        try:
+            for source in [*watched_sensors, *open_sources]:
+                source.close()
+            openni2.unload()
+        finally:
+            self._done.set()
 
 
 @contextmanager
@@ -162,5 +196,4 @@ class _Listener(openni2.DeviceListener):  # type: ignore[misc]
         lost_devices.add(bytes(info[0].uri))
 
     def _on_state_changed(self, info: Any, state: Any, _: Any) -> None:
-        if int(state) == 1:  # ONI_DEVICE_STATE_ERROR
-            lost_devices.add(bytes(info[0].uri))
+        """An error may pass; where it does not, the sensor falls silent, which is noticed."""

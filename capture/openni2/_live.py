@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 
 from primesense import openni2
@@ -136,7 +137,8 @@ class LiveSource(OpenNI2Source):
         slot = self._rings[kind].claim()
         if slot is None:
             self.no_room += 1
-            streams.read(kind)
+            with suppress(WrongSizeError):
+                streams.read(kind)
             return None
         try:
             stamp_us = streams.copy_frame(kind, slot.memory)
@@ -192,8 +194,8 @@ class LiveSource(OpenNI2Source):
         if self.pairs is None:
             return f"{self._name}: the streams were not started"
         now_s = time.monotonic()
-        silent = [kind for kind, clock in self.pairs.clocks.items()
-                  if now_s - clock.last_arrival_s > 2 * _SLICE_S]
+        silent = [kind for kind, last_s in self.pairs.last_new_s.items()
+                  if now_s - last_s > 2 * _SLICE_S]
         if not silent:
             return f"{self._name}: its depth and color frames do not belong together"
         which = f"{silent[0]} stream" if len(silent) == 1 else "sensor"

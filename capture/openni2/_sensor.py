@@ -7,11 +7,11 @@ from collections.abc import Callable
 from primesense import openni2
 
 from denseface.capture.calibration import ChosenCalibration
-from denseface.capture.errors import CaptureError, SensorError
+from denseface.capture.errors import CaptureError, SensorError, WrongSizeError
 from denseface.capture.live.pairs import LivePair, PairLog
 from denseface.capture.live.sensor import LiveSensor, Shot
 from denseface.capture.live.states import HANG_S, LiveEvent, LiveFigures, LiveState, LiveStates
-from denseface.capture.openni2._library import binding_errors, load
+from denseface.capture.openni2._library import binding_errors, load, watched_sensors
 from denseface.capture.openni2._live import LiveSource
 
 _SLICE_S = 0.1
@@ -54,6 +54,7 @@ class WatchedSensor(LiveSensor):
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="sensor", daemon=True)
         self._thread.start()
+        watched_sensors.add(self)
 
     # --- for any thread
 
@@ -103,6 +104,8 @@ class WatchedSensor(LiveSensor):
         self._asked = False
         try:
             return source.shot(pair)
+        except WrongSizeError:  # the driver has changed the size meanwhile
+            return None
         finally:
             pair.release()
 

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Iterator
-from typing import Any, Self
+from typing import Self
 
 import structlog
 import zmq
@@ -13,9 +13,9 @@ from denseface.service.protocol.message_base import ToHub
 from denseface.service.protocol.messages import Denied, Goodbye, Heartbeat
 from denseface.service.protocol.payload import Arrays
 from denseface.service.protocol.wire import Packet, encode
-from denseface.service.runtime.background import Background
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.supervisor_link import Beat, SupervisorLink
+from denseface.service.runtime.wake_pipe import WakePipe
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable
 from denseface.service.transport.connection import Credentials, connect, receive_packet
@@ -53,9 +53,9 @@ class HubConnection:
         return send_parts(self._socket, encode(Packet(message, arrays or {})))
 
     def packets(
-        self, stop: StopSignal, wake: Background[Any], holding: Callable[[], str | None]
+        self, stop: StopSignal, wake: WakePipe, holding: Callable[[], str | None]
     ) -> Iterator[Packet | None]:
-        """Give what the hub sends, and None at every heartbeat and when a call of `wake` ended.
+        """Give what the hub sends, and None at every heartbeat and when `wake` is readable.
 
         `stop` ends the iteration; `holding` gives the capture that this process works on.
         """

@@ -124,9 +124,10 @@ def test_what_waited_in_the_library_is_not_given(clip):
     code = ("source = LiveSource()\n"
             "for _ in range(12): before = source.read().depth_timestamp_us\n"
             "while source.streams.wait(1.0) is None: pass\n"
+            "time.sleep(0.02)\n"
             "print(source.read().depth_timestamp_us > before + 33_333)\n"
             "source.close()\nsource.close()")
-    done = run_python("from denseface.capture.openni2 import LiveSource\n" + code,
+    done = run_python("import time\nfrom denseface.capture.openni2 import LiveSource\n" + code,
                       env=environment(clip))
     assert done.stdout == "True\n", done.stderr
 

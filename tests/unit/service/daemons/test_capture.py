@@ -3,6 +3,7 @@
 import pytest
 
 from denseface.capture.errors import SensorError, UnreadableSourceError
+from denseface.service.daemons._reader_supply import ReaderSupply
 from denseface.service.daemons.capture import _Capture, sensor_name
 from denseface.service.protocol import messages
 from denseface.service.protocol.messages import SensorReady
@@ -57,7 +58,7 @@ class Connection:
 
     def __init__(self, driver, script):
         self.driver = driver
-        self.script = [ENDED, *script]
+        self.script = [ENDED, *script]  # first, the source is open
         self.sent = []
 
     def send(self, message, arrays=None):  # noqa: ARG002
@@ -106,8 +107,11 @@ def served(reader, *script):
     """Give what was sent, and the calls of the driver."""
     driver = Driver()
     connection = Connection(driver, script)
-    _Capture(ServiceSettings(address="ipc:///unused"), connection, reader, driver).serve(None)
-    return [getattr(one, "capture_id", one.kind) for one in connection.sent[1:]], reader.calls
+    settings = ServiceSettings(address="ipc:///unused")
+    supply = ReaderSupply(reader, driver, settings.take_timeout_s)
+    _Capture(settings, connection, supply, "x").serve(None)
+    return [getattr(one, "capture_id", one.kind) for one in connection.sent
+            if one.kind not in ("sensor_state", "sensor_ready")], reader.calls
 
 
 def test_a_preview_is_sent_once_when_it_is_asked_for():
@@ -144,7 +148,8 @@ def test_a_frame_that_is_not_acknowledged_is_sent_again_at_growing_intervals(mon
         monkeypatch.setattr(Connection, "now", 0.0)
         return len(served(FakeReader(live=False), take("a"), ENDED, *[1.0] * seconds, *then)[0])
 
-    monkeypatch.setattr("denseface.service.daemons.capture.time.monotonic", lambda: Connection.now)
+    monkeypatch.setattr(
+        "denseface.service.daemons._frame_sender.time.monotonic", lambda: Connection.now)
     sent = [times(seconds) for seconds in range(91)]
     assert [seconds for seconds in range(1, 91) if sent[seconds] > sent[seconds - 1]] == [
         2, 6, 14, 30, 60, 90]
@@ -167,10 +172,20 @@ def test_a_frame_larger_than_allowed_is_not_sent():
     driver = Driver()
     connection = Connection(driver, [take("a"), ENDED, 100.0])
     settings = ServiceSettings(address="ipc:///unused", max_frame_pixels=69)
-    _Capture(settings, connection, FakeReader(live=False), driver).serve(None)
-    _, said = connection.sent
+    supply = ReaderSupply(FakeReader(live=False), driver, 1.0)
+    _Capture(settings, connection, supply, "x").serve(None)
+    said = connection.sent[-1]
     assert (said.kind, said.capture_id) == ("frame_failed", "a")
     assert said.message.startswith("color has 10 x 7 pixels, at most 69 allowed")
+
+
+def test_the_hub_is_told_each_state_once_and_again_when_it_asks():
+    driver = Driver()
+    connection = Connection(driver, [0.0, messages.Announce(), 0.0])
+    supply = ReaderSupply(FakeReader(live=False), driver, 1.0)
+    _Capture(ServiceSettings(address="ipc:///unused"), connection, supply, "x").serve(None)
+    assert [one.state for one in connection.sent if one.kind == "sensor_state"] == [
+        "streaming", "streaming"]
 
 
 @pytest.mark.parametrize(("source", "identity", "name"), [

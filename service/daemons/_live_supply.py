@@ -1,0 +1,110 @@
+"""Frames of a live sensor for the capture process: the first that is newer than the press."""
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+from denseface.capture import RgbdFrame
+from denseface.capture.live.sensor import LiveSensor, Shot
+from denseface.capture.live.states import LiveState
+from denseface.service.daemons._supply import NotTaken, Outcome, Picture, Supply, SupplyState, Taken
+from denseface.service.protocol import messages
+from denseface.service.protocol.sensor_messages import SensorFigures
+from denseface.service.runtime.wake_pipe import WakePipe
+
+_HOPEFUL = (LiveState.OPENING, LiveState.WARMING, LiveState.STREAMING, LiveState.STALLED)
+"""States in which a press waits: there will be frames soon, or it will be known that not."""
+
+
+@dataclass
+class _Press:
+    capture_id: str
+    at_s: float
+    """When it came, monotonic clock."""
+    wanted: int
+    """Frames."""
+    shots: list[Shot] = field(default_factory=list)
+    """Those it has."""
+
+    @property
+    def next_s(self) -> float:
+        """When its next frame is exposed at the earliest."""
+        return math.nextafter(self.shots[-1].earliest_s, math.inf) if self.shots else self.at_s
+
+
+class LiveSupply(Supply):
+    """Each press gets the first pair of which both images were surely exposed after it came.
+
+    Parameters
+    ----------
+    patience_s : how long a press waits while the sensor is opened or has none
+    """
+
+    def __init__(self, sensor: LiveSensor, patience_s: float) -> None:
+        self.wake = WakePipe()
+        self._sensor = sensor
+        self._patience_s = patience_s
+        self._presses: dict[str, _Press] = {}
+        self._preview_due = False
+        self._shown_s = 0.0
+        """`latest_s` of the pair that the last preview showed."""
+        sensor.on_change = self.wake.wake
+
+    @property
+    def state(self) -> SupplyState:
+        sensor, figures = self._sensor, self._sensor.figures
+        return SupplyState(sensor.state.value, sensor.reason[:500], sensor.identity[:200],
+                           SensorFigures(
+                               frames=figures.frames, drops=figures.drops,
+                               skew_us=abs(figures.skew_us), stalls=figures.stalls,
+                               reconnects=figures.reconnects, wrong_size=figures.wrong_size))
+
+    def press(self, take: messages.Take) -> None:
+        self._presses.setdefault(
+            take.capture_id, _Press(take.capture_id, time.monotonic(), take.frames))
+
+    def preview(self) -> None:
+        self._preview_due = True
+
+    def step(self, *, busy: bool) -> Iterator[Outcome]:
+        for press in [*self._presses.values()]:
+            outcome = self._serve(press)
+            if outcome is not None:
+                del self._presses[press.capture_id]
+                yield outcome
+        if self._preview_due and not busy:
+            shot = self._sensor.latest()
+            if shot is not None and shot.latest_s != self._shown_s:
+                self._preview_due, self._shown_s = False, shot.latest_s
+                yield Picture(shot.frame)
+
+    def _serve(self, press: _Press) -> Outcome | None:
+        while len(press.shots) < press.wanted:
+            # The state first: a pair that comes in between is not overlooked.
+            state, reason = self._sensor.state, self._sensor.reason
+            shot = self._sensor.first_after(press.next_s)
+            if shot is not None:
+                press.shots.append(shot)
+                continue
+            if state not in _HOPEFUL:
+                return NotTaken(press.capture_id, reason)
+            waited_s = time.monotonic() - press.at_s
+            if waited_s > self._patience_s:
+                return NotTaken(press.capture_id, (
+                    f"no frame within {waited_s:.1f} s: " + (reason or "none is new enough")))
+            return None
+        return Taken(press.capture_id, _pressed(press))
+
+    def hangs(self) -> str:
+        return self._sensor.needs_new_process()
+
+    def close(self) -> bool:
+        return self._sensor.close()
+
+
+def _pressed(press: _Press) -> RgbdFrame:
+    """Give the frame of a press that has its shots, with how much later it was exposed."""
+    shot = press.shots[0]
+    after_ms = round((shot.earliest_s - press.at_s) * 1e3, 3)
+    return replace(shot.frame, origin=replace(shot.frame.origin, exposed_after_press_ms=after_ms))

@@ -1,0 +1,83 @@
+"""What gives frames to the capture process: a live sensor or a recording, asked alike.
+
+Nothing here waits: what is asked for comes out of `step`, some time after `wake` became readable.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from denseface.capture import RgbdFrame
+from denseface.service.protocol import messages
+from denseface.service.protocol.sensor_messages import LiveStateName, SensorFigures
+from denseface.service.runtime.wake_pipe import WakePipe
+
+__all__ = ["NotTaken", "Outcome", "Picture", "Supply", "SupplyState", "Taken"]
+
+
+@dataclass(frozen=True)
+class Taken:
+    """The frame of a press."""
+
+    capture_id: str
+    frame: RgbdFrame
+
+
+@dataclass(frozen=True)
+class NotTaken:
+    """A press that gets no frame."""
+
+    capture_id: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Picture:
+    """The frame of a preview."""
+
+    frame: RgbdFrame
+
+
+Outcome = Taken | NotTaken | Picture
+
+
+@dataclass(frozen=True)
+class SupplyState:
+    """How a source is, as the hub is told."""
+
+    state: LiveStateName
+    reason: str = ""
+    identity: str = ""
+    figures: SensorFigures = field(default_factory=SensorFigures)
+
+
+class Supply(Protocol):
+    """Gives frames of one source."""
+
+    wake: WakePipe
+    """Readable when `step` may have something new to give."""
+
+    @property
+    def state(self) -> SupplyState:
+        """How the source is."""
+
+    def press(self, take: messages.Take) -> None:
+        """Ask for a frame; a repeat of what is asked for already changes nothing."""
+
+    def preview(self) -> None:
+        """Ask for a picture: one, however often it is asked for."""
+
+    def step(self, *, busy: bool) -> Iterator[Outcome]:
+        """Give what became of what was asked for; no pictures while `busy`.
+
+        Raises
+        ------
+        CaptureError
+            The source cannot be opened, or has gone for good.
+        """
+
+    def hangs(self) -> str:
+        """Say why the process is to be ended, as when the driver hangs; empty where it is not."""
+
+    def close(self) -> bool:
+        """Close the source; False where the driver hangs."""

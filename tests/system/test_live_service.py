@@ -1,0 +1,144 @@
+"""A live sensor that fails, and the service: what the presser hears, and how all comes back."""
+
+import re
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from denseface.service.client import Client
+from denseface.service.errors import PressRefusedError
+from tests.system.running import REPOSITORY, hub_alone, service
+from tests.virtual_sensor.clip import write_clip
+from tests.virtual_sensor.control import Call, Control, OpenFault
+from tests.virtual_sensor.process import environment, run_python
+from tests.waiting import LIMIT_S, until
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory):
+    rng = np.random.default_rng(9)
+    path = tmp_path_factory.mktemp("clip") / "clip"
+    write_clip(path, [(rng.integers(500, 900, (480, 640), np.uint16),
+                       rng.integers(0, 256, (480, 640, 3), np.uint8)) for _ in range(3)])
+    return path
+
+
+@pytest.fixture
+def control(clip, tmp_path):
+    with Control(tmp_path / "control", clip, marks=True) as control:
+        yield control
+
+
+@pytest.fixture
+def hub(tmp_path):
+    """A hub without workers: a press is accepted when its frame is safe."""
+    address = f"ipc://{tmp_path}/h"
+    with hub_alone(address, tmp_path / "data"):
+        yield address
+
+
+@contextmanager
+def capture_process(address, control, log):
+    """Run the capture process alone, and give it."""
+    with log.open("w") as stderr:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "denseface", "capture", "--source", "openni2:", "--address",
+             address], cwd=REPOSITORY, stderr=stderr, env=environment(controls=[control]))
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def pressed(client):
+    """Press, and give the reason of a refusal; empty where the press was accepted."""
+    try:
+        client.press(timeout=LIMIT_S)
+    except PressRefusedError as error:
+        return str(error)
+    return ""
+
+
+def test_the_reason_why_there_is_no_frame_reaches_the_presser(hub, control, tmp_path):
+    control.plugged = False
+    with capture_process(hub, control, tmp_path / "log"), Client(hub) as client:
+        until(lambda: "OpenNI2 finds no sensor" in pressed(client))
+        control.open_fault = OpenFault.BUSY
+        control.replug()
+        until(lambda: "cannot be opened" in pressed(client))
+        control.open_fault = OpenFault.NONE
+        until(lambda: not pressed(client))
+        control.unplug()
+        until(lambda: "was unplugged" in pressed(client))
+        control.replug("virtual:7")
+        until(lambda: not pressed(client))
+
+
+def test_frames_and_previews_come_from_one_process_that_stays(hub, control, tmp_path):
+    with capture_process(hub, control, tmp_path / "log") as process, Client(hub) as client:
+        until(lambda: not pressed(client))
+        for _ in range(2):
+            control.unplug()
+            until(lambda: pressed(client))
+            control.replug()
+            until(lambda: not pressed(client))
+        assert process.poll() is None
+        assert control.loads == 1
+
+
+@pytest.mark.parametrize("call", [Call.STOP, Call.DESTROY_STREAM, Call.CLOSE])
+def test_a_driver_that_hangs_when_it_is_closed_ends_the_process(hub, control, tmp_path, call):
+    log = tmp_path / "log"
+    with capture_process(hub, control, log) as process, Client(hub) as client:
+        until(lambda: not pressed(client))
+        control.hang = call
+        control.unplug()
+        assert process.wait(LIMIT_S) == 1
+    assert re.search(r"the driver hangs \(closing for [23]\.\d s\)", log.read_text())
+
+
+@pytest.mark.parametrize("call", [Call.STOP, Call.DESTROY_STREAM, Call.CLOSE, Call.SHUTDOWN])
+def test_a_driver_that_hangs_does_not_keep_the_process_at_its_end(hub, control, tmp_path, call):
+    with capture_process(hub, control, tmp_path / "log") as process, Client(hub) as client:
+        until(lambda: not pressed(client))
+        control.hang = call
+        process.terminate()
+        process.wait(LIMIT_S)
+
+
+def test_a_driver_that_hangs_when_it_is_opened_ends_the_process(hub, control, tmp_path):
+    control.hang = Call.OPEN
+    with capture_process(hub, control, tmp_path / "log") as process:
+        assert process.wait(LIMIT_S) == 1
+    assert "the driver hangs (opening for 10." in (tmp_path / "log").read_text()
+
+
+def test_the_service_brings_back_a_sensor_whose_driver_hung(control, tmp_path):
+    with service("openni2:", tmp_path / "data",
+                 environment=environment(controls=[control])) as up, up.client() as client:
+        until(lambda: not pressed(client))
+        control.hang = Call.CLOSE
+        control.unplug()
+        control.wait_hanging(Call.CLOSE)
+        control.hang = Call.NONE
+        until(lambda: control.loads == 2 or pressed(client))
+        control.replug()
+        until(lambda: not pressed(client))
+
+
+@pytest.mark.parametrize("call", [Call.STOP, Call.CLOSE, Call.SHUTDOWN])
+def test_a_program_that_read_a_sensor_ends_though_the_driver_hangs(control, call):
+    """Any command that opens a sensor, not only the service."""
+    control.hang = call
+    done = run_python(
+        "from denseface.capture import open_source\n"
+        "source = open_source('openni2:')\n"
+        "print(next(iter(source)).depth.shape, flush=True)",
+        env=environment(controls=[control]))
+    assert done.stdout == "(480, 640)\n"
+    assert done.stderr == ("denseface: OpenNI2 or its driver hangs; ended without it after 3 s\n")
+    assert done.returncode == 1

@@ -1,0 +1,134 @@
+"""A process that looks after the virtual sensor as the capture process does, and can be asked.
+
+As a program it reads one name of a function below and its numbers a line, and answers with a line
+of JSON. All times are `time.monotonic` of the machine, so that the test may compare them.
+"""
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Self
+
+from tests.waiting import LIMIT_S, until
+
+_ROOT = Path(__file__).resolve().parents[2]
+
+
+class Watched:
+    """The process, from the test's side."""
+
+    def __init__(self, env: dict[str, str], uri: str = "openni2:") -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "tests.system.watched_sensor", uri], cwd=_ROOT, text=True,
+            env=env | {"PYTHONPATH": str(_ROOT)}, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.communicate()
+
+    def ask(self, *words: object) -> Any:
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        timer = threading.Timer(LIMIT_S, self.process.kill)
+        timer.start()
+        print(*words, file=self.process.stdin, flush=True)
+        answer = self.process.stdout.readline()
+        timer.cancel()
+        assert answer, "the process ended"
+        return json.loads(answer)
+
+    def wait_state(self, *wanted: str) -> float:
+        """Wait for one of some states and give when it was entered."""
+        found = until(lambda: self.ask("state") if self.ask("state")[0] in wanted else None)
+        return float(found[2])
+
+    def press(self) -> dict[str, Any]:
+        """Take a frame: when it was asked for, what is known of it, its marks."""
+        return dict(self.ask("press"))
+
+    def presses(self, count: int) -> list[dict[str, Any]]:
+        """Press again and again, at any time within a frame's period."""
+        return [self.ask("press", number) for number in range(count)]
+
+    def states_since(self, since_s: float) -> list[str]:
+        """Give the states that were entered since."""
+        return [state for state, _, at in self.ask("history") if at >= since_s]
+
+
+def _serve(uri: str) -> None:
+    import math
+
+    from denseface.capture.live.sensor import Shot, open_sensor
+    from tests.virtual_sensor.marks import read_mark
+
+    history: list[tuple[str, str, float]] = []
+    sensor = open_sensor(uri)
+    assert sensor is not None
+
+    def note() -> None:
+        now = sensor.state.value, sensor.reason
+        if not history or history[-1][:2] != now:
+            history.append((*now, time.monotonic()))
+
+    sensor.on_change = note
+    note()
+
+    def state() -> Any:
+        note()
+        return history[-1]
+
+    def taken(find: Callable[[], Shot | None]) -> Any:
+        deadline = time.monotonic() + LIMIT_S
+        while (shot := find()) is None:
+            if sensor.state.value not in ("opening", "warming", "streaming", "stalled") or (
+                    time.monotonic() > deadline):
+                return {"refused": sensor.reason, "state": sensor.state.value}
+            time.sleep(0.001)
+        return shot
+
+    def press(number: int = 0) -> Any:
+        time.sleep(number * 0.0137 % 0.05)  # at any time within a period
+        asked_s = time.monotonic()
+        shot = taken(lambda: sensor.first_after(asked_s))
+        got_s = time.monotonic()
+        if isinstance(shot, dict):
+            return shot | {"asked_s": asked_s, "got_s": got_s}
+        frame, origin = shot.frame, shot.frame.origin
+        marks = [read_mark(image, unit_um=frame.depth_meaning.unit_um)
+                 for image in (frame.depth, frame.color) if image is not None]
+        return {
+            "asked_s": asked_s, "got_s": got_s, "number": shot.number,
+            "exposed_s": [mark.exposed_ns / 1e9 for mark in marks],
+            "earliest_s": shot.earliest_s, "latest_s": shot.latest_s, "skew_us": frame.skew_us,
+            "exposure_known_by": origin.exposure_known_by, "captured_at": origin.captured_at,
+            "skew_known_by": origin.skew_known_by, "notes": origin.notes}
+
+    def burst(count: int) -> Any:
+        after_s, numbers = time.monotonic(), []
+        for _ in range(count):
+            shot = taken(lambda after_s=after_s: sensor.first_after(after_s))
+            numbers.append(shot.number)
+            after_s = math.nextafter(shot.earliest_s, math.inf)
+        return numbers
+
+    calls: dict[str, Callable[..., Any]] = {
+        "state": state, "press": press, "burst": burst, "history": lambda: history,
+        "figures": lambda: asdict(sensor.figures), "identity": lambda: sensor.identity,
+        "stuck": sensor.needs_new_process, "close": sensor.close,
+        "cpu": time.process_time,
+    }
+    for line in sys.stdin:
+        name, *numbers = line.split()
+        print(json.dumps(calls[name](*map(int, numbers))), flush=True)
+
+
+if __name__ == "__main__":
+    _serve(sys.argv[1])
