@@ -1,7 +1,9 @@
-"""The frame file: one `RgbdFrame` in a `.npz`, without pickles."""
+"""The frame file: one `RgbdFrame` in a `.npz`, without pickles; and folders of such files."""
 
+import errno
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +12,13 @@ from numpy.typing import NDArray
 
 from denseface.capture.calibration import MAX_SIDE, Calibration, ChosenCalibration
 from denseface.capture.calibration_files import doubts_of
-from denseface.capture.errors import CalibrationError, FrameError
+from denseface.capture.errors import CalibrationError, FrameError, UnreadableSourceError
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
 from denseface.capture.source import Source
 from denseface.capture.zipped_arrays import ArrayKind, read_arrays
 from denseface.files import replacing
 
-__all__ = ["NpzSource", "load_frame", "save_frame"]
+__all__ = ["FolderSource", "FolderWriter", "NpzSource", "load_frame", "save_frame"]
 
 _KINDS = {
     "depth": ArrayKind("uint16", ("H", "W"), MAX_SIDE),
@@ -51,6 +53,70 @@ class NpzSource(Source):
 
     def close(self) -> None:
         """Nothing is held open."""
+
+
+class FolderSource(Source):
+    """The frames of the `.npz` files in a folder, in the order of their names.
+
+    Raises
+    ------
+    UnreadableSourceError
+        There is none, or the folder cannot be read.
+    """
+
+    def __init__(self, folder: Path, chosen: ChosenCalibration | None = None) -> None:
+        self.uri = str(folder)
+        self._chosen = chosen
+        self._paths = _frame_files(folder)
+        if not self._paths:
+            raise UnreadableSourceError(f"{folder}: is a folder without frame files (.npz)")
+        self.frame_count = len(self._paths)
+
+    def __iter__(self) -> Iterator[RgbdFrame]:
+        for path in self._paths:
+            yield load_frame(path, self._chosen)
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+
+class FolderWriter:
+    """Writes frames into a folder as `000000.npz` and so on.
+
+    The files are not compressed: that would take longer than a sensor's next frame.
+
+    Raises
+    ------
+    OSError
+        As from the system; also where there are frame files already.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder
+        self.frames = 0
+        """How many are in the folder."""
+        self._made = not folder.exists()
+        folder.mkdir(exist_ok=True)
+        if _frame_files(folder):
+            raise FileExistsError(errno.EEXIST, "Holds frame files already", str(folder))
+
+    def add(self, frame: RgbdFrame) -> None:
+        """Write one more; OSError as from the system."""
+        save_frame(self.path / f"{self.frames:06}.npz", frame, quickly=True)
+        self.frames += 1
+
+    def close(self) -> None:
+        """Remove a folder that was made for no frame; harmless when repeated."""
+        if self._made and not self.frames:
+            with suppress(OSError):
+                self.path.rmdir()
+
+
+def _frame_files(folder: Path) -> list[Path]:
+    try:
+        return sorted(path for path in folder.iterdir() if path.suffix.lower() == ".npz")
+    except OSError as error:
+        raise UnreadableSourceError(f"{folder}: {error.strerror or error}") from error
 
 
 def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> RgbdFrame:
@@ -103,8 +169,13 @@ def _size(image: NDArray[Any]) -> tuple[int, int]:
     return image.shape[1], image.shape[0]
 
 
-def save_frame(path: str | Path, frame: RgbdFrame) -> None:
-    """Write a frame file: whole, or not at all; OSError as from the system."""
+def save_frame(path: str | Path, frame: RgbdFrame, *, quickly: bool = False) -> None:
+    """Write a frame file: whole, or not at all; OSError as from the system.
+
+    Parameters
+    ----------
+    quickly : do not compress, and do not wait for the disk
+    """
     arrays: dict[str, Any] = {
         "depth": frame.depth,
         "depth_timestamp_us": np.int64(frame.depth_timestamp_us),
@@ -119,6 +190,9 @@ def save_frame(path: str | Path, frame: RgbdFrame) -> None:
         if text:
             arrays[name] = np.array(text[:_MAX_LINE])
     with replacing(Path(path)) as file:
+        if quickly:
+            np.savez(file, allow_pickle=False, **arrays)
+            return
         np.savez_compressed(file, allow_pickle=False, **arrays)
         file.flush()
         os.fsync(file.fileno())

@@ -5,27 +5,33 @@ URI                what it opens
 ================== ===============================================================================
 ``NAME.npz``       one frame in the project's own format
 ``NAME.oni``       a recording, through OpenNI2
-``FOLDER``         image pairs, as data sets have them (TUM RGB-D, ScanNet, Open3D)
+``FOLDER``         the frames of its ``.npz`` files, in the order of their names; else image pairs,
+                   as data sets have them (TUM RGB-D, ScanNet, Open3D)
 ``openni2:``       the first live sensor that OpenNI2 finds
 ``openni2:URI``    the live sensor of that OpenNI2 URI
 ================== ===============================================================================
+
+What is read from files may end in ``?`` and options of `ReplayOptions`, such as
+``NAME.oni?rate=real&end=stop``.
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Protocol, Self, runtime_checkable
+from typing import Any, Protocol, Self, runtime_checkable
 
 from denseface.capture.calibration import Calibration
 from denseface.capture.calibration_files import choose_calibration
 from denseface.capture.errors import UnreadableSourceError
 from denseface.capture.frame import RgbdFrame
 
-__all__ = ["Source", "open_source"]
+__all__ = ["ReplayOptions", "Source", "open_source"]
 
 _SOURCES = {
     ".npz": "npz:NpzSource",
     ".oni": "openni2:RecordingSource",
+    "/*.npz": "npz:FolderSource",
     "/": "image_pair:FolderSource",
     "openni2:": "openni2:LiveSource",
 }
@@ -35,6 +41,56 @@ _SOURCES = {
 The class is imported when first needed, and called with the file's path (of a sensor: with what
 follows the scheme, or None) and the chosen calibration or None.
 """
+
+_FOLDERS = {"/*.npz": ".npz", "/": "image pairs"}
+"""What may be in a folder."""
+
+
+@dataclass(frozen=True)
+class ReplayOptions:
+    """How what was recorded is played.
+
+    Attributes
+    ----------
+    real_time : ``rate=real``: each frame at its time after the first, as of a live sensor;
+        ``rate=asked``, the default: the next one whenever one is asked for
+    stops : ``end=stop``: no frame after the last; ``end=loop``, the default: the first again
+    frame : ``frame=N``: that one alone, from 0; None for all
+    """
+
+    real_time: bool = False
+    stops: bool = False
+    frame: int | None = None
+
+    @classmethod
+    def split(cls, uri: str) -> tuple[str, Self | None]:
+        """Split options from a URI; None where it has none. A file may have a ``?`` in its name.
+
+        Raises
+        ------
+        UnreadableSourceError
+            An option is unknown, or has no value that it may have.
+        """
+        name, mark, text = uri.rpartition("?")
+        if not mark or Path(uri).exists():
+            return uri, None
+        given: dict[str, str] = {}
+        for option in text.split("&"):
+            key, _, value = option.partition("=")
+            valid = value in _OPTIONS[key] if key in _OPTIONS else (
+                key == "frame" and value.isdecimal() and len(value) < _MAX_DIGITS)
+            if not valid or key in given:
+                raise UnreadableSourceError(
+                    f"{uri}: {option or text!r}: expected rate=asked or rate=real, end=loop or "
+                    "end=stop, frame=N, each once")
+            given[key] = value
+        frame = given.get("frame")
+        return name, cls(given.get("rate") == "real", given.get("end") == "stop",
+                         None if frame is None else int(frame))
+
+
+_OPTIONS = {"rate": ("asked", "real"), "end": ("loop", "stop")}
+_MAX_DIGITS = 10
 
 
 @runtime_checkable
@@ -49,6 +105,8 @@ class Source(Protocol):
     """What was opened."""
     frame_count: int | None
     """How many frames one pass gives at most; None for a live sensor."""
+    repeats: bool = True
+    """Whether who wants more frames than a pass gives begins another."""
 
     def __iter__(self) -> Iterator[RgbdFrame]: ...
 
@@ -83,28 +141,38 @@ def open_source(uri: str | Path, calibration: Calibration | str | Path | None = 
     SensorError
         The OpenNI2 library, the device or one of its streams is missing.
     """
-    text = str(uri)
+    text, options = ReplayOptions.split(str(uri))
     scheme, colon, address = text.partition(":")
     kind, path = scheme.lower() + colon, None
     if not colon or kind not in _SOURCES:
         path = Path(text)
         kind = path.suffix.lower()
         if kind not in _SOURCES and text and path.is_dir():
-            kind = "/"
+            kind = "/*.npz" if any(path.glob("*.npz")) else "/"
         if kind not in _SOURCES:
             raise UnreadableSourceError(f"{text}: not a known kind of source; {_accepted()}")
-        if not path.is_file() and kind != "/":
+        if not path.is_file() and not kind.startswith("/"):
             found = ("is a folder, not a file" if path.is_dir() else
                      "is not a regular file" if path.exists() else "no such file")
             raise UnreadableSourceError(f"{text}: {found}")
-    module, name = _SOURCES[kind].split(":")
-    opener = getattr(import_module(f"denseface.capture.{module}"), name)
-    source: Source = opener(path or address or None, choose_calibration(path, calibration))
-    return source
+    elif options is not None:
+        raise UnreadableSourceError(f"{uri}: a live sensor has no options of a replay")
+    source: Source = _class(_SOURCES[kind])(
+        path or address or None, choose_calibration(path, calibration))
+    if options is None:
+        return source
+    replay: Source = _class("replay:Replay")(source, options)
+    return replay
+
+
+def _class(name: str) -> Any:
+    module, name = name.split(":")
+    return getattr(import_module(f"denseface.capture.{module}"), name)
 
 
 def _accepted() -> str:
     forms = [form for kind in _SOURCES
              for form in ((f"NAME{kind}",) if kind.startswith(".") else
-                          ("a folder of image pairs",) if kind == "/" else (kind, f"{kind}URI"))]
+                          (f"a folder of {_FOLDERS[kind]}",) if kind in _FOLDERS else
+                          (kind, f"{kind}URI"))]
     return f"accepted: {', '.join(forms[:-1])} or {forms[-1]}"

@@ -14,6 +14,7 @@ from typing import Protocol
 from denseface.capture.calibration_files import choose_calibration
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.live.states import LiveFigures, LiveState
+from denseface.capture.source import ReplayOptions
 
 __all__ = ["LiveSensor", "Shot", "open_sensor"]
 
@@ -90,7 +91,9 @@ class LiveSensor(Protocol):
 
 
 def open_sensor(uri: str, calibration: Path | None = None) -> LiveSensor | None:
-    """Begin to look after a live sensor; None where the URI is that of another kind of source.
+    """Begin to look after a live sensor, or to play a recording as if it were one (`rate=real`).
+
+    None where the URI is that of another kind of source.
 
     Parameters
     ----------
@@ -100,7 +103,14 @@ def open_sensor(uri: str, calibration: Path | None = None) -> LiveSensor | None:
     ------
     CalibrationError
         The calibration cannot be read.
+    CaptureError
+        The recording cannot be read.
     """
+    _, options = ReplayOptions.split(uri)
+    if options is not None and options.real_time:
+        replay: LiveSensor = import_module("denseface.capture.replay").ReplaySensor(
+            uri, calibration)
+        return replay
     scheme, colon, address = uri.partition(":")
     name = _SENSORS.get(scheme.lower() + colon)
     if name is None:

@@ -34,8 +34,7 @@ class Recorded:
         self.file = read_oni(path)
         depth = self._stream(DEPTH_NODE, "depth")
         if depth is None:
-            raise UnreadableSourceError(
-                f"{path}: has no depth stream; depth and color are needed")
+            raise UnreadableSourceError(f"{path}: has no depth stream; depth is needed")
         self.depth, self.color = depth, self._stream(IMAGE_NODE, "color")
         text = depth.texts.get(DESCRIPTION)
         self._described = None if text is None else Description.read(str(path), text)

@@ -37,7 +37,7 @@ class RecordingSource(OpenNI2Source):
     Raises
     ------
     UnreadableSourceError
-        The file is missing, damaged, has no depth or no colour stream, or OpenNI2 refuses it.
+        The file is missing, damaged, has no depth stream or no pair, or OpenNI2 refuses it.
     SensorError
         The OpenNI2 library is missing.
     """
@@ -50,15 +50,13 @@ class RecordingSource(OpenNI2Source):
         super().__init__(str(path), chosen or self._recorded.calibration)
         self._unread = True
         self._registered = self._recorded.depth.registered
-        if self._recorded.color is None:
-            raise UnreadableSourceError(
-                f"{self.uri}: has no color stream; depth and color are needed")
-        self._expected = {DEPTH: self._recorded.depth.frames, COLOR: self._recorded.color.frames}
+        self._expected = {
+            kind: node.frames for kind, node in
+            ((DEPTH, self._recorded.depth), (COLOR, self._recorded.color)) if node is not None}
         self.frame_count = self._recorded.pairs
         if not self.frame_count:
-            raise UnreadableSourceError(
-                f"{self.uri}: holds no pair of {self._expected[DEPTH]} depth and "
-                f"{self._expected[COLOR]} color frames")
+            raise UnreadableSourceError(f"{self.uri}: holds no pair of depth and color: "
+                                        f"{_counted(self._expected)}")
         self._open()
 
     def __iter__(self) -> Iterator[RgbdFrame]:
@@ -78,10 +76,9 @@ class RecordingSource(OpenNI2Source):
             except SensorError as error:
                 raise UnreadableSourceError(str(error)) from error
             if kind is None or image is None:
-                read = {k: self._expected[k] - n for k, n in left.items()}
                 raise UnreadableSourceError(
-                    f"{self.uri}: ends after {read[DEPTH]} of {self._expected[DEPTH]} depth and "
-                    f"{read[COLOR]} of {self._expected[COLOR]} color frames: damaged")
+                    f"{self.uri}: holds {_counted(self._expected)}, of which {_counted(left)} "
+                    "cannot be read: damaged")
             left[kind] -= 1
             if max(left.values()) <= 0:
                 # At the end the player's thread would busy-wait.
@@ -106,10 +103,12 @@ class RecordingSource(OpenNI2Source):
         super().close()
 
     def _frame(self, pair: Pair[Any, Any]) -> RgbdFrame:
-        frame = super()._frame(pair)
-        origin = self._recorded.origin(pair.depth_us)
-        return replace(frame, depth_meaning=self._recorded.meaning(frame.depth_meaning.unit_um),
-                       origin=replace(origin, notes=frame.origin.notes + origin.notes))
+        if self._streams is None:
+            raise SensorError(f"{self._name}: is closed")
+        frame = self._make_frame(self._streams, pair.depth, pair.color,
+                                 (pair.depth_us, pair.color_us),
+                                 self._recorded.origin(pair.depth_us))
+        return replace(frame, depth_meaning=self._recorded.meaning(frame.depth_meaning.unit_um))
 
     def _open(self) -> Streams:
         load()
@@ -137,3 +136,7 @@ class RecordingSource(OpenNI2Source):
                 return self._open_streams(device)
         except SensorError as error:
             raise UnreadableSourceError(str(error)) from error
+
+
+def _counted(frames: dict[str, int]) -> str:
+    return " and ".join(f"{number} {kind}" for kind, number in frames.items()) + " frames"

@@ -12,6 +12,7 @@ __all__ = ["COMMANDS", "Command", "load"]
 COMMANDS = {
     "reconstruct": "make a dense face of one frame of a file",
     "live": "reconstruct a source frame after frame and show the times",
+    "record": "record a sensor, or any source, to a file or folder",
     "up": "run the whole service on this machine",
     "press": "take a frame now and wait for its face",
     "subscribe": "follow the faces as they are published",

@@ -73,7 +73,8 @@ def add_log(parser: argparse.ArgumentParser) -> None:
 def add_source(parser: argparse.ArgumentParser) -> None:
     """Add `--source` and `--calibration`: where frames come from."""
     parser.add_argument("--source", default="openni2:", metavar="URI",
-                        help="openni2: for the first sensor, or a .oni or .npz file "
+                        help="openni2: for the first sensor, or a .oni or .npz file or a folder "
+                             "of .npz, played by options: FILE?rate=real&end=stop&frame=N "
                              "(default: openni2:)")
     parser.add_argument("--calibration", type=Path, metavar="FILE",
                         help="calibration that wins over the source's own")

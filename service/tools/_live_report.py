@@ -1,49 +1,20 @@
 """What is shown of a live run: a status line meanwhile, a summary at the end."""
 
 import json
-import shutil
-import sys
-import time
 from importlib.metadata import version
-from typing import Self
 
 from denseface.recon import Face, Settings
-from denseface.service.runtime.terminal import printable
 from denseface.service.tools._live_statistics import LiveFrame, LiveStatistics
 
-_REFRESH_S = 0.1
-"""Shortest time between two writings of the status line, seconds."""
 
-
-class StatusLine:
-    """One line on stderr, where that is a terminal; cleared at the end of the `with` block."""
-
-    def __init__(self) -> None:
-        self._shown = sys.stderr.isatty()
-        self._due = 0.0
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._shown:
-            self._write("")
-
-    def show(self, done: LiveFrame, statistics: LiveStatistics) -> None:
-        """Show the newest frame, unless the line was written just now."""
-        if not self._shown or (now := time.monotonic()) < self._due:
-            return
-        self._due = now + _REFRESH_S
-        if isinstance(done.outcome, Face):
-            report = done.outcome.report
-            outcome = f"{report.dense_points:,} points in {report.timings_ms['total']:.0f} ms"
-        else:
-            outcome = str(done.outcome)
-        self._write(f"{statistics.frames} frames, {statistics.recent_rate:.1f} a second: {outcome}")
-
-    def _write(self, text: str) -> None:
-        width = shutil.get_terminal_size().columns - 1
-        print(f"\r{printable(text)[:width]}\x1b[K", end="", file=sys.stderr, flush=True)
+def status(done: LiveFrame, statistics: LiveStatistics) -> str:
+    """Say in a line what the newest frame gave."""
+    if isinstance(done.outcome, Face):
+        report = done.outcome.report
+        outcome = f"{report.dense_points:,} points in {report.timings_ms['total']:.0f} ms"
+    else:
+        outcome = str(done.outcome)
+    return f"{statistics.frames} frames, {statistics.recent_rate:.1f} a second: {outcome}"
 
 
 def text_summary(warm_ms: float, statistics: LiveStatistics) -> str:

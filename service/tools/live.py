@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -11,8 +12,9 @@ from denseface.capture.errors import UnreadableSourceError
 from denseface.recon import Face, ReconstructionError, Settings, reconstruct, warm
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.terminal import complain, say
-from denseface.service.tools._live_report import StatusLine, json_summary, text_summary
+from denseface.service.tools._live_report import json_summary, status, text_summary
 from denseface.service.tools._live_statistics import Clock, LiveFrame, LiveStatistics
+from denseface.service.tools._status_line import StatusLine
 
 __all__ = ["reconstruct_frames", "run"]
 
@@ -40,7 +42,7 @@ def run(
             with StatusLine() as line:
                 for done in reconstruct_frames(source, settings):
                     statistics.add(done)
-                    line.show(done, statistics)
+                    line.show(partial(status, done, statistics))
                     if stop or statistics.frames == frames or (
                             seconds is not None and statistics.seconds >= seconds):
                         break
@@ -56,7 +58,7 @@ def run(
 def reconstruct_frames(
     source: Source, settings: Settings, clock: Clock = time.perf_counter
 ) -> Iterator[LiveFrame]:
-    """Reconstruct each frame of a source; recordings begin again at their end.
+    """Reconstruct each frame of a source; recordings begin again at their end, unless told not to.
 
     A frame without a face is an outcome like any other. The kernels are warm before a frame is
     asked for.
@@ -70,7 +72,9 @@ def reconstruct_frames(
     frames = _endless(source)
     while True:
         asked = clock()
-        frame = next(frames)
+        frame = next(frames, None)
+        if frame is None:
+            return
         begun = clock()
         try:
             outcome: Face | ReconstructionError = reconstruct(frame, settings)
@@ -89,3 +93,5 @@ def _endless(source: Source) -> Iterator[RgbdFrame]:
             yield frame
         if empty:
             raise UnreadableSourceError(f"{source.uri}: holds no pair of depth and colour")
+        if not getattr(source, "repeats", True):  # another's source need not say
+            return

@@ -107,7 +107,7 @@ def test_color_alone_and_then_depth_alone(recorded, tmp_path):
         keep = record.kind != 0x0A or (number <= 4) == (record.node == _COLOR)
         return (record,) if keep else ()
 
-    assert "holds no pair of 6 depth and 4 color frames" in refusal(
+    assert "holds no pair of depth and color: 6 depth and 4 color frames" in refusal(
         tmp_path, edited(recorded, edit))
 
 

@@ -11,7 +11,7 @@ from denseface.capture import open_source
 from denseface.capture.calibration import Calibration
 from denseface.capture.errors import CalibrationError, FrameError, UnreadableSourceError
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
-from denseface.capture.npz import load_frame, save_frame
+from denseface.capture.npz import FolderWriter, load_frame, save_frame
 from tests.unit import frames
 
 H, W = 6, 8
@@ -243,3 +243,23 @@ def test_calibration_of_another_size_names_both(tmp_path):
     with pytest.raises(CalibrationError,
                        match=r"f\.npz: .* of 160x100, the image is 8x6.*f\.calibration\.json"):
         open_source(path)
+
+
+def test_a_folder_of_frames_is_written(tmp_path):
+    folder = tmp_path / "take"
+    writer = FolderWriter(folder)
+    made = frames.frame(np.full((120, 160), 700, np.uint16), np.zeros((120, 160, 3), np.uint8))
+    for _ in range(2):
+        writer.add(made)
+    writer.close()
+    assert sorted(path.name for path in folder.iterdir()) == ["000000.npz", "000001.npz"]
+    np.testing.assert_array_equal(load_frame(folder / "000001.npz").depth, made.depth)
+    with pytest.raises(FileExistsError, match="Holds frame files already"):
+        FolderWriter(folder)
+
+
+def test_a_folder_that_was_made_for_nothing_is_removed(tmp_path):
+    FolderWriter(tmp_path / "new").close()
+    assert list(tmp_path.iterdir()) == []
+    FolderWriter(tmp_path).close()
+    assert tmp_path.is_dir()

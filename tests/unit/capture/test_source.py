@@ -54,8 +54,8 @@ def test_unknown_kinds_are_named_with_those_accepted(uri):
         open_source(uri)
     assert str(caught.value).startswith(uri)
     assert str(caught.value).endswith(
-        "not a known kind of source; accepted: NAME.npz, NAME.oni, a folder of image pairs, "
-            "openni2: or openni2:URI")
+        "not a known kind of source; accepted: NAME.npz, NAME.oni, a folder of .npz, "
+        "a folder of image pairs, openni2: or openni2:URI")
 
 
 @pytest.mark.parametrize("kind", ["npz", "oni", "ONI"])
@@ -72,3 +72,20 @@ def test_importing_capture_is_light():
             "print([m for m in ('primesense', 'cv2', 'open3d', 'scipy') if m in sys.modules])")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_folder_of_frames_in_the_order_of_their_names(saved):
+    folder = saved.parent / "take"
+    folder.mkdir()
+    for name, f in (("b.npz", 2), ("a.npz", 1), ("c.NPZ", 3)):
+        (folder / name).write_bytes(saved.read_bytes())
+        save_frame(folder / name, frames.frame(
+            np.full((120, 160), f, np.uint16), np.zeros((120, 160, 3), np.uint8), OWN))
+    (folder / "notes.txt").write_text("none")
+    with open_source(folder) as source:
+        assert (source.uri, source.frame_count) == (str(folder), 3)
+        assert [int(frame.depth[0, 0]) for frame in source] == [1, 2, 3]
+        assert {frame.calibration_origin for frame in source} == {"npz file"}
+    folder.with_name("take.calibration.json").write_text(BESIDE.to_json())
+    assert {frame.calibration_origin for frame in open_source(folder)} == {
+        "beside: take.calibration.json"}
