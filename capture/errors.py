@@ -3,8 +3,8 @@
 Each error is also the builtin kind that a caller would expect to catch.
 """
 
-__all__ = ["CalibrationError", "CaptureError", "FrameError", "SensorError", "SensorTimeoutError",
-           "UnreadableSourceError", "WrongSizeError"]
+__all__ = ["CalibrationError", "CaptureError", "FrameError", "MismatchedFrameError",
+           "SensorError", "SensorTimeoutError", "UnreadableSourceError", "WrongSizeError"]
 
 
 class CaptureError(Exception):
@@ -17,6 +17,10 @@ class CalibrationError(CaptureError, ValueError):
 
 class FrameError(CaptureError, ValueError):
     """A frame's arrays do not have the shape, dtype or size that its calibration states."""
+
+
+class MismatchedFrameError(FrameError):
+    """Depth and colour show different things, or another geometry than any that is known."""
 
 
 class UnreadableSourceError(CaptureError, OSError):

@@ -49,7 +49,7 @@ class NpzSource(Source):
         self._frame = load_frame(path, chosen)
 
     def __iter__(self) -> Iterator[RgbdFrame]:
-        yield self._frame
+        yield self.prepared(self._frame)
 
     def close(self) -> None:
         """Nothing is held open."""

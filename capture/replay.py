@@ -60,6 +60,10 @@ class Replay(Source):
             if number == self._options.frame:
                 break
 
+    def look_closely(self, *, refuse: bool = False) -> None:
+        """Measure the next frame of what is played."""
+        self._source.look_closely(refuse=refuse)
+
     def close(self) -> None:
         """Close what is played."""
         self._source.close()
@@ -108,7 +112,7 @@ class ReplaySensor(LiveSensor):
 
     Parameters
     ----------
-    uri, calibration : as of `open_source`
+    uri, calibration, rotation : as of `open_source`
 
     Raises
     ------
@@ -116,11 +120,12 @@ class ReplaySensor(LiveSensor):
         As `open_source`.
     """
 
-    def __init__(self, uri: str, calibration: Calibration | str | Path | None = None) -> None:
+    def __init__(self, uri: str, calibration: Calibration | str | Path | None = None,
+                 rotation: int = 0) -> None:
         self.uri = uri
         self.on_change: Callable[[], object] = lambda: None
         self._state, self._reason = LiveState.OPENING, "the recording is being opened"
-        source = open_source(uri, calibration)
+        source = open_source(uri, calibration, rotation=rotation)
         self._source = source if isinstance(source, Replay) else Replay(source, ReplayOptions())
         self._changed = threading.Condition()
         self._shots: deque[Shot] = deque(maxlen=_KEPT)

@@ -19,12 +19,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Protocol, Self, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, Self, runtime_checkable
 
 from denseface.capture.calibration import Calibration
 from denseface.capture.calibration_files import choose_calibration
-from denseface.capture.errors import UnreadableSourceError
+from denseface.capture.errors import MismatchedFrameError, UnreadableSourceError
 from denseface.capture.frame import RgbdFrame
+
+if TYPE_CHECKING:
+    from denseface.capture.preparation import FramePreparation
 
 __all__ = ["ReplayOptions", "Source", "open_source"]
 
@@ -107,11 +110,43 @@ class Source(Protocol):
     """How many frames one pass gives at most; None for a live sensor."""
     repeats: bool = True
     """Whether who wants more frames than a pass gives begins another."""
+    rotation: int = 0
+    """Degrees by which frames are turned, clockwise: 0, 90, 180 or 270."""
+    _preparation: "FramePreparation | None" = None
 
     def __iter__(self) -> Iterator[RgbdFrame]: ...
 
     def close(self) -> None:
         """Release the sensor or file; harmless when repeated."""
+
+    def prepared(self, frame: RgbdFrame) -> RgbdFrame:
+        """Give a frame of this source as its user gets it: put right where needed, and turned.
+
+        Each source passes its frames through this, as its images and calibration make them.
+
+        Raises
+        ------
+        MismatchedFrameError
+            Depth and colour do not belong together, and `look_closely` was told to refuse that.
+        """
+        try:
+            return self._prepare().of(frame)
+        except MismatchedFrameError as error:
+            raise MismatchedFrameError(f"{self.uri}: {error}") from error
+
+    def look_closely(self, *, refuse: bool = False) -> None:
+        """Measure whether depth and colour of the next frame belong together.
+
+        refuse : raise where they do not; otherwise the frame has a note
+        """
+        self._prepare().look_closely(refuse=refuse)
+
+    def _prepare(self) -> "FramePreparation":
+        if self._preparation is None:
+            # Imported late: who only asks for frames' types needs no OpenCV.
+            module = import_module("denseface.capture.preparation")
+            self._preparation = module.FramePreparation(self.rotation)
+        return self._preparation
 
     def __enter__(self) -> Self:
         return self
@@ -120,7 +155,9 @@ class Source(Protocol):
         self.close()
 
 
-def open_source(uri: str | Path, calibration: Calibration | str | Path | None = None) -> Source:
+def open_source(
+    uri: str | Path, calibration: Calibration | str | Path | None = None, *, rotation: int = 0
+) -> Source:
     """Open a recording, a frame file or a live sensor.
 
     Parameters
@@ -129,6 +166,8 @@ def open_source(uri: str | Path, calibration: Calibration | str | Path | None = 
     calibration : a calibration or the path of one (JSON); it wins over ``NAME.calibration.json``
         beside the recording, which wins over what the recording or sensor says of itself, which
         wins over the defaults of the sensor's kind. `RgbdFrame.calibration_origin` says which.
+    rotation : degrees by which frames are turned, clockwise, as of a sensor on its side: 0, 90, 180
+        or 270
 
     Raises
     ------
@@ -159,6 +198,7 @@ def open_source(uri: str | Path, calibration: Calibration | str | Path | None = 
         raise UnreadableSourceError(f"{uri}: a live sensor has no options of a replay")
     source: Source = _class(_SOURCES[kind])(
         path or address or None, choose_calibration(path, calibration))
+    source.rotation = rotation
     if options is None:
         return source
     replay: Source = _class("replay:Replay")(source, options)

@@ -42,7 +42,7 @@ class FolderSource(Source):
 
     def frames_from(self, number: int) -> Iterator[RgbdFrame]:
         """Read the frames from a number on, from 0, without those before it."""
-        return (read_pair(pair, self._reading) for pair in self._pairs[number:])
+        return (self.prepared(read_pair(pair, self._reading)) for pair in self._pairs[number:])
 
     def close(self) -> None:
         """Nothing is held open."""

@@ -64,7 +64,7 @@ class ImagePairSource(Source):
         self._frame = read_pair(ImagePair(Path(depth), Path(color) if color else None), reading)
 
     def __iter__(self) -> Iterator[RgbdFrame]:
-        yield self._frame
+        yield self.prepared(self._frame)
 
     def close(self) -> None:
         """Nothing is held open."""

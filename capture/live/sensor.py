@@ -20,7 +20,7 @@ __all__ = ["LiveSensor", "Shot", "open_sensor"]
 
 _SENSORS = {"openni2:": "openni2:WatchedSensor"}
 """A sensor's scheme, and which class of which module of `capture` looks after it: called with what
-follows the scheme, or None, and the chosen calibration or None."""
+follows the scheme, or None, the chosen calibration or None, and the rotation."""
 
 
 @dataclass(frozen=True)
@@ -90,14 +90,16 @@ class LiveSensor(Protocol):
         """Close the sensor; False where the driver hangs, and the process is to be ended."""
 
 
-def open_sensor(uri: str, calibration: Path | None = None) -> LiveSensor | None:
+def open_sensor(
+    uri: str, calibration: Path | None = None, *, rotation: int = 0
+) -> LiveSensor | None:
     """Begin to look after a live sensor, or to play a recording as if it were one (`rate=real`).
 
     None where the URI is that of another kind of source.
 
     Parameters
     ----------
-    uri, calibration : as of `open_source`
+    uri, calibration, rotation : as of `open_source`
 
     Raises
     ------
@@ -109,7 +111,7 @@ def open_sensor(uri: str, calibration: Path | None = None) -> LiveSensor | None:
     _, options = ReplayOptions.split(uri)
     if options is not None and options.real_time:
         replay: LiveSensor = import_module("denseface.capture.replay").ReplaySensor(
-            uri, calibration)
+            uri, calibration, rotation)
         return replay
     scheme, colon, address = uri.partition(":")
     name = _SENSORS.get(scheme.lower() + colon)
@@ -117,5 +119,6 @@ def open_sensor(uri: str, calibration: Path | None = None) -> LiveSensor | None:
         return None
     module, kind = name.split(":")
     maker = getattr(import_module(f"denseface.capture.{module}"), kind)
-    sensor: LiveSensor = maker(address or None, choose_calibration(None, calibration))
+    sensor: LiveSensor = maker(
+        address or None, choose_calibration(None, calibration), rotation)
     return sensor

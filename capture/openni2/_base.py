@@ -81,13 +81,14 @@ class OpenNI2Source(Source):
                 (depth.shape[1], depth.shape[0]), (color.shape[1], color.shape[0]), registered)
         try:
             # PrimeSense's drivers, and the recordings made through them, cut the fraction off.
-            return RgbdFrame(
+            frame = RgbdFrame(
                 depth, color, *stamps_us, calibration, registered,
                 calibration_origin=chosen,
                 depth_meaning=DepthMeaning(streams.depth_unit_um, DepthRounding.CUT),
                 origin=replace(origin, notes=notes))
         except FrameError as error:
             raise FrameError(f"{self._name}: {error} (calibration: {chosen})") from error
+        return self.prepared(frame)
 
     def _calibration(self, streams: Streams) -> ChosenCalibration:
         """Give the chosen calibration, or what the device says, for the modes that are sent."""

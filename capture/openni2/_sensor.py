@@ -31,14 +31,16 @@ class WatchedSensor(LiveSensor):
     ----------
     device_uri : OpenNI2's URI of the device; None for any one
     chosen : calibration; None for what the sensor says of itself
+    rotation : degrees by which frames are turned, clockwise
     """
 
     def __init__(
-        self, device_uri: str | None = None, chosen: ChosenCalibration | None = None
+        self, device_uri: str | None = None, chosen: ChosenCalibration | None = None,
+        rotation: int = 0,
     ) -> None:
         self.uri = f"openni2:{device_uri or ''}"
         self.on_change: Callable[[], object] = lambda: None
-        self._device_uri, self._chosen = device_uri, chosen
+        self._device_uri, self._chosen, self._rotation = device_uri, chosen, rotation
         self._states = LiveStates(time.monotonic())
         self._past = LiveFigures()
         """Of the time before the sensor was opened last."""
@@ -79,7 +81,7 @@ class WatchedSensor(LiveSensor):
         return self._shot(self._log.newest)
 
     def first_after(self, after_s: float) -> Shot | None:
-        return self._shot(lambda: self._log.first_after(after_s))
+        return self._shot(lambda: self._log.first_after(after_s), closely=True)
 
     def wait(self, number: int, timeout_s: float) -> bool:
         return self._log.wait(number, timeout_s)
@@ -95,13 +97,15 @@ class WatchedSensor(LiveSensor):
         self._thread.join(timeout_s)
         return not self._thread.is_alive()
 
-    def _shot(self, find: Callable[[], LivePair | None]) -> Shot | None:
+    def _shot(self, find: Callable[[], LivePair | None], *, closely: bool = False) -> Shot | None:
         source = self._source
         self._asked = True  # before the look: a pair that comes in between is told
         pair = find() if source is not None else None
         if pair is None or source is None:
             return None
         self._asked = False
+        if closely:
+            source.look_closely()
         try:
             return source.shot(pair)
         except WrongSizeError:  # the driver has changed the size meanwhile
@@ -157,6 +161,7 @@ class WatchedSensor(LiveSensor):
     def _open(self) -> None:
         try:
             source = LiveSource(self._device_uri, self._chosen)
+            source.rotation = self._rotation
         except Exception as error:  # whatever a driver makes the binding raise
             known = isinstance(error, CaptureError)
             self._advance(LiveEvent.REFUSED, str(error) if known else f"{self.uri}: {error!r}")

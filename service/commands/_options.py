@@ -78,6 +78,17 @@ def add_source(parser: argparse.ArgumentParser) -> None:
                              "(default: openni2:)")
     parser.add_argument("--calibration", type=Path, metavar="FILE",
                         help="calibration that wins over the source's own")
+    add_rotation(parser)
+
+
+def add_rotation(
+    parser: argparse.ArgumentParser, action: str = "store", default: int | None = 0
+) -> None:
+    """Add `--rotate`: how a sensor on its side, or its recording, is turned upright."""
+    parser.add_argument("--rotate", type=int, choices=(0, 90, 180, 270), action=action,
+                        default=default,
+                        help="degrees by which images are turned clockwise, as of a sensor on its "
+                             "side or upside down (default: 0)")
 
 
 def add_outputs(parser: argparse.ArgumentParser, *flags: str) -> None:

@@ -21,4 +21,4 @@ def run(args: argparse.Namespace) -> int:
     from denseface.service.daemons import capture
 
     return capture.run(_options.service_settings(args), args.source, args.calibration, supervisor,
-                       args.name)
+                       args.name, rotation=args.rotate)

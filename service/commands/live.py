@@ -22,5 +22,5 @@ def run(args: argparse.Namespace) -> int:
     settings = _options.recon_settings(args)
     from denseface.service.tools import live
 
-    return live.run(args.source, args.calibration, settings, frames=args.frames,
-                    seconds=args.seconds, as_json=args.json)
+    return live.run(args.source, args.calibration, settings, rotation=args.rotate,
+                    frames=args.frames, seconds=args.seconds, as_json=args.json)

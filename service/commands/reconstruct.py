@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from denseface.service.commands import _options
-from denseface.service.runtime.terminal import say
+from denseface.service.runtime.terminal import complain, say
 
 if TYPE_CHECKING:
     from denseface.capture import RgbdFrame
@@ -32,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--calibration", type=Path, metavar="FILE",
                         help="calibration that wins over the file's own: JSON, or OpenCV's or "
                              "ROS's YAML")
+    _options.add_rotation(parser)
     _options.add_recon(parser)
 
 
@@ -42,9 +43,14 @@ def run(args: argparse.Namespace) -> int:
     settings = _options.recon_settings(args)
     frame = _frame(args)
 
-    from denseface.recon import reconstruct
+    from denseface.recon import ReconstructionError, reconstruct
 
-    face = reconstruct(frame, settings)
+    try:
+        face = reconstruct(frame, settings)
+    except ReconstructionError:
+        for note in frame.origin.notes:
+            complain(f"warning: {note}")
+        raise
     files.write(face)
     _options.warn(face)
     report = face.report
@@ -74,7 +80,7 @@ def _frame(args: argparse.Namespace) -> "RgbdFrame":
         if args.frame or args.frames > 1:
             raise UsageError("--frame or --frames is given with --depth: a pair of images is one "
                              "frame")
-        return read_image_pair(args.depth, args.color, args.calibration, reading)
+        return read_image_pair(args.depth, args.color, args.calibration, reading, args.rotate)
     said = unit_mm is not None or registered is not None
     return read_frame(args.input, args.frame, args.calibration, most, args.frames,
-                      reading if said else None)
+                      reading if said else None, args.rotate)

@@ -14,6 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--calibration", type=Path, action="append", metavar="FILE.json",
                         help="calibration that wins over the source's own; with several sources "
                              "one for each, in their order")
+    _options.add_rotation(parser, action="append", default=None)
     parser.add_argument("--workers", type=_worker_count, default=max(1, (os.cpu_count() or 2) - 1),
                         metavar="N", help="reconstruction processes (default: cores less one)")
     _options.add_hub(parser)
@@ -34,12 +35,14 @@ def run(args: argparse.Namespace) -> int:
         common=_options.repeated(args, "address", "log", "debug"),
         hub=_options.repeated(args, "data", "keys", "key", "listen", "retention", "metrics",
                               "preset", "set"),
-        captures=_captures(args.source or ["openni2:"], args.calibration or []))
+        captures=_captures(args.source or ["openni2:"], args.calibration or [], args.rotate or []))
     with ServiceManager(os.environ) as manager:
         return Supervisor(table, max(settings.hang_timeout_s, settings.silence_s), manager).run()
 
 
-def _captures(sources: list[str], calibrations: list[Path]) -> list[list[str]]:
+def _captures(
+    sources: list[str], calibrations: list[Path], rotations: list[int]
+) -> list[list[str]]:
     """Give the flags of each capture process."""
     from denseface.service.errors import UsageError
 
@@ -48,7 +51,13 @@ def _captures(sources: list[str], calibrations: list[Path]) -> list[list[str]]:
     if calibrations and len(calibrations) != len(sources):
         raise UsageError(f"--calibration: {len(calibrations)} given for {len(sources)} sources, "
                          "expected one for each")
-    return [[f"--source={source}", *(f"--calibration={one}" for one in calibrations[at:at + 1])]
+    if len(rotations) not in (0, 1, len(sources)):
+        raise UsageError(f"--rotate: {len(rotations)} given for {len(sources)} sources, expected "
+                         "one for each, or one for all")
+    if len(rotations) == 1:
+        rotations = rotations * len(sources)
+    return [[f"--source={source}", *(f"--calibration={one}" for one in calibrations[at:at + 1]),
+             *(f"--rotate={one}" for one in rotations[at:at + 1])]
             for at, source in enumerate(sources)]
 
 

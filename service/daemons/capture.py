@@ -44,7 +44,8 @@ _log = structlog.get_logger("capture")
 
 
 def run(settings: ServiceSettings, uri: str, calibration: Path | None = None,
-        supervisor: SupervisorLink | None = None, name: str | None = None) -> int:
+        supervisor: SupervisorLink | None = None, name: str | None = None, *,
+        rotation: int = 0) -> int:
     """Serve frames of a source until SIGINT or SIGTERM and give the exit status.
 
     A press gets the first frame of a live sensor that was exposed after it; of a recording the
@@ -58,7 +59,7 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None,
     """
     cv2.setNumThreads(1)
     with StopSignal() as stop:
-        with _supply(settings, uri, calibration) as supply:
+        with _supply(settings, uri, calibration, rotation) as supply:
             try:
                 with HubConnection(settings, "capture", supervisor) as connection:
                     _Capture(settings, connection, supply, uri, name).serve(stop)
@@ -70,12 +71,15 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None,
 
 
 @contextmanager
-def _supply(settings: ServiceSettings, uri: str, calibration: Path | None) -> Iterator[Supply]:
-    if sensor := open_sensor(uri, calibration):
+def _supply(
+    settings: ServiceSettings, uri: str, calibration: Path | None, rotation: int
+) -> Iterator[Supply]:
+    if sensor := open_sensor(uri, calibration, rotation=rotation):
         yield LiveSupply(sensor, settings.take_timeout_s / 2)
         return
     with Background[RgbdFrame | None]("sensor") as driver:
-        yield ReaderSupply(SensorReader(uri, calibration), driver, settings.take_timeout_s)
+        reader = SensorReader(uri, calibration, rotation)
+        yield ReaderSupply(reader, driver, settings.take_timeout_s)
 
 
 @dataclass

@@ -21,9 +21,10 @@ class _LiveSource(Protocol):
 class SensorReader:
     """Reads frames of a sensor or recording; all but `live` is called in the driver's thread."""
 
-    def __init__(self, uri: str, calibration: Path | None) -> None:
+    def __init__(self, uri: str, calibration: Path | None, rotation: int = 0) -> None:
         self.uri = uri
         self._calibration = calibration
+        self._rotation = rotation
         self._source: Source | None = None
         self._frames: Iterator[RgbdFrame] = iter(())
         self._peeked: RgbdFrame | CaptureError | None = None
@@ -37,7 +38,8 @@ class SensorReader:
 
     def open(self) -> None:
         """Open the source; raises as `open_source`."""
-        self._source = open_source(self.uri, calibration=self._calibration)
+        self._source = open_source(
+            self.uri, calibration=self._calibration, rotation=self._rotation)
 
     def take(self) -> RgbdFrame:
         """Give the newest frame of a live sensor; of a recording the next one, over and over.

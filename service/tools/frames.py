@@ -1,5 +1,6 @@
 """One frame out of a file, a folder or a pair of image files."""
 
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
@@ -15,7 +16,7 @@ __all__ = ["read_frame", "read_image_pair"]
 
 def read_frame(
     path: str, number: int, calibration: Path | None, max_pixels: int, burst: int = 1,
-    reading: PairReading | None = None,
+    reading: PairReading | None = None, rotation: int = 0,
 ) -> RgbdFrame:
     """Read a frame of a `.npz` or `.oni` file, or of a folder of image pairs, by its number from 0.
 
@@ -23,6 +24,7 @@ def read_frame(
     ----------
     burst : of how many frames from that one on it is the mean
     reading : how the pairs of a folder are to be understood; None where nothing was said
+    rotation : degrees by which frames are turned, clockwise
 
     Raises
     ------
@@ -30,21 +32,20 @@ def read_frame(
         Where the path names a sensor, there is no frame of that number, or `reading` is said of
         what has no image pairs.
     CaptureError
-        Where the file cannot be read.
+        Where the file cannot be read, or its depth and colour do not belong together.
     FrameTooLargeError
         Where an image of the frame has more than `max_pixels`.
     """
     if path.startswith("openni2:"):
         raise UsageError(f"{path}: expected a .npz or .oni file; `denseface up` serves a sensor")
     with _opened(path, calibration, max_pixels, reading) as source:
+        source.rotation = rotation
         count = source.frame_count
         if count is not None and not 0 <= number < count:
             raise UsageError(f"{path}: has {count} frames (0 to {count - 1}), --frame asks for "
                              f"{number}")
         frames: list[RgbdFrame] = []
-        following = (source.frames_from(number) if isinstance(source, FolderSource)
-                     else islice(source, number, None))
-        for frame in islice(following, burst):
+        for frame in islice(_frames_from(source, number), burst):
             check_frame_size(frame, max_pixels)
             frames.append(frame)
     if not frames:
@@ -56,22 +57,40 @@ def read_frame(
 
 
 def read_image_pair(
-    depth: Path, color: Path | None, calibration: Path | None, reading: PairReading
+    depth: Path, color: Path | None, calibration: Path | None, reading: PairReading,
+    rotation: int = 0,
 ) -> RgbdFrame:
     """Read the frame that two image files make.
 
     Parameters
     ----------
     calibration : its file; None for `NAME.calibration.json` beside the depth image, if there is one
+    rotation : degrees by which it is turned, clockwise
 
     Raises
     ------
     CaptureError
-        Where a file cannot be read, or is not what it should be.
+        Where a file cannot be read or is not what it should be, or both do not belong together.
     """
     chosen = choose_calibration(depth, calibration)
     with ImagePairSource(depth, color, reading._replace(chosen=chosen)) as source:
+        source.rotation = rotation
+        source.look_closely(refuse=True)
         return next(iter(source))
+
+
+def _frames_from(source: Source, number: int) -> Iterator[RgbdFrame]:
+    """Give the frames from that of a number on, the first of which must be one that fits."""
+    if number == 0 or isinstance(source, FolderSource):
+        source.look_closely(refuse=True)
+    if isinstance(source, FolderSource):
+        yield from source.frames_from(number)
+        return
+    for index, frame in enumerate(source):
+        if index >= number:
+            yield frame
+        elif index + 1 == number:
+            source.look_closely(refuse=True)
 
 
 def _opened(

@@ -20,8 +20,8 @@ __all__ = ["reconstruct_frames", "run"]
 
 
 def run(
-    uri: str, calibration: Path | None, settings: Settings, *, frames: int | None = None,
-    seconds: float | None = None, as_json: bool = False,
+    uri: str, calibration: Path | None, settings: Settings, *, rotation: int = 0,
+    frames: int | None = None, seconds: float | None = None, as_json: bool = False,
 ) -> int:
     """Reconstruct the frames of a source, print a summary and give the exit status.
 
@@ -33,7 +33,7 @@ def run(
         Where the source cannot be opened or fails; the summary is printed all the same.
     """
     cv2.setNumThreads(1)
-    with open_source(uri, calibration) as source, StopSignal() as stop:
+    with open_source(uri, calibration, rotation=rotation) as source, StopSignal() as stop:
         begun = time.perf_counter()
         warm()
         warm_ms = (time.perf_counter() - begun) * 1e3
