@@ -55,10 +55,10 @@ class Peers:
         if known := self.sensors.get(peer):
             known.name, known.seen, known.key = name, now, key
             return False
-        same = [one.peer for one in self.sensors.values() if (one.name, one.key) == (name, key)]
+        for one in self.sensors.values():
+            # Its process may have died, and this be the next.
+            one.doubted |= (one.name, one.key) == (name, key)
         self.sensors[peer] = SensorPeer(peer, name, now, key)
-        for older in same:  # its process may have died, and this be the next
-            self.put_last(older)
         return True
 
     def sensor_state(self, peer: bytes, message: SensorState, now: float, key: str = "") -> bool:
@@ -118,13 +118,13 @@ class Peers:
         return min(free, key=lambda worker: len(worker.jobs), default=None)
 
     def sensor(self, name: str | None = None) -> SensorPeer | None:
-        """Return the sensor to ask, the first of those that were not `put_last`; see `choose`."""
+        """Return the sensor to ask; see `choose`."""
         return sensors.choose(self.sensors.values(), name)
 
-    def put_last(self, peer: bytes) -> None:
-        """Ask a sensor only where no other is connected: it lives and gives no frames."""
-        if sensor := self.sensors.pop(peer, None):
-            self.sensors[peer] = sensor
+    def doubt(self, peer: bytes, *, doubted: bool = True) -> None:
+        """Ask a sensor only where no other can be asked: it lives and gives no frames."""
+        if sensor := self.sensors.get(peer):
+            sensor.doubted = doubted
 
     def overdue(self, now: float) -> list[WorkerPeer]:
         """Return the workers whose first job should have been answered."""

@@ -212,6 +212,7 @@ class Presses:
             yield send(peer, messages.FrameRefused(capture_id=capture_id, message=str(error)))
             yield from self._refuse(capture_id, "sensor", str(error))
             return
+        self._peers.doubt(peer, doubted=False)
         press.frame_sender, press.deadline = peer, now + self._settings.take_timeout_s
         self._captures.advance(capture_id, CaptureEvent.FRAME_RECEIVED)
         try:
@@ -312,7 +313,7 @@ class Presses:
             yield from self.refuse_failed()
         for capture_id, press in list(self._presses.items()):
             if now >= press.deadline and press.frame_sender is None:
-                self._peers.put_last(press.sensor)
+                self._peers.doubt(press.sensor)
                 yield from self._refuse(
                     capture_id, "timeout", f"no frame from the sensor in {press.patience_s:g} s")
         for capture_id, press in self._presses.items():

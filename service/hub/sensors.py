@@ -31,6 +31,8 @@ class SensorPeer:
     """Why it does not stream."""
     identity: str = ""
     figures: SensorFigures = field(default_factory=SensorFigures)
+    doubted: bool = False
+    """It was asked for a frame and none came in time, or another took its name."""
 
     @property
     def can_be_asked(self) -> bool:
@@ -58,9 +60,12 @@ class SensorPeer:
 
 
 def choose(sensors: Iterable[SensorPeer], name: str | None) -> SensorPeer | None:
-    """Give the sensor to ask: of this name where there is one, the best off, of these the first."""
+    """Give the sensor to ask: of this name where there is one, the best off, of these the first.
+
+    One that is doubted only where there is no other: whatever it says, it gave no frame.
+    """
     asked = [one for one in sensors if one.can_be_asked and name in (None, one.name)]
-    return min(asked, key=lambda one: _ASKED[one.state], default=None)
+    return min(asked, key=lambda one: (one.doubted, _ASKED[one.state]), default=None)
 
 
 def why_none(sensors: Iterable[SensorPeer], name: str | None) -> str | None:

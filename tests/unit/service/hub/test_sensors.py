@@ -63,6 +63,20 @@ def test_of_two_with_one_name_the_later_is_asked(bench):
     assert asked(press(bench, sensor="s")) == [OTHER]
 
 
+def test_one_that_gave_no_frame_in_time_is_asked_last_until_it_gives_one(bench):
+    state(bench, "streaming")
+    state(bench, "opening", OTHER, "o")
+    assert asked(press(bench)) == [SENSOR]
+    for _ in range(11):
+        bench.say(SENSOR, messages.Heartbeat())
+        bench.say(OTHER, messages.Heartbeat())
+        bench.wait(1.0)
+    assert asked(press(bench, "b")) == [OTHER]
+    assert asked(press(bench, "c", sensor="s")) == [SENSOR]
+    bench.frame("c")
+    assert asked(press(bench, "d")) == [SENSOR]
+
+
 def test_what_a_sensor_says_of_itself_stands_in_the_status(bench):
     bench.sensor()
     figures = SensorFigures(frames=9, drops=2, skew_us=1500)
