@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from denseface.recon.settings import Settings
 from denseface.service import errors, storage
+from denseface.service.hub import sensors
 from denseface.service.hub._common import LOCAL, Common
 from denseface.service.hub.captures import Captures
 from denseface.service.hub.jobs import Jobs
@@ -320,7 +321,7 @@ class Hub:
 
     def _make_status(self, request: int) -> messages.Status:
         counts, counters = self._store.counts(), self._figures.counters
-        known = list(self._peers.sensors.values())
+        known = sensors.best_first(self._peers.sensors.values())
         return messages.Status(
             request=request, epoch=self._store.epoch, sequence=self._store.last_sequence(),
             hub_version=_VERSION,

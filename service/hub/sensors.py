@@ -65,7 +65,17 @@ def choose(sensors: Iterable[SensorPeer], name: str | None) -> SensorPeer | None
     One that is doubted only where there is no other: whatever it says, it gave no frame.
     """
     asked = [one for one in sensors if one.can_be_asked and name in (None, one.name)]
-    return min(asked, key=lambda one: (one.doubted, _ASKED[one.state]), default=None)
+    return min(asked, key=_rank, default=None)
+
+
+def best_first(sensors: Iterable[SensorPeer]) -> list[SensorPeer]:
+    """Sort sensors as `choose` prefers them; those that cannot be asked come last."""
+    return sorted(sensors, key=_rank)
+
+
+def _rank(sensor: SensorPeer) -> tuple[bool, bool, int]:
+    state = _ASKED.get(sensor.state)
+    return state is None, sensor.doubted, state or 0
 
 
 def why_none(sensors: Iterable[SensorPeer], name: str | None) -> str | None:

@@ -59,7 +59,7 @@ class Health:
         elif status.free_bytes < reserve * _MIB:
             found.append(
                 f"disk: {status.free_bytes // _MIB} MiB free, {reserve} MiB are to stay free")
-        if not status.sensors:
+        if not status.has_frames:
             found += [f"sensor: {one.name} is {one.state}{one.reason and f': {one.reason}'}"
                       for one in status.sensor_states] or ["sensor: none is alive"]
         if not status.workers:

@@ -102,4 +102,11 @@ class Status(BaseAnswer):
     @property
     def ready(self) -> bool:
         """A press now would become a face."""
-        return self.state == "serving" and bool(self.sensors) and bool(self.workers)
+        return self.state == "serving" and self.has_frames and bool(self.workers)
+
+    @property
+    def has_frames(self) -> bool:
+        """A sensor streams, or is about to; one that is being opened may yet turn out not to."""
+        if not self.sensor_states:  # an older hub's
+            return bool(self.sensors)
+        return any(one.state in ("streaming", "warming") for one in self.sensor_states)

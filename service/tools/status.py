@@ -29,7 +29,7 @@ def ready_status(client: Client, timeout: float) -> Status:
         left = deadline - time.monotonic()
         if left <= 0:
             missing = ("no hub" if status.state != "serving" else
-                       _no_sensor(status) if not status.sensors else "no worker")
+                       _no_sensor(status) if not status.has_frames else "no worker")
             raise ClientTimeoutError(f"{missing} is ready after {timeout:g} s")
         time.sleep(min(_POLL_S, left))
         status = client.status()

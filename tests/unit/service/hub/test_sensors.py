@@ -91,6 +91,17 @@ def test_what_a_sensor_says_of_itself_stands_in_the_status(bench):
     assert second.reason.isprintable()
 
 
+@pytest.mark.parametrize(("now", "frames"), [
+    ("streaming", True), ("warming", True), ("opening", False), ("blocked", False)])
+def test_a_service_is_ready_when_a_sensor_has_frames(bench, now, frames):
+    bench.worker()
+    state(bench, now)
+    state(bench, "absent", OTHER, "o")
+    ((_, status),) = bench.say(CLIENT, messages.GetStatus(request=1))
+    assert (status.ready, status.has_frames) == (frames, frames)
+    assert [one.name for one in status.sensor_states] == ["s", "o"]
+
+
 def test_a_sensor_that_is_known_by_its_state_alone_gives_frames_and_goes(bench):
     state(bench, "streaming")
     press(bench)
