@@ -13,8 +13,12 @@ How the library's faults are avoided:
   destroyed (`_recording`).
 """
 
+from denseface.capture.openni2._devices import available
+from denseface.capture.openni2._library import find_library as library_folder
+from denseface.capture.openni2._library import library_version
 from denseface.capture.openni2._live import LiveSource
 from denseface.capture.openni2._recording import RecordingSource
 from denseface.capture.openni2._sensor import WatchedSensor
 
-__all__ = ["LiveSource", "RecordingSource", "WatchedSensor"]
+__all__ = ["LiveSource", "RecordingSource", "WatchedSensor", "available", "library_folder",
+           "library_version"]

@@ -16,7 +16,7 @@ from denseface.capture.identity import (
     known_as,
     usb_devices,
 )
-from denseface.capture.openni2._library import open_device
+from denseface.capture.openni2._library import binding_errors, load, open_device
 
 __all__ = ["available", "choose", "identity_of"]
 
@@ -27,7 +27,14 @@ _OPENED_ONCE = "freenect:"
 
 
 def available() -> list[Identity]:
-    """List the sensors, none of which is opened: serial numbers are those that Linux reads."""
+    """List the sensors, none of which is opened: serial numbers are those that Linux reads.
+
+    Raises
+    ------
+    SensorError
+        The library is missing, or refuses.
+    """
+    load()
     devices = usb_devices()
     return distinct(identify(uri, None, devices) for uri in _uris())
 
@@ -76,7 +83,8 @@ def _by_serial(wanted: str | Identity) -> bool:
 
 
 def _uris() -> list[str]:
-    return [uri.decode("utf-8", "replace") for uri in openni2.Device.enumerate_uris()]
+    with binding_errors("OpenNI2 does not list its devices"):
+        return [uri.decode("utf-8", "replace") for uri in openni2.Device.enumerate_uris()]
 
 
 def _serial_of(uri: str) -> str | None:

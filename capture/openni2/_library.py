@@ -66,6 +66,14 @@ def find_library() -> Path:
         f"libopenni2-dev (apt install libopenni2-dev), or name the folder in OPENNI2_REDIST")
 
 
+def library_version() -> str:
+    """Load the library and give its version; raises as `load`."""
+    load()
+    with binding_errors("OpenNI2 does not say its version"):
+        version = openni2.get_version()
+    return f"{version.major}.{version.minor}.{version.maintenance}.{version.build}"
+
+
 def load() -> None:
     """Load and initialise the library, until the process ends: a second initialisation crashes.
 

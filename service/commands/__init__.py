@@ -11,6 +11,7 @@ __all__ = ["COMMANDS", "Command", "load"]
 
 COMMANDS = {
     "reconstruct": "make a dense face of one frame of a file",
+    "doctor": "look for what keeps a sensor from working",
     "live": "reconstruct a source frame after frame and show the times",
     "record": "record a sensor, or any source, to a file or folder",
     "up": "run the whole service on this machine",

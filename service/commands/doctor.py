@@ -1,0 +1,20 @@
+"""`denseface doctor`."""
+
+import argparse
+
+from denseface.service.commands import _options
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    _options.add_client(parser)
+    parser.add_argument("--source", metavar="URI",
+                        help="look at this sensor alone, openni2:NAME with its serial number, USB "
+                             "port or address (default: at all)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    from denseface.service.tools import doctor
+
+    with _options.client(args) as client:
+        return doctor.run(args.source, client, as_json_object=args.json)
