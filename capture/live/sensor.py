@@ -80,6 +80,12 @@ class LiveSensor(Protocol):
         after_s : monotonic clock, seconds
         """
 
+    def lock_exposure(self, *, on: bool) -> None:
+        """Keep exposure and white balance as they are while a burst lasts, or no longer.
+
+        It holds from one of the next frames on. What the driver cannot lock is a note of the frame.
+        """
+
     def wait(self, number: int, timeout_s: float) -> bool:
         """Wait for a pair after that of a number; False where none came. For threads."""
 

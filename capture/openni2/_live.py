@@ -5,16 +5,16 @@ from collections.abc import Iterator
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 
-from primesense import openni2
-
 from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.errors import SensorError, SensorTimeoutError, WrongSizeError
 from denseface.capture.frame import FrameOrigin, RgbdFrame
+from denseface.capture.identity import Identity, find_calibration
 from denseface.capture.live.pairs import LivePair, LivePairs
 from denseface.capture.live.ring import Ring
 from denseface.capture.live.sensor import Shot
 from denseface.capture.live.states import LiveFigures
 from denseface.capture.openni2._base import OpenNI2Source
+from denseface.capture.openni2._devices import choose, identity_of
 from denseface.capture.openni2._library import (
     binding_errors,
     load,
@@ -38,7 +38,10 @@ class LiveSource(OpenNI2Source):
 
     Parameters
     ----------
-    device_uri : OpenNI2's URI of the device; None for the first one
+    wanted : serial number, USB port or OpenNI2's URI of the device, or what it was known as
+        before; None for the first one
+    chosen : calibration; None for the one of this sensor in `calibration_folder()`, or what the
+        sensor says of itself
     timeout_s : how long to wait for a pair
     start : start the streams at once; a recorder has to be attached before
 
@@ -47,6 +50,7 @@ class LiveSource(OpenNI2Source):
     pairs : the clocks and what waits for a partner; there from the start of the streams on
     no_room : frames that were lost because all memory was held
     wrong_size : frames of another size than their mode's, which were dropped
+    known_as : the sensor's serial number, USB port and URI
 
     Raises
     ------
@@ -60,26 +64,24 @@ class LiveSource(OpenNI2Source):
     _live = True
 
     def __init__(
-        self, device_uri: str | None = None, chosen: ChosenCalibration | None = None, *,
+        self, wanted: str | Identity | None = None, chosen: ChosenCalibration | None = None, *,
         timeout_s: float = 5.0, start: bool = True,
     ) -> None:
-        super().__init__(f"openni2:{device_uri or ''}", chosen)
+        super().__init__(f"openni2:{wanted or ''}", chosen)
         self.timeout_s = timeout_s
         self.no_room = self.wrong_size = 0
+        self._settled = self._locked = False
         load()
-        found = openni2.Device.enumerate_uris()
-        if not found:
-            raise SensorError(f"{self._name}: OpenNI2 finds no sensor")
-        wanted = found[0] if device_uri is None else device_uri.encode()
         # OpenNI2 would also open the name of a file.
-        if wanted not in found:
-            known = ", ".join(uri.decode("utf-8", "replace") for uri in found)
-            raise SensorError(f"{self._name}: no such sensor; found: {known}")
+        found = choose(wanted, self._name)
         with binding_errors(f"{self._name}: cannot be opened"):
-            device = open_device(wanted)
+            device = open_device(found.uri.encode())
         self._device_uri = bytes(device.uri)
         lost_devices.discard(self._device_uri)
         streams = self._opened = self._open_streams(device)
+        self.known_as = identity_of(device)
+        if self._chosen is None:
+            self._chosen = self._own_calibration()
         self._rings = {kind: Ring(_SLOTS, streams.frame_bytes(kind)) for kind in streams.kinds}
         self.pairs: LivePairs | None = None
         if start:
@@ -89,6 +91,8 @@ class LiveSource(OpenNI2Source):
         """Start both streams of a source that was made with `start=False`."""
         started_s = time.monotonic()
         self.streams.start()
+        # Some sensors keep what another program locked; some take it while they stream only.
+        self.streams.exposure.unlock()
         self.pairs = LivePairs(dict.fromkeys(self.streams.kinds, started_s))
 
     def __iter__(self) -> Iterator[RgbdFrame]:
@@ -151,26 +155,40 @@ class LiveSource(OpenNI2Source):
         except BaseException:
             slot.release()
             raise
-        return self.pairs.add(kind, slot, stamp_us, time.monotonic())
+        pair = self.pairs.add(kind, slot, stamp_us, time.monotonic())
+        if pair is not None and not self._settled:
+            color = None if pair.color is None else streams.image(COLOR, pair.color.memory)
+            self._settled = streams.exposure.settled(color)
+        return pair
 
     def shot(self, pair: LivePair) -> Shot:
         """Make a frame of a pair that the caller holds; the source may be closed meanwhile."""
         streams = self._opened
         color = None if pair.color is None else streams.image(COLOR, pair.color.memory)
+        doubt = streams.exposure.doubt if self._locked else ""
         middle_s = (pair.earliest_s + pair.latest_s) / 2
         taken = datetime.now(UTC) - timedelta(seconds=time.monotonic() - middle_s)
         origin = FrameOrigin(
             sensor=self.identity, captured_at=taken.isoformat(timespec="milliseconds"),
             exposure_known_by=pair.exposure_known_by, skew_known_by=pair.skew_known_by,
-            notes=pair.notes)
+            notes=pair.notes + ((doubt,) if doubt else ()))
         frame = self._make_frame(streams, streams.image(DEPTH, pair.depth.memory), color,
                                  (pair.depth_us, pair.color_us), origin)
         return Shot(frame, pair.number, pair.earliest_s, pair.latest_s)
 
     @property
     def warm(self) -> bool:
-        """Whether enough pairs came: the clocks are known."""
-        return self.pairs is not None and self.pairs.count >= _WARM_PAIRS
+        """Whether enough pairs came: the clocks are known, the exposure has settled."""
+        return self.pairs is not None and self.pairs.count >= _WARM_PAIRS and self._settled
+
+    def lock_exposure(self, *, on: bool) -> None:
+        """Keep exposure and white balance as they are, or let the camera find them again.
+
+        What the driver cannot lock is said in the frames' notes.
+        """
+        exposure = self.streams.exposure
+        (exposure.lock if on else exposure.unlock)()
+        self._locked = on
 
     @property
     def figures(self) -> LiveFigures:
@@ -203,8 +221,16 @@ class LiveSource(OpenNI2Source):
 
     @property
     def identity(self) -> str:
-        """What the sensor is known by."""
-        return self._device_uri.decode("utf-8", "replace")
+        """What the sensor is known by: serial number, else USB port, else URI."""
+        return self.known_as.name
+
+    def _own_calibration(self) -> ChosenCalibration | None:
+        """Read the calibration file of this sensor; the source is closed where that fails."""
+        try:
+            return find_calibration(self.known_as)
+        except BaseException:
+            self.close()
+            raise
 
     @property
     def streams(self) -> Streams:

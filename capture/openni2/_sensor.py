@@ -4,14 +4,14 @@ import threading
 import time
 from collections.abc import Callable
 
-from primesense import openni2
-
 from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.errors import CaptureError, SensorError, WrongSizeError
+from denseface.capture.identity import Identity
 from denseface.capture.live.pairs import LivePair, PairLog
 from denseface.capture.live.sensor import LiveSensor, Shot
 from denseface.capture.live.states import HANG_S, LiveEvent, LiveFigures, LiveState, LiveStates
-from denseface.capture.openni2._library import binding_errors, load, watched_sensors
+from denseface.capture.openni2._devices import find, why_absent
+from denseface.capture.openni2._library import watched_sensors
 from denseface.capture.openni2._live import LiveSource
 
 _SLICE_S = 0.1
@@ -29,23 +29,27 @@ class WatchedSensor(LiveSensor):
 
     Parameters
     ----------
-    device_uri : OpenNI2's URI of the device; None for any one
+    wanted : serial number, USB port or OpenNI2's URI of the device; None for any one
     chosen : calibration; None for what the sensor says of itself
     rotation : degrees by which frames are turned, clockwise
     """
 
     def __init__(
-        self, device_uri: str | None = None, chosen: ChosenCalibration | None = None,
+        self, wanted: str | None = None, chosen: ChosenCalibration | None = None,
         rotation: int = 0,
     ) -> None:
-        self.uri = f"openni2:{device_uri or ''}"
+        self.uri = f"openni2:{wanted or ''}"
         self.on_change: Callable[[], object] = lambda: None
-        self._device_uri, self._chosen, self._rotation = device_uri, chosen, rotation
+        self._wanted, self._chosen, self._rotation = wanted, chosen, rotation
+        self._lock_exposure = self._exposure_locked = False
         self._states = LiveStates(time.monotonic())
         self._past = LiveFigures()
         """Of the time before the sensor was opened last."""
         self._stuck = ""
-        self._identity = ""
+        self._known_as: Identity | None = None
+        """The sensor that was open last."""
+        self._found: Identity | None = None
+        """The one that is to be opened."""
         self._source: LiveSource | None = None
         self._log = PairLog()
         self._asked = False
@@ -70,7 +74,10 @@ class WatchedSensor(LiveSensor):
 
     @property
     def identity(self) -> str:
-        return self._identity
+        return "" if self._known_as is None else self._known_as.name
+
+    def lock_exposure(self, *, on: bool) -> None:
+        self._lock_exposure = on
 
     @property
     def figures(self) -> LiveFigures:
@@ -137,38 +144,36 @@ class WatchedSensor(LiveSensor):
     def _look(self) -> None:
         """Look for the sensor while it is absent or cannot be had."""
         try:
-            load()
-            with binding_errors(f"{self.uri}: OpenNI2 does not list its devices"):
-                found = openni2.Device.enumerate_uris()
+            found, listed = find(self._wanted)
+            if found is None and self._wanted is not None and self._known_as is not None:
+                found, listed = find(self._known_as)
         except SensorError as error:
             self._advance(LiveEvent.REFUSED, str(error))
             self._stop.wait(_RETRY_S)
             return
-        listed = [uri.decode("utf-8", "replace") for uri in found]
-        if listed and (self._device_uri is None or self._device_uri in listed):
+        if found is not None:
             if self._states.state is LiveState.BLOCKED:
                 self._stop.wait(_RETRY_S)
+            self._found = found
             self._advance(LiveEvent.FOUND, "the sensor is being opened")
             return
         if self._states.state is LiveState.BLOCKED:
             self._advance(LiveEvent.LOST)
-        if not self._identity:
-            self._states.explain(f"{self.uri.rstrip(':')}: " + (
-                f"no such sensor; found: {', '.join(listed)}" if listed else
-                "OpenNI2 finds no sensor"))
+        if self._known_as is None:
+            self._states.explain(why_absent(self.uri.rstrip(":"), listed))
         self._stop.wait(_LOOK_S)
 
     def _open(self) -> None:
         try:
-            source = LiveSource(self._device_uri, self._chosen)
+            source = LiveSource(self._found, self._chosen)
             source.rotation = self._rotation
         except Exception as error:  # whatever a driver makes the binding raise
             known = isinstance(error, CaptureError)
             self._advance(LiveEvent.REFUSED, str(error) if known else f"{self.uri}: {error!r}")
             return
-        self._source = source
-        self._past += LiveFigures(reconnects=int(bool(self._identity)))
-        self._identity = source.identity
+        self._source, self._exposure_locked = source, False
+        self._past += LiveFigures(reconnects=int(self._known_as is not None))
+        self._known_as = source.known_as
         self._last_pair_s = time.monotonic()
         self._advance(LiveEvent.OPENED, "the sensor was just opened and is warming up")
 
@@ -178,6 +183,9 @@ class WatchedSensor(LiveSensor):
         if source is None:
             raise RuntimeError("no sensor is open")
         try:
+            if self._lock_exposure is not self._exposure_locked:
+                self._exposure_locked = self._lock_exposure
+                source.lock_exposure(on=self._exposure_locked)
             pair = source.poll(_SLICE_S)
         except SensorError as error:
             self._advance(LiveEvent.LOST, str(error))

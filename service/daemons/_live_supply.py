@@ -73,6 +73,7 @@ class LiveSupply(Supply):
             if outcome is not None:
                 del self._presses[press.capture_id]
                 yield outcome
+        self._sensor.lock_exposure(on=any(one.wanted > 1 for one in self._presses.values()))
         if self._preview_due and not busy:
             shot = self._sensor.latest()
             if shot is not None and shot.latest_s != self._shown_s:

@@ -23,6 +23,10 @@ class FakeSensor:
         self.state, self.reason = LiveState.STREAMING, ""
         self.figures = LiveFigures(frames=3, skew_us=-12)
         self.shots = []
+        self.locked = []
+
+    def lock_exposure(self, *, on):
+        self.locked.append(on)
 
     def shoot(self, at_s):
         self.shots.append(Shot(small_frame(), len(self.shots) + 1, at_s, at_s + 0.03))
@@ -104,8 +108,10 @@ def test_a_burst_takes_pairs_that_follow_each_other(supply, sensor):
     for at_s in (100.0, 100.033):
         sensor.shoot(at_s)
     assert outcomes(supply) == []
+    assert sensor.locked == [True]
     sensor.shoot(math.nextafter(100.033, math.inf))
     assert len(outcomes(supply)) == 1
+    assert sensor.locked == [True, False]
 
 
 def test_a_preview_shows_the_newest_pair_once(supply, sensor):
