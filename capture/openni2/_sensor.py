@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.errors import CaptureError, SensorError, WrongSizeError
-from denseface.capture.identity import Identity
+from denseface.capture.identity import Identity, usb_devices
 from denseface.capture.live.pairs import LivePair, PairLog
 from denseface.capture.live.sensor import LiveSensor, Shot
 from denseface.capture.live.states import HANG_S, LiveEvent, LiveFigures, LiveState, LiveStates
+from denseface.capture.live.usb import UsbWatch
 from denseface.capture.openni2._devices import find, why_absent
 from denseface.capture.openni2._library import watched_sensors
 from denseface.capture.openni2._live import LiveSource
@@ -45,7 +46,9 @@ class WatchedSensor(LiveSensor):
         self._states = LiveStates(time.monotonic())
         self._past = LiveFigures()
         """Of the time before the sensor was opened last."""
+        self._usb = UsbWatch(usb_devices())
         self._stuck = ""
+        """Why only another process can go on."""
         self._known_as: Identity | None = None
         """The sensor that was open last."""
         self._found: Identity | None = None
@@ -151,6 +154,11 @@ class WatchedSensor(LiveSensor):
             self._advance(LiveEvent.REFUSED, str(error))
             self._stop.wait(_RETRY_S)
             return
+        unlisted = self._usb.unlisted(
+            usb_devices(), [sensor.uri for sensor in listed], time.monotonic())
+        if unlisted and (found is None or self._states.state is LiveState.BLOCKED):
+            self._stuck = f"{unlisted} was plugged in, and OpenNI2 in this process does not list it"
+            self.on_change()
         if found is not None:
             if self._states.state is LiveState.BLOCKED:
                 self._stop.wait(_RETRY_S)
@@ -174,6 +182,7 @@ class WatchedSensor(LiveSensor):
         self._source, self._exposure_locked = source, False
         self._past += LiveFigures(reconnects=int(self._known_as is not None))
         self._known_as = source.known_as
+        self._usb.know(usb_devices())
         self._last_pair_s = time.monotonic()
         self._advance(LiveEvent.OPENED, "the sensor was just opened and is warming up")
 

@@ -108,7 +108,7 @@ class _Capture:
             if packet is not None:
                 self._receive(packet)
             if reason := self.supply.hangs():
-                _log.error("the driver hangs", source=self.uri, reason=reason)
+                _log.error("another process is needed", source=self.uri, reason=reason)
                 exit_now(1)
             for outcome in self.supply.step(busy=len(self.sender) > 0):
                 match outcome:

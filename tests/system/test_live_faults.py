@@ -3,6 +3,8 @@
 The sensor looks after itself here as in the capture process; `test_live_service` has the service.
 """
 
+import shutil
+
 import numpy as np
 import pytest
 
@@ -221,6 +223,31 @@ def test_a_burst_is_of_frames_that_follow_each_other(control, sensor):
     sensor.wait_state("streaming")
     numbers = sensor.ask("burst", 4)
     assert numbers == sorted(set(numbers))
+
+
+def test_a_sensor_that_linux_lists_and_openni2_does_not_needs_a_new_process(
+    control, clip, tmp_path
+):
+    """As where the system does not tell the driver: in a container, or with Freenect's."""
+    usb = tmp_path / "usb"
+
+    def plug(number):
+        (usb / "1-4").mkdir(parents=True)
+        for name, text in (("idVendor", "1d27"), ("idProduct", "0601"), ("busnum", "1"),
+                           ("devnum", str(number))):
+            (usb / "1-4" / name).write_text(text + "\n")
+
+    control.hotplug = False
+    plug(7)
+    env = environment(controls=[control]) | {"FAKE_USB_DEVICES": str(usb)}
+    with Watched(env) as sensor:
+        sensor.wait_state("streaming")
+        control.unplug()
+        shutil.rmtree(usb / "1-4")
+        sensor.wait_state("stalled", "closing", "absent")
+        control.replug()
+        plug(8)
+        assert "Xtion 1d27:0601 at port 1-4 was plugged in" in until(lambda: sensor.ask("stuck"))
 
 
 def test_lost_frames_are_counted(control, sensor):

@@ -5,6 +5,7 @@ of JSON. All times are `time.monotonic` of the machine, so that the test may com
 """
 
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -66,8 +67,13 @@ class Watched:
 def _serve(uri: str) -> None:
     import math
 
+    from denseface.capture import identity
     from denseface.capture.live.sensor import Shot, open_sensor
+    from denseface.capture.openni2 import _devices, _sensor
     from tests.virtual_sensor.marks import read_mark
+
+    if fake := os.environ.get("FAKE_USB_DEVICES"):
+        _devices.usb_devices = _sensor.usb_devices = lambda: identity.usb_devices(Path(fake))
 
     history: list[tuple[str, str, float]] = []
     sensor = open_sensor(uri)
@@ -109,7 +115,8 @@ def _serve(uri: str) -> None:
             "exposed_s": [mark.exposed_ns / 1e9 for mark in marks],
             "earliest_s": shot.earliest_s, "latest_s": shot.latest_s, "skew_us": frame.skew_us,
             "exposure_known_by": origin.exposure_known_by, "captured_at": origin.captured_at,
-            "skew_known_by": origin.skew_known_by, "notes": origin.notes}
+            "skew_known_by": origin.skew_known_by, "notes": origin.notes, "sensor": origin.sensor,
+            "brightness": 0 if frame.color is None else float(frame.color[20:].mean())}
 
     def burst(count: int) -> Any:
         after_s, numbers = time.monotonic(), []
