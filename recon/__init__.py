@@ -4,6 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from denseface.recon.errors import (
+    CoarseDepthError,
     FaceWithoutDepthError,
     ImpossibleFrameError,
     NoDepthError,
@@ -19,9 +20,9 @@ if TYPE_CHECKING:
     from denseface.recon.warmup import warm
 
 __all__ = [
-    "DenseCloud", "Face", "FaceWithoutDepthError", "ImpossibleFrameError", "Neighbors",
-    "NoDepthError", "NoFaceError", "PointCloud", "Preset", "ReconstructionError", "Report",
-    "Settings", "TooLittleDepthError", "reconstruct", "warm",
+    "CoarseDepthError", "DenseCloud", "Face", "FaceWithoutDepthError", "ImpossibleFrameError",
+    "Neighbors", "NoDepthError", "NoFaceError", "PointCloud", "Preset", "ReconstructionError",
+    "Report", "Settings", "TooLittleDepthError", "reconstruct", "warm",
 ]
 
 _MODULES = {"reconstruct": "denseface.recon.pipeline", "warm": "denseface.recon.warmup"}

@@ -1,7 +1,7 @@
 """Why a frame did not become a face: always one of these, never a bad cloud."""
 
-__all__ = ["FaceWithoutDepthError", "ImpossibleFrameError", "NoDepthError", "NoFaceError",
-           "ReconstructionError", "TooLittleDepthError"]
+__all__ = ["CoarseDepthError", "FaceWithoutDepthError", "ImpossibleFrameError", "NoDepthError",
+           "NoFaceError", "ReconstructionError", "TooLittleDepthError"]
 
 
 class ReconstructionError(Exception):
@@ -22,6 +22,10 @@ class FaceWithoutDepthError(ReconstructionError):
 
 class TooLittleDepthError(ReconstructionError):
     """Fewer seeds on the face than a fit needs."""
+
+
+class CoarseDepthError(ReconstructionError):
+    """Depth comes in steps that no face's surface can be told from."""
 
 
 class ImpossibleFrameError(ReconstructionError):

@@ -14,18 +14,21 @@ import cv2
 import numpy as np
 
 from denseface.capture.frame import FrameOrigin, RgbdFrame
+from denseface.capture.rotation import ROTATIONS, rotate_frame
 from denseface.recon.arrays import Floats
 from denseface.recon.detail import add_detail
-from denseface.recon.detection import detect_face
+from denseface.recon.detection import Detection, detect_face, look_for_faces
 from denseface.recon.errors import (
     ImpossibleFrameError,
     NoDepthError,
+    NoFaceError,
     ReconstructionError,
     TooLittleDepthError,
 )
 from denseface.recon.face import Face, PointCloud, Report
 from denseface.recon.intermediate import ColorSampler, Registration, SurfaceGrid
 from denseface.recon.numerics.threads import one_blas_thread
+from denseface.recon.plausibility import check_face, check_steps
 from denseface.recon.propagation import densify, noise_fraction
 from denseface.recon.registration import register, sample_colors, with_shaded_depth
 from denseface.recon.segmentation import box_window, segment_face
@@ -41,6 +44,8 @@ _MOST_MM = 1000.0
 """Seeds farther apart, along x or y, are not on a face."""
 _SPARSE = 4
 """Every so many pixels are enough to find a face and weigh its depth."""
+_TURNED_LOOKS, _FARTHEST_MM = (0, 4), 1300.0
+"""How faces are looked for in turned images: by the coarse and the medium pass, no farther."""
 _MUCH_SKEW_US = 33_000
 """A whole frame at 30 frames a second: the face may have moved in between."""
 
@@ -66,8 +71,9 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     Raises
     ------
     ReconstructionError
-        `NoDepthError`, `NoFaceError`, `FaceWithoutDepthError`, `TooLittleDepthError` or
-        `ImpossibleFrameError`: the same for the same frame, so trying it again does not help.
+        `NoDepthError`, `NoFaceError`, `FaceWithoutDepthError`, `TooLittleDepthError`,
+        `CoarseDepthError` or `ImpossibleFrameError`: the same for the same frame, so trying it
+        again does not help.
     """
     clock = _Stopwatch()
     try:
@@ -96,12 +102,14 @@ def _reconstruct(frame: RgbdFrame, settings: Settings, clock: "_Stopwatch") -> F
     focal_px = frame.calibration.color.fx
     overview = _overview(frame)
     clock.lap("overview")
-    found = detect_face(frame.rgb, overview, focal_px)
+    found = _detect(frame, overview)
     clock.lap("detection")
     registered = register(frame, *box_window(overview, found.box))
+    coarse = check_steps(registered.points[registered.valid][:, 2], found.depth_mm)
     clock.lap("registration")
     seeds = segment_face(registered, found.box, focal_px)
     _check_seeds(seeds.points)
+    check_face(seeds.points, 1 / (frame.depth_camera.fx * frame.depth_camera.fy), found.box)
     clock.lap("segmentation")
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     clock.lap("neighbors")
@@ -120,9 +128,24 @@ def _reconstruct(frame: RgbdFrame, settings: Settings, clock: "_Stopwatch") -> F
         colored=colored, registered=frame.registered and colored,
         depth_unit_um=frame.depth_meaning.unit_um,
         depth_rounding=frame.depth_meaning.rounding, **_of_origin(frame.origin),
-        version=_version(), warnings=_warnings(frame, len(initial), colored=colored),
+        version=_version(), warnings=_warnings(frame, len(initial), coarse, colored=colored),
     )
     return Face(initial, dense, report)
+
+
+def _detect(frame: RgbdFrame, overview: Registration) -> Detection:
+    """Find the face; where there is none, say so if there is one in the turned images."""
+    try:
+        return detect_face(frame.rgb, overview, frame.calibration.color.fx)
+    except NoFaceError as error:
+        for degrees in ROTATIONS[1:]:
+            turned = rotate_frame(frame, degrees)
+            seen = _overview(turned)
+            if any(look_for_faces(turned.rgb, seen, turned.calibration.color.fx, look,
+                                  _FARTHEST_MM).faces for look in _TURNED_LOOKS):
+                raise NoFaceError(f"{error}; there is one when the images are turned by {degrees} "
+                                  f"degrees (--rotate {degrees})") from error
+        raise
 
 
 def _of_origin(origin: FrameOrigin) -> dict[str, Any]:
@@ -182,8 +205,10 @@ def surface_of(
         sampler=sampler if settings.shading else None)
 
 
-def _warnings(frame: RgbdFrame, seeds: int, *, colored: bool) -> tuple[str, ...]:
-    found = list(frame.origin.notes)
+def _warnings(
+    frame: RgbdFrame, seeds: int, coarse: str, *, colored: bool
+) -> tuple[str, ...]:
+    found = [*frame.origin.notes, *filter(None, [coarse])]
     if not colored:
         found.append("the sensor has no colour camera: the face is shaded grey")
     if seeds < _FEW_SEEDS:
