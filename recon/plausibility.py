@@ -21,7 +21,7 @@ _TIMES_ITS_OWN = 2.2
 """A depth in larger steps than so many times the sensor's own went through something coarser."""
 _COARSE_MM, _TOO_COARSE_MM = 4.0, 9.0
 """Steps that are said, and steps that no surface follows: seeds grow over 10 mm from pixel to
-pixel. Of 6 frames with steps of 5 or 8 mm all were faces, of 15 with 10 to 40 mm one: flat discs."""
+pixel. Of 6 frames with steps of 5 or 8 mm all were faces, of 15 with 10 to 40 mm one was."""
 
 _WIDTH_MM, _HEIGHT_MM = (50.0, 280.0), (60.0, 350.0)
 """Narrowest and widest, lowest and highest of what was cut out: of 60 right frames 108 to 148 and
