@@ -73,8 +73,11 @@ class FolderSource(Source):
         self.frame_count = len(self._paths)
 
     def __iter__(self) -> Iterator[RgbdFrame]:
-        for path in self._paths:
-            yield load_frame(path, self._chosen)
+        return self.frames_from(0)
+
+    def frames_from(self, number: int) -> Iterator[RgbdFrame]:
+        """Read the frames from a number on, from 0, without those before it."""
+        return (self.prepared(load_frame(path, self._chosen)) for path in self._paths[number:])
 
     def close(self) -> None:
         """Nothing is held open."""

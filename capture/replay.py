@@ -5,6 +5,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from statistics import median
 
@@ -36,9 +37,9 @@ class Replay(Source):
     """
 
     def __init__(self, source: Source, options: ReplayOptions) -> None:
+        self._source, self._options = source, options
         self.uri = source.uri
         self.repeats = not options.stops
-        self._source, self._options = source, options
         count = source.frame_count
         if options.frame is not None:
             if count is not None and options.frame >= count:
@@ -54,11 +55,17 @@ class Replay(Source):
 
     def chosen(self) -> Iterator[RgbdFrame]:
         """Give the frames of a pass as fast as they are asked for."""
-        for number, frame in enumerate(self._source):
-            if self._options.frame in (None, number):
-                yield frame
-            if number == self._options.frame:
-                break
+        number = self._options.frame
+        return iter(self._source) if number is None else islice(self._source, number, number + 1)
+
+    @property
+    def rotation(self) -> int:
+        """Of what is played."""
+        return self._source.rotation
+
+    @rotation.setter
+    def rotation(self, degrees: int) -> None:
+        self._source.rotation = degrees
 
     def look_closely(self, *, refuse: bool = False) -> None:
         """Measure the next frame of what is played."""
@@ -112,7 +119,7 @@ class ReplaySensor(LiveSensor):
 
     Parameters
     ----------
-    uri, calibration, rotation : as of `open_source`
+    uri, calibration, rotation, raw : as of `open_source`
 
     Raises
     ------
@@ -121,11 +128,11 @@ class ReplaySensor(LiveSensor):
     """
 
     def __init__(self, uri: str, calibration: Calibration | str | Path | None = None,
-                 rotation: int = 0) -> None:
+                 rotation: int = 0, *, raw: bool = False) -> None:
         self.uri = uri
         self.on_change: Callable[[], object] = lambda: None
         self._state, self._reason = LiveState.OPENING, "the recording is being opened"
-        source = open_source(uri, calibration, rotation=rotation)
+        source = open_source(uri, calibration, rotation=rotation, raw=raw)
         self._source = source if isinstance(source, Replay) else Replay(source, ReplayOptions())
         self._changed = threading.Condition()
         self._shots: deque[Shot] = deque(maxlen=_KEPT)

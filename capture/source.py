@@ -29,7 +29,7 @@ from denseface.capture.frame import RgbdFrame
 if TYPE_CHECKING:
     from denseface.capture.preparation import FramePreparation
 
-__all__ = ["ReplayOptions", "Source", "open_source"]
+__all__ = ["ReplayOptions", "Source", "is_folder_of_pairs", "open_source"]
 
 _SOURCES = {
     ".npz": "npz:NpzSource",
@@ -112,6 +112,8 @@ class Source(Protocol):
     """Whether who wants more frames than a pass gives begins another."""
     rotation: int = 0
     """Degrees by which frames are turned, clockwise: 0, 90, 180 or 270."""
+    raw: bool = False
+    """Frames are given as they are, for a recording: neither measured nor turned."""
     _preparation: "FramePreparation | None" = None
 
     def __iter__(self) -> Iterator[RgbdFrame]: ...
@@ -129,6 +131,8 @@ class Source(Protocol):
         MismatchedFrameError
             Depth and colour do not belong together, and `look_closely` was told to refuse that.
         """
+        if self.raw:
+            return frame
         try:
             return self._prepare().of(frame)
         except MismatchedFrameError as error:
@@ -156,7 +160,8 @@ class Source(Protocol):
 
 
 def open_source(
-    uri: str | Path, calibration: Calibration | str | Path | None = None, *, rotation: int = 0
+    uri: str | Path, calibration: Calibration | str | Path | None = None, *, rotation: int = 0,
+    raw: bool = False,
 ) -> Source:
     """Open a recording, a frame file or a live sensor.
 
@@ -168,6 +173,7 @@ def open_source(
         wins over the defaults of the sensor's kind. `RgbdFrame.calibration_origin` says which.
     rotation : degrees by which frames are turned, clockwise, as of a sensor on its side: 0, 90, 180
         or 270
+    raw : give frames as they are, for a recording: neither measured nor turned
 
     Raises
     ------
@@ -187,7 +193,7 @@ def open_source(
         path = Path(text)
         kind = path.suffix.lower()
         if kind not in _SOURCES and text and path.is_dir():
-            kind = "/*.npz" if any(path.glob("*.npz")) else "/"
+            kind = "/" if is_folder_of_pairs(path) else "/*.npz"
         if kind not in _SOURCES:
             raise UnreadableSourceError(f"{text}: not a known kind of source; {_accepted()}")
         if not path.is_file() and not kind.startswith("/"):
@@ -198,11 +204,16 @@ def open_source(
         raise UnreadableSourceError(f"{uri}: a live sensor has no options of a replay")
     source: Source = _class(_SOURCES[kind])(
         path or address or None, choose_calibration(path, calibration))
-    source.rotation = rotation
+    source.rotation, source.raw = rotation, raw
     if options is None:
         return source
     replay: Source = _class("replay:Replay")(source, options)
     return replay
+
+
+def is_folder_of_pairs(path: Path) -> bool:
+    """Whether a path is that of a folder of image pairs: one without frame files."""
+    return path.is_dir() and not any(path.glob("*.npz"))
 
 
 def _class(name: str) -> Any:

@@ -97,7 +97,7 @@ class LiveSensor(Protocol):
 
 
 def open_sensor(
-    uri: str, calibration: Path | None = None, *, rotation: int = 0
+    uri: str, calibration: Path | None = None, *, rotation: int = 0, raw: bool = False
 ) -> LiveSensor | None:
     """Begin to look after a live sensor, or to play a recording as if it were one (`rate=real`).
 
@@ -105,7 +105,7 @@ def open_sensor(
 
     Parameters
     ----------
-    uri, calibration, rotation : as of `open_source`
+    uri, calibration, rotation, raw : as of `open_source`
 
     Raises
     ------
@@ -117,7 +117,7 @@ def open_sensor(
     _, options = ReplayOptions.split(uri)
     if options is not None and options.real_time:
         replay: LiveSensor = import_module("denseface.capture.replay").ReplaySensor(
-            uri, calibration, rotation)
+            uri, calibration, rotation, raw=raw)
         return replay
     scheme, colon, address = uri.partition(":")
     name = _SENSORS.get(scheme.lower() + colon)
@@ -126,5 +126,5 @@ def open_sensor(
     module, kind = name.split(":")
     maker = getattr(import_module(f"denseface.capture.{module}"), kind)
     sensor: LiveSensor = maker(
-        address or None, choose_calibration(None, calibration), rotation)
+        address or None, choose_calibration(None, calibration), rotation, raw=raw)
     return sensor

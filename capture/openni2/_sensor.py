@@ -33,15 +33,17 @@ class WatchedSensor(LiveSensor):
     wanted : serial number, USB port or OpenNI2's URI of the device; None for any one
     chosen : calibration; None for what the sensor says of itself
     rotation : degrees by which frames are turned, clockwise
+    raw : give frames as they are, see `open_source`
     """
 
     def __init__(
         self, wanted: str | None = None, chosen: ChosenCalibration | None = None,
-        rotation: int = 0,
+        rotation: int = 0, *, raw: bool = False,
     ) -> None:
         self.uri = f"openni2:{wanted or ''}"
         self.on_change: Callable[[], object] = lambda: None
-        self._wanted, self._chosen, self._rotation = wanted, chosen, rotation
+        self._wanted, self._chosen = wanted, chosen
+        self._rotation, self._raw = rotation, raw
         self._lock_exposure = self._exposure_locked = False
         self._states = LiveStates(time.monotonic())
         self._past = LiveFigures()
@@ -174,7 +176,7 @@ class WatchedSensor(LiveSensor):
     def _open(self) -> None:
         try:
             source = LiveSource(self._found, self._chosen)
-            source.rotation = self._rotation
+            source.rotation, source.raw = self._rotation, self._raw
         except Exception as error:  # whatever a driver makes the binding raise
             known = isinstance(error, CaptureError)
             self._advance(LiveEvent.REFUSED, str(error) if known else f"{self.uri}: {error!r}")

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("input", metavar="INPUT", nargs="?",
-                        help="a .npz frame, a .oni recording or a folder of image pairs")
+                        help="a .npz frame, a .oni recording, or a folder of frames or image pairs")
     parser.add_argument("--frame", type=int, default=0, metavar="N",
                         help="which frame of the recording, from 0 (default: 0)")
     parser.add_argument("--frames", type=_options.burst, default=1, metavar="N",

@@ -26,7 +26,7 @@ class SensorReader:
         self._calibration = calibration
         self._rotation = rotation
         self._source: Source | None = None
-        self._frames: Iterator[RgbdFrame] = iter(())
+        self._frames: Iterator[RgbdFrame] | None = None
         self._peeked: RgbdFrame | CaptureError | None = None
         """What the next `take` gives of a recording, after a `peek`."""
         self._flush_due = False
@@ -85,8 +85,11 @@ class SensorReader:
         if self._source is None:
             raise SensorError(f"{self.uri}: is not open")
         for _ in range(2):
-            frame = next(self._frames, None)
-            if frame is not None:
-                return frame
+            if self._frames is not None:
+                frame = next(self._frames, None)
+                if frame is not None:
+                    return frame
+                if not getattr(self._source, "repeats", True):  # another's need not say
+                    raise UnreadableSourceError(f"{self.uri}: the recording is at its end")
             self._frames = iter(self._source)
         raise UnreadableSourceError(f"{self.uri}: holds no pair of a depth and a colour frame")

@@ -75,7 +75,7 @@ class FrameReader:
     def _run(self) -> None:
         end: CaptureError | None = None
         try:
-            sensor = open_sensor(self._uri, self._calibration)
+            sensor = open_sensor(self._uri, self._calibration, raw=True)
             frames = self._recorded() if sensor is None else self._taken(sensor)
             for frame in frames:
                 if not self._put(frame):
@@ -85,7 +85,7 @@ class FrameReader:
         self._put(end, always=True)
 
     def _recorded(self) -> Iterator[RgbdFrame]:
-        with open_source(self._uri, self._calibration) as source:
+        with open_source(self._uri, self._calibration, raw=True) as source:
             yield from source
 
     def _taken(self, sensor: LiveSensor) -> Iterator[RgbdFrame]:

@@ -4,21 +4,25 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
-from denseface.capture import RgbdFrame, Source, open_source
+from denseface.capture import RgbdFrame, Source, npz, open_source
 from denseface.capture.burst import fuse
 from denseface.capture.calibration_files import choose_calibration
 from denseface.capture.image_pair import FolderSource, ImagePairSource, PairReading
+from denseface.capture.source import is_folder_of_pairs
 from denseface.service.errors import UsageError
 from denseface.service.protocol.payload import check_frame_size
 
 __all__ = ["read_frame", "read_image_pair"]
+
+_AT_ONCE = FolderSource, npz.FolderSource
+"""Sources that need not read the frames before the one that is asked for."""
 
 
 def read_frame(
     path: str, number: int, calibration: Path | None, max_pixels: int, burst: int = 1,
     reading: PairReading | None = None, rotation: int = 0,
 ) -> RgbdFrame:
-    """Read a frame of a `.npz` or `.oni` file, or of a folder of image pairs, by its number from 0.
+    """Read a frame of a `.npz` or `.oni` file or of a folder of either kind by its number, from 0.
 
     Parameters
     ----------
@@ -81,9 +85,9 @@ def read_image_pair(
 
 def _frames_from(source: Source, number: int) -> Iterator[RgbdFrame]:
     """Give the frames from that of a number on, the first of which must be one that fits."""
-    if number == 0 or isinstance(source, FolderSource):
+    if number == 0 or isinstance(source, _AT_ONCE):
         source.look_closely(refuse=True)
-    if isinstance(source, FolderSource):
+    if isinstance(source, _AT_ONCE):
         yield from source.frames_from(number)
         return
     for index, frame in enumerate(source):
@@ -96,7 +100,7 @@ def _frames_from(source: Source, number: int) -> Iterator[RgbdFrame]:
 def _opened(
     path: str, calibration: Path | None, max_pixels: int, reading: PairReading | None
 ) -> Source:
-    if Path(path).is_dir():
+    if is_folder_of_pairs(Path(path)):
         return FolderSource(Path(path), choose_calibration(Path(path), calibration),
                             (reading or PairReading())._replace(max_pixels=max_pixels))
     if reading is not None:

@@ -85,3 +85,13 @@ def test_a_press_after_a_preview_gets_no_frame_older_than_itself(monkeypatch):
 def test_a_source_that_is_not_open_says_so():
     with pytest.raises(SensorError, match="is not open"):
         SensorReader("x", None).take()
+
+
+def test_a_recording_that_is_to_be_played_once(monkeypatch):
+    source = Recording()
+    source.repeats = False
+    reader = opened(monkeypatch, source)
+    assert [reader.take() for _ in range(3)] == source.frames
+    for _ in range(2):
+        with pytest.raises(UnreadableSourceError, match="x: the recording is at its end"):
+            reader.take()
