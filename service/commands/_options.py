@@ -70,15 +70,16 @@ def add_log(parser: argparse.ArgumentParser) -> None:
                         help="form of the log on stderr (default: text)")
 
 
-def add_source(parser: argparse.ArgumentParser) -> None:
-    """Add `--source` and `--calibration`: where frames come from."""
+def add_source(parser: argparse.ArgumentParser, *, rotated: bool = True) -> None:
+    """Add `--source`, `--calibration` and, where frames are `rotated`, `--rotate`."""
     parser.add_argument("--source", default="openni2:", metavar="URI",
                         help="openni2: for the first sensor, or a .oni or .npz file or a folder "
                              "of .npz, played by options: FILE?rate=real&end=stop&frame=N "
                              "(default: openni2:)")
     parser.add_argument("--calibration", type=Path, metavar="FILE",
                         help="calibration that wins over the source's own")
-    add_rotation(parser)
+    if rotated:
+        add_rotation(parser)
 
 
 def add_rotation(

@@ -9,7 +9,7 @@ from denseface.service.commands import _options
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("output", type=Path, metavar="OUT",
                         help="NAME.oni, or a folder for one .npz frame file each")
-    _options.add_source(parser)
+    _options.add_source(parser, rotated=False)
     parser.add_argument("--seconds", type=_options.seconds, metavar="S",
                         help="end after S seconds (default: at Ctrl-C, or the source's end)")
     parser.add_argument("--frames", type=_options.count, metavar="N", help="end after N frames")

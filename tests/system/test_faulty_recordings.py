@@ -21,14 +21,16 @@ _PERIOD_US = 33_333
 _NUMBERS = """
 import json, sys
 from denseface.capture import open_source
-with open_source(sys.argv[1]) as source:
-    frames = list(source)
-    for frame in frames:
-        # Both images hold the number of the frame that was shown.
-        print(json.dumps({
-            "depth": int(frame.depth[100, 100]) - 1000, "color": round(frame.color[8:40, 8:40, 2]
-            .mean() / 20), "skew_us": frame.skew_us, "skew_known_by": frame.origin.skew_known_by,
-            "notes": frame.origin.notes, "count": source.frame_count}))
+for name in sys.argv[1:]:
+    print(json.dumps(name))
+    with open_source(name) as source:
+        for frame in source:
+            # Both images hold the number of the frame that was shown.
+            print(json.dumps({
+                "depth": int(frame.depth[100, 100]) - 1000,
+                "color": round(frame.color[8:40, 8:40, 2].mean() / 20),
+                "skew_us": frame.skew_us, "skew_known_by": frame.origin.skew_known_by,
+                "notes": frame.origin.notes, "count": source.frame_count}))
 """
 _DEPTH, _COLOR = 1, 2
 
@@ -52,12 +54,20 @@ def recorded(clip) -> bytes:
     return path.read_bytes()
 
 
-def played(tmp_path: Path, content: bytes) -> list[dict]:
-    path = tmp_path / "take.oni"
-    path.write_bytes(content)
-    done = run_python(_NUMBERS, path, env=environment())
+def played(tmp_path: Path, *contents: bytes) -> list[list[dict]]:
+    """Play files in a process of its own; give the frames of each."""
+    paths = [tmp_path / f"take-{number}.oni" for number in range(len(contents))]
+    for path, content in zip(paths, contents, strict=True):
+        path.write_bytes(content)
+    done = run_python(_NUMBERS, *paths, env=environment())
     assert (done.returncode, done.stderr) == (0, "")
-    return [json.loads(line) for line in done.stdout.splitlines()]
+    found: list[list[dict]] = []
+    for line in map(json.loads, done.stdout.splitlines()):
+        if isinstance(line, str):
+            found.append([])
+        else:
+            found[-1].append(line)
+    return found
 
 
 def refusal(tmp_path: Path, content: bytes) -> str:
@@ -73,29 +83,30 @@ def numbers(frames: list[dict]) -> list[tuple[int, int]]:
 
 
 def test_a_whole_recording_has_no_notes(recorded, tmp_path):
-    frames = played(tmp_path, recorded)
+    frames, = played(tmp_path, recorded)
     assert numbers(frames) == [(i, i) for i in range(_FRAMES)]
     for frame in frames:
         assert (frame["notes"], frame["skew_us"]) == ([], 0)
         assert (frame["skew_known_by"], frame["count"]) == ("record order", _FRAMES)
 
 
-@pytest.mark.parametrize("late", [1, 2, 3, 8])
-def test_color_that_began_late_is_paired_with_its_depth(recorded, tmp_path, late):
-    frames = played(tmp_path, began_late(recorded, _COLOR, late))
-    assert numbers(frames) == [(i, i) for i in range(late, _FRAMES)]
-    for frame in frames:
-        assert frame["skew_known_by"] == "record order"
-        assert abs(frame["skew_us"]) <= 1_000
-        assert frame["count"] == _FRAMES - late
-        assert frame["notes"] == [
-            f"the recording's color stream began {late * _PERIOD_US / 1e3:.0f} ms after its depth "
-            "stream, but the time stamps of both start together: depth and color are paired by the "
-            "order of records, known to one frame"]
+def test_color_that_began_late_is_paired_with_its_depth(recorded, tmp_path):
+    lags = (1, 2, 3, 8)
+    found = played(tmp_path, *(began_late(recorded, _COLOR, late) for late in lags))
+    for late, frames in zip(lags, found, strict=True):
+        assert numbers(frames) == [(i, i) for i in range(late, _FRAMES)]
+        for frame in frames:
+            assert frame["skew_known_by"] == "record order"
+            assert abs(frame["skew_us"]) <= 1_000
+            assert frame["count"] == _FRAMES - late
+            assert frame["notes"] == [
+                f"the recording's color stream began {late * _PERIOD_US / 1e3:.0f} ms after its "
+                "depth stream, but the time stamps of both start together: depth and color are "
+                "paired by the order of records, known to one frame"]
 
 
 def test_depth_that_began_late_is_paired_with_its_color(recorded, tmp_path):
-    frames = played(tmp_path, began_late(recorded, _DEPTH, 3))
+    frames, = played(tmp_path, began_late(recorded, _DEPTH, 3))
     # The order allows for one frame more or less.
     assert {color - depth for depth, color in numbers(frames)} <= {0, -1}
     assert all("depth stream began" in frame["notes"][0] for frame in frames)
@@ -112,7 +123,7 @@ def test_color_alone_and_then_depth_alone(recorded, tmp_path):
 
 
 def test_a_recording_without_cropping_is_played(recorded, tmp_path):
-    frames = played(tmp_path, without_cropping(recorded))
+    frames, = played(tmp_path, without_cropping(recorded))
     assert numbers(frames) == [(i, i) for i in range(_FRAMES)]
     assert frames[0]["notes"] == [
         "the recording lacks the Cropping property of the depth stream, the Cropping property of "
@@ -140,15 +151,13 @@ def cuts(content: bytes) -> dict[str, tuple[int, int]]:
     }
 
 
-@pytest.mark.parametrize("where", [
-    "in the end record", "before the end record", "in the table of frames", "after the last frame",
-    "in the last frame", "in the head of the last frame", "before the last frame",
-    "in the middle", "after the first pair"])
-def test_the_whole_frames_of_a_cut_recording_are_used(recorded, tmp_path, where):
-    at, pairs = cuts(recorded)[where]
-    frames = played(tmp_path, recorded[:at])
-    assert numbers(frames) == [(i, i) for i in range(pairs)]
-    assert f"the {pairs} whole frames before that are used" in frames[0]["notes"][0]
+def test_the_whole_frames_of_a_cut_recording_are_used(recorded, tmp_path):
+    wanted = cuts(recorded)
+    found = played(tmp_path, *(recorded[:at] for at, _ in wanted.values()))
+    for frames, (where, (_, pairs)) in zip(found, wanted.items(), strict=True):
+        assert numbers(frames) == [(i, i) for i in range(pairs)], where
+        note = f"the {pairs} whole frames before that are used"
+        assert note in frames[0]["notes"][0], where
 
 
 def test_a_recording_cut_before_its_first_frame(recorded, tmp_path):
@@ -174,7 +183,7 @@ def test_a_recording_of_openni2s_recorder_that_was_killed(clip, tmp_path, how):
                           env=environment(clip) | {"PYTHONPATH": str(root)}) as recorder:
         until(lambda: path.exists() and path.stat().st_size and _pairs(path) >= 5, LIMIT_S)
         recorder.send_signal(how)
-    frames = played(tmp_path, path.read_bytes())
+    frames, = played(tmp_path, path.read_bytes())
     assert len(frames) >= 5
     assert all(a == b for a, b in numbers(frames))
     assert "whole frames before that are used" in frames[0]["notes"][0]

@@ -164,7 +164,7 @@ def test_whatever_ends_a_recording_it_is_whole(control, tmp_path, how):
     assert said.startswith(f"{out}: {pairs(out)} frames")
     frames = played(out)
     assert len(frames) == pairs(out) >= 6
-    assert all(frame["notes"] == [] for frame in frames)
+    assert not any("recording" in note for frame in frames for note in frame["notes"])
 
 
 @pytest.mark.parametrize("name", ["take.oni", "take"])
@@ -176,7 +176,7 @@ def test_a_recording_that_was_killed_is_played(control, tmp_path, name):
     frames = played(out)
     assert len(frames) >= 6
     if not out.is_dir():
-        assert "whole frames before that are used" in frames[0]["notes"][0]
+        assert any("whole frames before that are used" in note for note in frames[0]["notes"])
 
 
 def test_a_recording_says_when_by_what_and_how(control, tmp_path):
