@@ -25,6 +25,10 @@ struct Window {
     }
 };
 
+inline bool sameSize(const ClipHeader& clip, const OniVideoMode& mode) {
+    return mode.resolutionX == int(clip.width) && mode.resolutionY == int(clip.height);
+}
+
 inline void undistort(const Camera& c, double& x, double& y) {
     const double xd = x, yd = y;
     for (int i = 0; i < 20; i++) {
@@ -70,7 +74,9 @@ inline std::vector<uint16_t> scaledDepth(const ClipHeader& h, const uint16_t* de
                                          const OniVideoMode& mode) {
     const Window window(h, mode);
     const int unit = mode.pixelFormat == ONI_PIXEL_FORMAT_DEPTH_100_UM ? 10 : 1;
-    std::vector<uint16_t> out(size_t(mode.resolutionX) * mode.resolutionY);
+    const size_t size = size_t(mode.resolutionX) * mode.resolutionY;
+    if (sameSize(h, mode) && unit == 1) return {depth, depth + size};
+    std::vector<uint16_t> out(size);
     size_t at = 0;
     for (int v = 0; v < mode.resolutionY; v++) {
         const uint16_t* row = depth + size_t(window.row(h, v)) * h.width;
@@ -85,7 +91,9 @@ inline std::vector<uint8_t> scaledColor(const ClipHeader& h, const uint8_t* colo
                                         const OniVideoMode& mode) {
     const Window window(h, mode);
     const int covers = std::max(1, int(std::lround(1 / window.scale)));
-    std::vector<uint8_t> out(size_t(mode.resolutionX) * mode.resolutionY * 3);
+    const size_t size = size_t(mode.resolutionX) * mode.resolutionY * 3;
+    if (sameSize(h, mode)) return {color, color + size};
+    std::vector<uint8_t> out(size);
     size_t at = 0;
     for (int v = 0; v < mode.resolutionY; v++)
         for (int u = 0; u < mode.resolutionX; u++)
