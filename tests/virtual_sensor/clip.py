@@ -60,7 +60,9 @@ def write_clip(
             depth=_pinhole(width, height, zpd_mm / zpps_mm * width / _ZPPS_COLUMNS),
             color=_pinhole(width, height, width / 2 / math.tan(color_fov[0] / 2)),
             depth_to_color=DepthToColor(translation_mm=(-10 * dcrcdis_cm, 0, 0)))
-    with path.open("wb") as file:
+    # Written aside: a driver that has the old one mapped goes on with it.
+    aside = path.with_name(f"{path.name}.part")
+    with aside.open("wb") as file:
         file.write(_HEADER.pack(b"VSENSOR2", 2, len(frames), width, height, zpd_mm, zpps_mm,
                                 lddis_cm, dcrcdis_cm, *depth_fov, *color_fov,
                                 *_geometry(calibration)))
@@ -70,6 +72,7 @@ def write_clip(
                                  f"and color {color.shape}")
             file.write(np.ascontiguousarray(depth, "<u2").tobytes())
             file.write(np.ascontiguousarray(color, np.uint8).tobytes())
+    aside.replace(path)
 
 
 def _geometry(calibration: Calibration) -> list[float]:

@@ -108,7 +108,7 @@ private:
         shared_.changed.notify_all();
         return ONI_STATUS_OK;
     }
-    const std::vector<char>& scene(size_t index);
+    void scene(size_t index);
     void picture(int64_t number, int64_t exposedNs);
     void cut(OniFrame& frame, const std::vector<char>& image) const;
     OniStatus answerOfDepth(int id, void* data, int* size);
@@ -232,15 +232,26 @@ inline void Stream::notifyAllProperties() {
     }
 }
 
-// Registration and scaling take milliseconds: their results are kept, one for each frame of the clip.
-inline const std::vector<char>& Stream::scene(size_t index) {
+// What the camera sees, into `last_`. Registration and scaling take milliseconds: their results are
+// kept, one for each frame of the clip.
+inline void Stream::scene(size_t index) {
+    const Clip& clip = shared_.clip;
     const bool moved = depth && shared_.registered;
+    if (!moved && sameSize(clip.head, mode_) && mode_.pixelFormat != ONI_PIXEL_FORMAT_DEPTH_100_UM) {
+        kept_.clear();
+        const char* image = depth ? reinterpret_cast<const char*>(clip.depth(index))
+                                  : reinterpret_cast<const char*>(clip.color(index));
+        last_.assign(image, image + (depth ? clip.depthSize() : clip.colorSize()));
+        return;
+    }
     if (moved != kept_registered_ || std::memcmp(&kept_mode_, &mode_, sizeof mode_)) kept_.clear();
     kept_registered_ = moved;
     kept_mode_ = mode_;
     std::vector<char>& kept = kept_[index];
-    if (!kept.empty()) return kept;
-    const Clip& clip = shared_.clip;
+    if (!kept.empty()) {
+        last_ = kept;
+        return;
+    }
     if (depth) {
         std::vector<uint16_t> image(clip.depth(index), clip.depth(index) + clip.depthSize() / 2);
         if (moved) image = registered(clip.head, image.data());
@@ -251,14 +262,14 @@ inline const std::vector<char>& Stream::scene(size_t index) {
         const std::vector<uint8_t> image = scaledColor(clip.head, clip.color(index), mode_);
         kept.assign(image.begin(), image.end());
     }
-    return kept;
+    last_ = kept;
 }
 
 inline void Stream::picture(int64_t number, int64_t exposedNs) {
     const int width = mode_.resolutionX, height = mode_.resolutionY;
     // The clip is 30 frames a second, whatever the stream's rate.
     const DeviceControl& words = shared_.control.device;
-    last_ = scene(size_t(number * periodUs() / kClipPeriodUs) % shared_.clip.head.frames);
+    scene(size_t(number * periodUs() / kClipPeriodUs) % shared_.clip.head.frames);
     if (!depth) {
         exposure_.light(last_, words.breathing_per_mille);
         exposure_.step(words.settle_frames);
