@@ -4,7 +4,9 @@ A slot that somebody holds is never written. Where all are held the newest frame
 which the reader counts as lost: it waits for nobody.
 """
 
+import mmap
 import threading
+import weakref
 from collections import deque
 
 import numpy as np
@@ -20,11 +22,13 @@ class Slot:
         self.memory = memory
         """(n,) uint8."""
         self.holders = 0
-        self._ring = ring
+        self._lock = ring.lock
+        # Else a ring that is closed stays, 18 MB, until the garbage collector looks for cycles.
+        self._ring = weakref.ref(ring)
 
     def hold(self) -> "Slot":
         """Hold it once more; only who holds it may let others."""
-        with self._ring.lock:
+        with self._lock:
             if not self.holders:
                 raise RuntimeError("a slot that nobody holds may be written at any time")
             self.holders += 1
@@ -32,12 +36,14 @@ class Slot:
 
     def release(self) -> None:
         """Hold it no more: the last holder gives it back."""
-        with self._ring.lock:
+        with self._lock:
             if not self.holders:
                 raise RuntimeError("a slot was released more often than held")
             self.holders -= 1
             if not self.holders:
-                self._ring.free.append(self)
+                ring = self._ring()
+                if ring is not None:
+                    ring.free.append(self)
 
 
 class Ring:
@@ -53,7 +59,9 @@ class Ring:
         if slots < 1 or size < 1:
             raise ValueError(f"slots and size must be at least 1, got {slots}, {size}")
         self.lock = threading.Lock()
-        self.free = deque(Slot(self, memory) for memory in np.zeros((slots, size), np.uint8))
+        # Mapped, so that it goes back to the system: malloc keeps what threads come and go with.
+        memory = np.frombuffer(mmap.mmap(-1, slots * size), np.uint8).reshape(slots, size)
+        self.free = deque(Slot(self, part) for part in memory)
 
     def claim(self) -> Slot | None:
         """Give the slot that was free for longest, held by the caller; None where none is free."""

@@ -1,6 +1,8 @@
 """Memory that somebody holds is never given out to be written."""
 
+import gc
 import threading
+import weakref
 
 import pytest
 
@@ -63,3 +65,20 @@ def test_threads_never_share_a_slot_that_is_written():
         thread.join()
     assert not wrong
     assert len(ring.free) == 3
+
+
+def test_memory_goes_with_its_ring_at_once():
+    """A sensor that is opened again and again would take more and more."""
+    gc.disable()
+    try:
+        ring = Ring(2, 4)
+        held = ring.claim()
+        assert held is not None
+        memory, free = weakref.ref(held.memory), weakref.ref(ring.free[0])
+        del ring
+        assert free() is None
+        held.release()
+        del held
+        assert memory() is None
+    finally:
+        gc.enable()
