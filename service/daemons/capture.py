@@ -16,6 +16,7 @@ import structlog
 
 from denseface.capture import RgbdFrame
 from denseface.capture.live.sensor import open_sensor
+from denseface.recon.numerics.malloc import share_heaps
 from denseface.service.daemons._frame_sender import FrameSender
 from denseface.service.daemons._live_supply import LiveSupply
 from denseface.service.daemons._reader_supply import ReaderSupply
@@ -58,6 +59,7 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None,
         Where a recording cannot be opened or read. A sensor that is not there is waited for.
     """
     cv2.setNumThreads(1)
+    share_heaps()
     with StopSignal() as stop:
         with _supply(settings, uri, calibration, rotation) as supply:
             try:

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from denseface.recon.numerics.malloc import keep_freed_memory
+from denseface.recon.numerics.malloc import keep_freed_memory, share_heaps
 from tests.waiting import LIMIT_S
 
 _PROGRAM = """
@@ -35,5 +35,6 @@ def test_freed_memory_is_not_fetched_again():
     assert int(kept) < 100
 
 
-def test_says_the_same_when_asked_again():
-    assert keep_freed_memory() is keep_freed_memory()
+@pytest.mark.parametrize("ask", [keep_freed_memory, share_heaps])
+def test_says_the_same_when_asked_again(ask):
+    assert ask() is ask()
