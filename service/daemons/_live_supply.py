@@ -9,12 +9,15 @@ from denseface.capture import RgbdFrame
 from denseface.capture.live.sensor import LiveSensor, Shot
 from denseface.capture.live.states import LiveState
 from denseface.service.daemons._supply import NotTaken, Outcome, Picture, Supply, SupplyState, Taken
+from denseface.service.gate.live import Hinted, LiveGate, NotPassed, Passed
 from denseface.service.protocol import messages
 from denseface.service.protocol.sensor_messages import SensorFigures
 from denseface.service.runtime.wake_pipe import WakePipe
 
 _HOPEFUL = (LiveState.OPENING, LiveState.WARMING, LiveState.STREAMING, LiveState.STALLED)
 """States in which a press waits: there will be frames soon, or it will be known that not."""
+_LOOKED_AT_S = 1.0
+"""After the last preview frames are judged for so long, seconds."""
 
 
 @dataclass
@@ -26,6 +29,10 @@ class _Press:
     """Frames."""
     shots: list[Shot] = field(default_factory=list)
     """Those it has."""
+    gate_s: float = 0.0
+    """How long its gate may wait for a good one."""
+    gated: bool = False
+    """Whether the gate chooses its first frame."""
 
     @property
     def next_s(self) -> float:
@@ -49,6 +56,7 @@ class LiveSupply(Supply):
         self._preview_due = False
         self._shown_s = 0.0
         """`latest_s` of the pair that the last preview showed."""
+        self._gate = LiveGate(sensor, self.wake.wake)
         sensor.on_change = self.wake.wake
 
     @property
@@ -61,37 +69,59 @@ class LiveSupply(Supply):
                                reconnects=figures.reconnects, wrong_size=figures.wrong_size))
 
     def press(self, take: messages.Take) -> None:
-        self._presses.setdefault(
-            take.capture_id, _Press(take.capture_id, time.monotonic(), take.frames))
+        if take.capture_id in self._presses:
+            return
+        press = _Press(take.capture_id, time.monotonic(), take.frames)
+        if take.gate != "off":
+            press.gated, press.gate_s = True, take.gate_timeout
+            self._gate.press(take)
+        self._presses[take.capture_id] = press
 
     def preview(self) -> None:
         self._preview_due = True
+        self._gate.look(_LOOKED_AT_S)
+
+    def send_hints(self, seconds: float) -> None:
+        self._gate.send_hints(seconds)
 
     def step(self, *, busy: bool) -> Iterator[Outcome]:
+        for judged in self._gate.step():
+            match judged:
+                case Hinted():
+                    yield judged
+                case Passed(capture_id, good):
+                    self._presses[capture_id].shots.append(good)
+                case NotPassed(capture_id, last):
+                    del self._presses[capture_id]
+                    yield NotTaken(capture_id, last.refusal, last.hint)
         for press in [*self._presses.values()]:
             outcome = self._serve(press)
             if outcome is not None:
                 del self._presses[press.capture_id]
+                self._gate.withdraw(press.capture_id)
                 yield outcome
         self._sensor.lock_exposure(on=any(one.wanted > 1 for one in self._presses.values()))
         if self._preview_due and not busy:
             shot = self._sensor.latest()
-            if shot is not None and shot.latest_s != self._shown_s:
+            # Picture and hint are of one frame: while it is judged the picture waits.
+            if (shot is not None and shot.latest_s != self._shown_s
+                    and not self._gate.judges(shot)):
                 self._preview_due, self._shown_s = False, shot.latest_s
-                yield Picture(shot.frame)
+                yield Picture(shot.frame, self._gate.hint_of(shot))
 
     def _serve(self, press: _Press) -> Outcome | None:
         while len(press.shots) < press.wanted:
             # The state first: a pair that comes in between is not overlooked.
             state, reason = self._sensor.state, self._sensor.reason
-            shot = self._sensor.first_after(press.next_s)
+            left_to_gate = press.gated and not press.shots
+            shot = None if left_to_gate else self._sensor.first_after(press.next_s)
             if shot is not None:
                 press.shots.append(shot)
                 continue
             if state not in _HOPEFUL:
                 return NotTaken(press.capture_id, reason)
             waited_s = time.monotonic() - press.at_s
-            if waited_s > self._patience_s:
+            if waited_s > self._patience_s + press.gate_s:
                 return NotTaken(press.capture_id, (
                     f"no frame within {waited_s:.1f} s: " + (reason or "none is new enough")))
             return None
@@ -101,6 +131,7 @@ class LiveSupply(Supply):
         return self._sensor.needs_new_process()
 
     def close(self) -> bool:
+        self._gate.close()
         return self._sensor.close()
 
 

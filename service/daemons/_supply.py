@@ -8,11 +8,13 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from denseface.capture import RgbdFrame
+from denseface.service.gate.live import Hinted
 from denseface.service.protocol import messages
+from denseface.service.protocol.hint import Hint
 from denseface.service.protocol.sensor_messages import LiveStateName, SensorFigures
 from denseface.service.runtime.wake_pipe import WakePipe
 
-__all__ = ["NotTaken", "Outcome", "Picture", "Supply", "SupplyState", "Taken"]
+__all__ = ["Hinted", "NotTaken", "Outcome", "Picture", "Supply", "SupplyState", "Taken"]
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,8 @@ class NotTaken:
 
     capture_id: str
     reason: str
+    hint: Hint | None = None
+    """Of the last frame, where frames came and the press's gate let none through."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +40,11 @@ class Picture:
     """The frame of a preview."""
 
     frame: RgbdFrame
+    hint: Hint | None = None
+    """Of this frame, where it was judged."""
 
 
-Outcome = Taken | NotTaken | Picture
+Outcome = Taken | NotTaken | Picture | Hinted
 
 
 @dataclass(frozen=True)
@@ -66,6 +72,9 @@ class Supply(Protocol):
 
     def preview(self) -> None:
         """Ask for a picture: one, however often it is asked for."""
+
+    def send_hints(self, seconds: float) -> None:
+        """Ask for hints from now on, for so long."""
 
     def step(self, *, busy: bool) -> Iterator[Outcome]:
         """Give what became of what was asked for; no pictures while `busy`.

@@ -19,8 +19,8 @@ from denseface.capture.live.sensor import open_sensor
 from denseface.recon.numerics.malloc import share_heaps
 from denseface.service.daemons._frame_sender import FrameSender
 from denseface.service.daemons._live_supply import LiveSupply
-from denseface.service.daemons._reader_supply import ReaderSupply
-from denseface.service.daemons._supply import NotTaken, Picture, Supply, SupplyState, Taken
+from denseface.service.daemons._reader_supply import JudgedFrame, ReaderSupply
+from denseface.service.daemons._supply import Hinted, NotTaken, Picture, Supply, SupplyState, Taken
 from denseface.service.daemons.preview_picture import preview_jpeg
 from denseface.service.daemons.sensor import SensorReader
 from denseface.service.errors import FrameTooLargeError
@@ -79,7 +79,7 @@ def _supply(
     if sensor := open_sensor(uri, calibration, rotation=rotation):
         yield LiveSupply(sensor, settings.take_timeout_s / 2)
         return
-    with Background[RgbdFrame | None]("sensor") as driver:
+    with Background[JudgedFrame | None]("sensor") as driver:
         reader = SensorReader(uri, calibration, rotation)
         yield ReaderSupply(reader, driver, settings.take_timeout_s)
 
@@ -116,10 +116,12 @@ class _Capture:
                 match outcome:
                     case Taken(capture_id, frame):
                         self._taken(capture_id, frame)
-                    case NotTaken(capture_id, reason):
-                        self._no_frame(capture_id, reason)
-                    case Picture(frame):
-                        self._send_preview(frame)
+                    case NotTaken(capture_id, reason, hint):
+                        self._no_frame(capture_id, reason, hint)
+                    case Picture(frame, hint):
+                        self._send_preview(frame, hint)
+                    case Hinted(hint):
+                        self.connection.send(messages.QualityHint(hint=hint))
             self._tell_state()
             self.sender.send_due()
 
@@ -135,6 +137,8 @@ class _Capture:
                     self.supply.press(take)
             case messages.TakePreview():
                 self.supply.preview()
+            case messages.TakeHints(seconds=seconds):
+                self.supply.send_hints(seconds)
             case messages.FrameAccepted(capture_id=capture_id):
                 self.sender.answered(capture_id)
             case messages.FrameRefused(capture_id=capture_id, message=reason):
@@ -168,12 +172,18 @@ class _Capture:
                   exposed_after_press_ms=frame.origin.exposed_after_press_ms)
         self.sender.send(capture_id, frame)
 
-    def _no_frame(self, capture_id: str, reason: str) -> None:
-        _log.error("no frame", capture_id=capture_id, reason=reason)
-        self.connection.send(messages.FrameFailed(capture_id=capture_id, message=reason[:4000]))
+    def _no_frame(
+        self, capture_id: str, reason: str, hint: messages.Hint | None = None
+    ) -> None:
+        say = _log.error if hint is None else _log.info
+        say("no frame", capture_id=capture_id, reason=reason)
+        self.connection.send(messages.FrameFailed(
+            capture_id=capture_id, message=reason[:4000],
+            reason="sensor" if hint is None else "quality", hint=hint))
 
-    def _send_preview(self, frame: RgbdFrame) -> None:
-        header, arrays = PreviewHeader.of_jpeg(preview_jpeg(frame), frame.color_timestamp_us)
+    def _send_preview(self, frame: RgbdFrame, hint: messages.Hint | None) -> None:
+        header, arrays = PreviewHeader.of_jpeg(
+            preview_jpeg(frame), frame.color_timestamp_us, hint)
         self.connection.send(messages.PreviewFrame(preview=header), arrays)
 
 
