@@ -21,7 +21,8 @@ class Hint(BaseModel):
     codes: Annotated[tuple[Code, ...], Field(max_length=8), FailFast()] = ()
     """What is wrong, the most important first; empty where a press now is worth it."""
     text: Annotated[str, Field(max_length=200)] = ""
-    """The first of them in words, for the person: "come closer"."""
+    """The first of them in words, for the person: "come closer". Each is said long enough to be
+    read, so it may still be that of a frame before."""
     measures: Annotated[dict[Code, float], Field(default_factory=dict, max_length=24)]
     """What was measured, each in the unit that its name ends with."""
 
