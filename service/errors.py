@@ -9,12 +9,13 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
 __all__ = [
-    "AddressError", "AuthenticatorStoppedError", "CaptureFailedError", "ClientClosedError",
-    "ClientForkedError", "ClientTimeoutError", "CorruptFileError", "DamagedDatabaseError",
-    "DamagedFaceError", "DiskFullError", "FormatError", "FrameTooLargeError", "HubRunningError",
-    "KeyFileError", "KeyRefusedError", "LocalProtocolError", "PressRefusedError", "ProtocolError",
-    "RemoteProtocolError", "RequestFailedError", "ServiceError", "SettingsError", "StoreError",
-    "UnknownCaptureError", "UsageError", "first_error", "reason_of",
+    "AddressError", "AuthenticatorStoppedError", "CalibrationFailedError", "CaptureFailedError",
+    "ClientClosedError", "ClientForkedError", "ClientTimeoutError", "CorruptFileError",
+    "DamagedDatabaseError", "DamagedFaceError", "DiskFullError", "FormatError",
+    "FrameTooLargeError", "HubRunningError", "KeyFileError", "KeyRefusedError",
+    "LocalProtocolError", "PressRefusedError", "ProtocolError", "RemoteProtocolError",
+    "RequestFailedError", "ServiceError", "SettingsError", "StoreError", "UnknownCaptureError",
+    "UsageError", "first_error", "reason_of",
 ]
 
 
@@ -149,6 +150,10 @@ class HubRunningError(ServiceError, RuntimeError):
 
 class FrameTooLargeError(ServiceError, ValueError):
     """A frame has more pixels than the setting allows."""
+
+
+class CalibrationFailedError(ServiceError, RuntimeError):
+    """The views of a board give no calibration."""
 
 
 class FormatError(ServiceError, ValueError):

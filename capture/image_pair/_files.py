@@ -15,7 +15,7 @@ from denseface.capture.image_pair._headers import read_header
 from denseface.capture.zipped_arrays import read_npy_header
 from denseface.files import open_regular, read_bounded
 
-__all__ = ["MAX_PIXELS", "read_color_image", "read_depth_image"]
+__all__ = ["MAX_PIXELS", "read_color_image", "read_depth_image", "read_grey_image"]
 
 MAX_PIXELS = 2**24
 """Of an image, where the caller does not say; more than any sensor's."""
@@ -25,6 +25,9 @@ _MAX_VALUE_BYTES = 8
 """Of a number in a `.npy`."""
 _NUMBERS = "uif"
 """NumPy's letters of whole numbers and floats."""
+_STRETCHED = (0.5, 99.5)
+"""Percentiles of an infrared image that become black and white: a reflex of the projector is far
+brighter than all else."""
 _DEPTH_DTYPES = "16 or 32 bits, or float"
 
 # OpenCV reads EXR files only where it is told to, when it first meets one.
@@ -79,6 +82,24 @@ def read_color_image(path: str | Path, max_pixels: int = MAX_PIXELS) -> NDArray[
     if image.dtype == np.uint16:
         image = (image >> 8).astype(np.uint8)
     return np.ascontiguousarray(np.broadcast_to(image[..., :3], (*image.shape[:2], 3)))
+
+
+def read_grey_image(path: str | Path, max_pixels: int = MAX_PIXELS) -> NDArray[np.uint8]:
+    """Read an image of any bits as grey, (H, W) uint8, stretched to what its pixels span.
+
+    Infrared images of 16 bits use a small part of them.
+
+    Raises
+    ------
+    UnreadableSourceError, FrameError
+        As from `read_depth_image`.
+    """
+    image = _read(path, max_pixels).astype(np.float32)
+    if image.ndim == 3:
+        image = image[..., :3].mean(axis=2)
+    dark, bright = np.percentile(image[np.isfinite(image)], _STRETCHED) if image.size else (0, 0)
+    stretched = (image - dark) * (255 / max(bright - dark, 1e-6))
+    return np.nan_to_num(stretched, nan=0, posinf=255, neginf=0).clip(0, 255).astype(np.uint8)
 
 
 def _read(path: str | Path, max_pixels: int) -> NDArray[Any]:

@@ -12,6 +12,7 @@ __all__ = ["COMMANDS", "Command", "load"]
 COMMANDS = {
     "reconstruct": "make a dense face of one frame of a file",
     "doctor": "look for what keeps a sensor from working",
+    "calibrate": "find both cameras and their pose by a board that they see",
     "live": "reconstruct a source frame after frame and show the times",
     "record": "record a sensor, or any source, to a file or folder",
     "up": "run the whole service on this machine",
