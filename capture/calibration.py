@@ -384,3 +384,6 @@ class ChosenCalibration(NamedTuple):
     origin: str
     notes: tuple[str, ...] = ()
     """What was assumed when it was read."""
+    registered: bool | None = None
+    """Whether the depth is already in the colour camera's pixels, whatever the source says; None
+    where this is not said."""

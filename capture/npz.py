@@ -144,10 +144,10 @@ def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> Rgb
         (missing,) = _COLOR - arrays.keys()
         raise FrameError(f"{path}: key {missing!r} is missing; color and color_timestamp_us: "
                          "expected both or neither")
-    calibration, origin, notes = chosen or ChosenCalibration(
+    calibration, origin, notes, said = chosen or ChosenCalibration(
         _own_calibration(path, arrays["calibration"]), "npz file")
     depth, color = arrays["depth"], arrays.get("color")
-    registered = bool(arrays.get("registered", False))
+    registered = bool(arrays.get("registered", False)) if said is None else said
     notes += doubts_of(calibration, registered or color is None)
     stamp = int(arrays["depth_timestamp_us"])
     try:

@@ -172,6 +172,9 @@ class ReplaySensor(LiveSensor):
         """Give the first frame that was due at a time or later, monotonic clock."""
         return self._find(after_s, newest=False)
 
+    def lock_exposure(self, *, on: bool) -> None:
+        """Nothing: a recording's exposure is what it was."""
+
     def wait(self, number: int, timeout_s: float) -> bool:
         """Wait for a frame after that of a number."""
         with self._changed:

@@ -46,7 +46,8 @@ def read_calibration(path: str | Path) -> ChosenCalibration:
 
     Known are this project's JSON; OpenCV's YAML and XML with `camera_matrix` and
     `distortion_coefficients`; ROS's `camera_info` YAML; Open3D's JSON of an intrinsic matrix. All
-    but the first describe one camera: it is taken for both, with a note.
+    but the first describe one camera: it is taken for both, with a note. The first may also have
+    `registered`: whether the depth is already in the colour camera's pixels.
 
     Raises
     ------
@@ -69,10 +70,15 @@ def read_calibration(path: str | Path) -> ChosenCalibration:
         if not isinstance(fields, dict) or not _OF_ONE & fields.keys():
             return ChosenCalibration(Calibration.from_json(text, name=str(path)), str(path))
         return _of_one(path, lambda _: fields, text)
+    registered = fields.pop("registered", None)
+    if not isinstance(registered, bool | None):
+        raise CalibrationError(f"{path}: registered: expected true or false, found "
+                               f"{json.dumps(registered)[:40]}")
     for name in ("depth", "color"):
         fields[name] = _with_five(fields[name], f"{path}: {name}") if name in fields else None
     text = json.dumps({name: value for name, value in fields.items() if value is not None})
-    return ChosenCalibration(Calibration.from_json(text, name=str(path)), str(path))
+    return ChosenCalibration(Calibration.from_json(text, name=str(path)), str(path),
+                             registered=registered)
 
 
 def _of_one(path: str | Path, parse: Any, text: str) -> ChosenCalibration:

@@ -119,8 +119,8 @@ def _cameras(
                   if calibration.depth == calibration.color else
                   f"no calibration was given: the cameras are taken for {default.words}",)
     else:
-        calibration, origin, said = reading.chosen
-        notes += said
+        calibration, origin, assumed, _ = reading.chosen
+        notes += assumed
         if not registered and color and calibration.depth == calibration.color and (
                 "depth_to_color" not in calibration.model_fields_set):
             raise CalibrationError(
@@ -142,6 +142,8 @@ def _is_registered(
         return False, ()
     if reading.registered is not None:
         return reading.registered, ()
+    if reading.chosen and reading.chosen.registered is not None:
+        return reading.chosen.registered, ()
     calibration = reading.chosen and reading.chosen.calibration
     two = calibration and (calibration.depth != calibration.color
                            and "depth_to_color" in calibration.model_fields_set)

@@ -72,9 +72,9 @@ class OpenNI2Source(Source):
         stamps_us: tuple[int, int], origin: FrameOrigin,
     ) -> RgbdFrame:
         """Make a frame; `streams` may be closed, `stamps_us` are of depth and of colour."""
-        calibration, chosen, said = self._calibration(streams)
-        registered = self._registered or streams.registered
-        notes = (*streams.notes, *origin.notes, *said,
+        calibration, chosen, assumed, said = self._calibration(streams)
+        registered = (self._registered or streams.registered) if said is None else said
+        notes = (*streams.notes, *origin.notes, *assumed,
                  *doubts_of(calibration, registered or color is None))
         if registered and color is not None and depth.shape != color.shape[:2]:
             calibration, registered = calibration.for_images(

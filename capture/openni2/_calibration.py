@@ -118,7 +118,7 @@ def fit(chosen: ChosenCalibration, depth_size: Size, color_size: Size | None) ->
 
     depth_size, color_size : of the modes in use; None for a sensor without a colour camera
     """
-    calibration, origin, notes = chosen
+    calibration = chosen.calibration
     changed = {}
     for name, camera, size in (("depth", calibration.depth, depth_size),
                                ("color", calibration.color, color_size)):
@@ -129,7 +129,8 @@ def fit(chosen: ChosenCalibration, depth_size: Size, color_size: Size | None) ->
         return chosen
     cut = ", ".join(f"{name} cut to {camera.width}x{camera.height}"
                     for name, camera in changed.items())
-    return ChosenCalibration(calibration.model_copy(update=changed), f"{origin}, {cut}", notes)
+    return chosen._replace(calibration=calibration.model_copy(update=changed),
+                           origin=f"{chosen.origin}, {cut}")
 
 
 def _depth_focal(p: SensorProperties) -> tuple[float, str]:

@@ -1,5 +1,6 @@
 """Recordings through the real OpenNI2 library: made by its recorder, played by its player."""
 
+import json
 import os
 import struct
 from pathlib import Path
@@ -48,6 +49,17 @@ def test_what_is_recorded_is_played(recorded, shown):
 
 def test_the_file_ends_where_its_records_do(recorded):
     assert read_oni(recorded).end == recorded.stat().st_size
+
+
+def test_a_file_beside_a_recording_says_that_its_depth_is_registered(recorded, tmp_path):
+    path = tmp_path / "take.oni"
+    path.write_bytes(recorded.read_bytes())
+    (frame, *_), _ = play(path)
+    beside = json.loads(frame.calibration.to_json()) | {"registered": True}
+    path.with_name("take.calibration.json").write_text(json.dumps(beside))
+    (said, *_), origin = play(path)
+    assert (frame.registered, said.registered) == (False, True)
+    assert origin == "beside: take.calibration.json"
 
 
 def test_a_mirrored_recording_is_turned_back(shown, tmp_path):

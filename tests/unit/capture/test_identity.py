@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.errors import CalibrationError
 from denseface.capture.identity import (
     Identity,
@@ -106,8 +107,8 @@ def test_the_calibration_of_a_sensor(tmp_path):
                          ("S_1", "by serial")):
         path = tmp_path / f"{name}.calibration.json"
         path.write_text(calibration().to_json())
-        assert find_calibration(sensor, tmp_path) == (
-            calibration(), f"{origin}: {name}.calibration.json", ())
+        assert find_calibration(sensor, tmp_path) == ChosenCalibration(
+            calibration(), f"{origin}: {name}.calibration.json")
     path.write_text("{}")
     with pytest.raises(CalibrationError, match=r"S_1\.calibration\.json: depth: Field required"):
         find_calibration(sensor, tmp_path)

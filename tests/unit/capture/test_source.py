@@ -1,5 +1,7 @@
+import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -89,3 +91,22 @@ def test_a_folder_of_frames_in_the_order_of_their_names(saved):
     folder.with_name("take.calibration.json").write_text(BESIDE.to_json())
     assert {frame.calibration_origin for frame in open_source(folder)} == {
         "beside: take.calibration.json"}
+
+
+@pytest.mark.parametrize("said", [True, False])
+def test_a_calibration_file_says_whether_depth_is_registered(saved, said):
+    frame = next(iter(open_source(saved)))
+    save_frame(saved, replace(frame, registered=not said))
+    assert next(iter(open_source(saved, raw=True))).registered is not said
+    beside = saved.with_name("take.1.calibration.json")
+    beside.write_text(json.dumps(json.loads(OWN.to_json()) | {"registered": said}))
+    assert next(iter(open_source(saved, raw=True))).registered is said
+    beside.write_text(OWN.to_json())
+    assert next(iter(open_source(saved, raw=True))).registered is not said
+
+
+def test_a_calibration_file_that_says_it_otherwise(saved):
+    beside = saved.with_name("take.1.calibration.json")
+    beside.write_text(json.dumps(json.loads(OWN.to_json()) | {"registered": "yes"}))
+    with pytest.raises(CalibrationError, match=r'registered: expected true or false, found "yes"'):
+        open_source(saved)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from denseface.capture import Calibration, CameraModel, DepthToColor
+from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.calibration_files import choose_calibration, doubts_of, read_calibration
 from denseface.capture.errors import CalibrationError
 
@@ -55,7 +56,7 @@ def opencv(kind, coefficients=FIVE, **more):
     ROS, f"\n# ours\n{ROS}", opencv("yml"), opencv("xml"), opencv("json")])
 def test_one_camera_of_other_programs(tmp_path, text):
     (tmp_path / "camera.yaml").write_text(text)
-    calibration, _, notes = read_calibration(tmp_path / "camera.yaml")
+    calibration, _, notes, _ = read_calibration(tmp_path / "camera.yaml")
     assert calibration.depth == calibration.color == PAIR.color
     note, = notes
     assert "describes one camera" in note
@@ -85,8 +86,8 @@ def test_a_byte_order_mark_is_left_out(tmp_path, encode):
         (tmp_path / name).write_bytes(encode(text))
         assert read_calibration(tmp_path / name).calibration.color == PAIR.color
     (tmp_path / "f.calibration.json").write_bytes(encode(PAIR.to_json()))
-    assert choose_calibration(tmp_path / "f.npz", None) == (
-        PAIR, "beside: f.calibration.json", ())
+    assert choose_calibration(tmp_path / "f.npz", None) == ChosenCalibration(
+        PAIR, "beside: f.calibration.json")
 
 
 def test_four_coefficients_leave_the_fifth_at_0(tmp_path):

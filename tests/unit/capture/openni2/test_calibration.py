@@ -113,7 +113,7 @@ def test_a_calibration_of_ones_own_for_other_modes():
     mine, _ = derive_calibration(SensorProperties(), VGA, VGA)
     chosen = ChosenCalibration(mine, "argument mine.json")
     assert fit(chosen, VGA, VGA) is chosen
-    calibration, origin, _ = fit(chosen, (320, 240), (1280, 1024))
+    calibration, origin, *_ = fit(chosen, (320, 240), (1280, 1024))
     assert (calibration, origin) == (
         derive_calibration(SensorProperties(), (320, 240), (1280, 1024))[0],
         "argument mine.json, depth cut to 320x240, color cut to 1280x1024")
