@@ -36,7 +36,7 @@ def _look_at(uri: str) -> None:
     _say("opening")
     with LiveSource(uri, timeout_s=_FRAME_S) as source:
         streams = source.streams
-        _say("open", name=source.identity,
+        _say("open", name=source.identity, uri=source.known_as.uri,
              offered={kind: len(modes) for kind, modes in streams.offered.items()},
              chosen={kind: str(streams.mode(kind)) for kind in streams.kinds})
         started_s = time.monotonic()

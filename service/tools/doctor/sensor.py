@@ -93,7 +93,7 @@ def look_at_frame(name: str, answers: Answers, serving: Sequence[str]) -> Iterat
 
     Parameters
     ----------
-    name : the sensor's, for messages
+    name : the sensor's, for messages, until it says itself what it is known as
     answers : of `ask`, with its URI
     serving : names of the sensors that the hub knows: they may be this one
     """
@@ -101,12 +101,13 @@ def look_at_frame(name: str, answers: Answers, serving: Sequence[str]) -> Iterat
         yield warning(name, answers["error"]["text"], "the running service may have it "
                       f"({', '.join(serving)}); to look at it, stop denseface up")
         return
+    name = answers.get("open", {}).get("name", name)
     yield from _failures(name, answers)
     if (said := answers.get("open")) is not None:
         modes = ", ".join(f"{kind} {mode} (of {said['offered'].get(kind, 1)})"
                           for kind, mode in said["chosen"].items())
         alone = "" if "color" in said["chosen"] else ", no color camera"
-        yield ok(name, f"known as {said['name']}, {modes}{alone}")
+        yield ok(name, f"{said['uri']}, {modes}{alone}")
     if (frame := answers.get("frame")) is None:
         return
     yield from _look_at_facts(name, frame)

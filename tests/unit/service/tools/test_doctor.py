@@ -138,7 +138,8 @@ def test_a_sensor_that_openni2_does_not_list():
 
 FRAME = {"skew_ms": 11.7, "skew_known_by": "stamps", "coverage": 0.8, "registered": False,
          "calibration": "device: ZPD 120", "brightness": 120.0, "notes": []}
-OPEN = {"name": "S1", "offered": {"depth": 3, "color": 6},
+OPEN = {"name": "S1", "uri": "1d27/0601@1/17",
+        "offered": {"depth": 3, "color": 6},
         "chosen": {"depth": "640x480 at 30/s as DEPTH_1_MM", "color": "640x480 at 30/s as RGB888"}}
 
 
@@ -151,8 +152,8 @@ def test_a_sensor_in_good_health():
     findings = [*sensor.look_at_frame("S1", frame(), [])]
     assert {finding.level for finding in findings} == {Level.OK}
     assert [finding.text for finding in findings] == [
-        "known as S1, depth 640x480 at 30/s as DEPTH_1_MM (of 3), color 640x480 at 30/s as RGB888 "
-        "(of 6)", "depth in 80% of the image, not registered",
+        "1d27/0601@1/17, depth 640x480 at 30/s as DEPTH_1_MM (of 3), color 640x480 at 30/s as "
+        "RGB888 (of 6)", "depth in 80% of the image, not registered",
         "depth and color 11.7 ms apart, by stamps", "calibration: device: ZPD 120"]
 
 
