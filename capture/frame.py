@@ -1,6 +1,5 @@
 """A synchronized depth + colour frame, what its numbers mean and where it comes from."""
 
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, Self
@@ -163,17 +162,8 @@ class RgbdFrame:
 
     @property
     def depth_camera(self) -> CameraModel:
-        """The camera in whose pixels `depth` is given.
-
-        Registered depth may be of another mode's size than the colour image: 640x480 to 1280x1024.
-        """
-        if not self.registered:
-            return self.calibration.depth
-        color = self.calibration.color
-        height, width = self.depth.shape
-        with suppress(ValueError):  # no known cut: the sizes differ, and it is refused
-            return color.cut_to(width, height)
-        return color
+        """The camera in whose pixels `depth` is given."""
+        return self.calibration.color if self.registered else self.calibration.depth
 
     @property
     def depth_to_color(self) -> DepthToColor:

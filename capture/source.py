@@ -8,7 +8,7 @@ URI                what it opens
 ``FOLDER``         the frames of its ``.npz`` files, in the order of their names; else image pairs,
                    as data sets have them (TUM RGB-D, ScanNet, Open3D)
 ``openni2:``       the first live sensor that OpenNI2 finds
-``openni2:URI``    the live sensor of that OpenNI2 URI
+``openni2:NAME``   the live sensor of that serial number, USB port or OpenNI2 URI
 ================== ===============================================================================
 
 What is read from files may end in ``?`` and options of `ReplayOptions`, such as

@@ -28,6 +28,9 @@ COMMANDS = {
 }
 """What each does, by the name of its module, in the order of `denseface --help`."""
 
+_SUBROOMS = {"doctor": "sensor", "record": "sensor"}
+"""Where a command's module is, if not here."""
+
 
 class Command(Protocol):
     """A subcommand's module."""
@@ -41,4 +44,5 @@ class Command(Protocol):
 
 def load(name: str) -> Command:
     """Import a command's module."""
-    return cast("Command", import_module(f"denseface.service.commands.{name}"))
+    module = f"{_SUBROOMS[name]}.{name}" if name in _SUBROOMS else name
+    return cast("Command", import_module(f"denseface.service.commands.{module}"))

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from denseface.capture.calibration import DepthToColor
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.npz import load_frame
 from tests.simulator import KINECT_DEFAULT
@@ -27,6 +28,12 @@ for uri in sys.argv[2:]:
         for frame in islice(source, 2): pass
         save_frame(f"{sys.argv[1]}/{uri}.npz", frame)
         print(json.dumps([source.streams.notes, source.wrong_size, frame.calibration_origin]))
+"""
+_RECORD = """
+import sys
+from pathlib import Path
+from tests.virtual_sensor.recorder import record
+record(Path(sys.argv[1]), int(sys.argv[2]))
 """
 
 
@@ -208,6 +215,27 @@ def test_registration_is_switched_off_or_said(sensors, tmp_path):
                               if honesty is Honesty.REFUSED else [])
         if off:
             np.testing.assert_array_equal(seen.frame.depth, DEPTH)
+
+
+def test_registered_depth_of_another_size_than_the_colour_image(sensor, tmp_path):
+    """640x480 is in the pixels of the upper 960 rows of 1280x1024."""
+    sensor.registration, sensor.registered_at_start = Honesty.REFUSED, True
+    sensor.color.offer(Mode(1280, 1024, format=RGB))
+    ((frame, *_),) = look(tmp_path, sensor)
+    assert frame.rgb.shape == (1024, 1280, 3)
+    assert (frame.depth_camera.fx, frame.depth_camera.cy) == (pytest.approx(525), 239.5)
+    assert frame.depth_to_color == DepthToColor()
+
+
+@pytest.mark.parametrize("pixels", [YUV, YUYV])
+def test_a_recording_with_yuv_colors(sensor, tmp_path, pixels):
+    sensor.color.offer(Mode(format=pixels))
+    oni = tmp_path / "yuv.oni"
+    done = run_python(_RECORD, oni, 2, env=environment(controls=[sensor]))
+    assert done.returncode == 0, done.stderr
+    (frame,), _ = play(oni, max_frames=1)
+    np.testing.assert_array_equal(frame.depth.ravel()[:-32], DEPTH.ravel()[:-32])
+    assert np.abs(frame.rgb.astype(float) - COLOR).mean() < 3
 
 
 def test_one_frame_of_another_size_is_dropped_and_a_size_that_is_kept_to_is_taken(

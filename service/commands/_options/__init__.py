@@ -73,7 +73,8 @@ def add_log(parser: argparse.ArgumentParser) -> None:
 def add_source(parser: argparse.ArgumentParser, *, rotated: bool = True) -> None:
     """Add `--source`, `--calibration` and, where frames are `rotated`, `--rotate`."""
     parser.add_argument("--source", default="openni2:", metavar="URI",
-                        help="openni2: for the first sensor, or a .oni or .npz file or a folder "
+                        help="openni2: for the first sensor, openni2:NAME for that of a serial "
+                             "number, USB port or address, or a .oni or .npz file or a folder "
                              "of .npz, played by options: FILE?rate=real&end=stop&frame=N "
                              "(default: openni2:)")
     parser.add_argument("--calibration", type=Path, metavar="FILE",

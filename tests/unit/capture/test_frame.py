@@ -21,19 +21,6 @@ def test_registered_depth_is_in_the_colour_cameras_pixels():
     assert registered.depth_to_color == DepthToColor()
 
 
-def test_registered_depth_of_another_mode_than_the_colour_image():
-    """640x480 is the upper part of 1280x1024, at half its size."""
-    color = camera(1280, 1024, f=1050.0).model_copy(update={"cx": 641.0, "cy": 487.0})
-    registered = frame(np.zeros((480, 640), np.uint16), np.zeros((1024, 1280, 3), np.uint8),
-                       calibration(color=color), registered=True)
-    small = registered.depth_camera
-    assert (small.width, small.height, small.fx) == (640, 480, 525)
-    assert (small.cx, small.cy) == (320.25, 243.25)
-    with pytest.raises(FrameError, match="depth is 160x400, its calibration says 1280x1024"):
-        frame(np.zeros((400, 160), np.uint16), np.zeros((1024, 1280, 3), np.uint8),
-              calibration(color=color), registered=True)
-
-
 @pytest.mark.parametrize(("depth", "color", "match"), [
     (DEPTH.astype(np.float32), COLOR, "depth must be a 2-dimensional uint16.*float32"),
     (DEPTH[0], COLOR, "depth must be a 2-dimensional"),

@@ -1,0 +1,1 @@
+"""The subcommands that deal with a sensor alone, without a service."""
