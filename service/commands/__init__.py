@@ -28,7 +28,7 @@ COMMANDS = {
 }
 """What each does, by the name of its module, in the order of `denseface --help`."""
 
-_SUBROOMS = {"doctor": "sensor", "record": "sensor"}
+_SUBROOMS = dict.fromkeys(("calibrate", "doctor", "record"), "sensor")
 """Where a command's module is, if not here."""
 
 
