@@ -1,8 +1,10 @@
 """The virtual sensor does what it is told, as the bare binding sees it."""
 
 import math
+import signal
 import time
 
+import cv2
 import numpy as np
 import pytest
 
@@ -20,10 +22,11 @@ from tests.virtual_sensor.control import (
     OpenFault,
     Stamps,
 )
+from tests.virtual_sensor.marks import read_mark
 from tests.virtual_sensor.process import environment
 from tests.virtual_sensor.raw import Raw
 from tests.virtual_sensor.scenes import cheap_frames
-from tests.waiting import until
+from tests.waiting import LIMIT_S, until
 
 PERIOD_US = 33_333
 FRAMES = cheap_frames(3)
@@ -450,3 +453,39 @@ def test_frames_come_faster_at_a_raised_speed(sensor, raw):
     assert frame["exposed_ns"] - first["exposed_ns"] == numbers * PERIOD_US * 100
     assert frame["timestamp"] - first["timestamp"] == pytest.approx(
         numbers * PERIOD_US / 10, abs=1)
+
+
+def test_freenect_crashes_where_registration_is_asked_for_too_early(tmp_path, clip):
+    sensor = Control(tmp_path / "sensor", clip)
+    presets.as_kinect(sensor)
+    with Raw(environment(controls=[sensor])) as raw:
+        raw.ask("open()")
+        raw.tell("device.get_image_registration_mode()")
+        assert raw.process.wait(LIMIT_S) == -signal.SIGSEGV
+    with Raw(environment(controls=[sensor])) as raw:
+        raw.ask("(open(), create())")
+        assert raw.ask("int(device.get_image_registration_mode())") == 0
+
+
+def test_a_mode_cannot_be_changed_while_the_stream_runs(sensor, raw):
+    sensor.depth.offer(Mode(), Mode(320, 240))
+    opened(raw, "depth")
+    with pytest.raises(RuntimeError, match="ONI_STATUS_OUT_OF_FLOW"):
+        raw.ask("depth.configure_mode(320, 240, 30, 100)")
+    raw.ask("stop('depth')")
+    raw.ask("depth.configure_mode(320, 240, 30, 100)")
+    raw.ask("start('depth')")
+    until(lambda: raw.ask("read('depth')")["width"] == 320)
+
+
+def test_the_mark_outlives_a_preview(sensor, raw):
+    sensor.color.mirrored_at_start = False
+    opened(raw, "color")
+    frame = raw.ask("read('color')")
+    small = cv2.resize(raw.image(), (320, 240), interpolation=cv2.INTER_AREA)
+    for quality in (60, 90):
+        _, data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, quality])
+        mark = read_mark(cv2.imdecode(data, cv2.IMREAD_COLOR))
+        assert mark == (frame["number"], frame["exposed_ns"], False)
+    with pytest.raises(ValueError, match="no mark"):
+        read_mark(FRAMES[0][1])
