@@ -58,11 +58,21 @@ class Recorded:
         """How many pairs of depth and colour there are; without colour, how many depths."""
         if self.color is None:
             return self.depth.frames
+        if self.in_pairs:
+            return min(self.depth.frames, self.color.frames)
         pairer: Pairer[None, None] = Pairer()
         return sum(
             (pairer.add_depth if kind == DEPTH_NODE else pairer.add_color)(
                 stamp + self.shift_us[kind], None) is not None
             for kind, stamp in zip(self.file.order, self.file.stamps_us, strict=True))
+
+    @property
+    def in_pairs(self) -> bool:
+        """Whether depth and colour of a number belong together, whatever their stamps.
+
+        So writes `OniWriter`: who took the frames knew more of their clocks than their stamps say.
+        """
+        return self._described is not None
 
     @property
     def calibration(self) -> ChosenCalibration | None:

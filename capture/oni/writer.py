@@ -51,6 +51,8 @@ class _Node:
     """Width and height, pixels."""
     pixel_bytes: int
     added_at: int = 0
+    ends: bool = False
+    """Whether the file ends: the number of frames is known."""
     seek_table_at: int = 0
     entries: list[tuple[int, int, int]] = field(default_factory=list)
     """Of the table of frames: stamp, configuration, position."""
@@ -58,7 +60,7 @@ class _Node:
     def added(self) -> bytes:
         """Give the record that adds it; before the end, the number of frames is not known."""
         frames, last = records.UNKNOWN_FRAMES, records.UNKNOWN_STAMP
-        if self.seek_table_at:
+        if self.ends:
             frames, last = len(self.entries), max(stamp for stamp, _, _ in self.entries)
         tail = records.NODE_TAIL.pack(self.codec, frames, 0, last, self.seek_table_at)
         return records.record(records.Kind.NODE_ADDED, self.number, records.counted(self.name)
@@ -93,9 +95,12 @@ class _Node:
 
     def ended(self, at: int) -> bytes:
         """Give the records that end it, to stand at that position."""
+        self.ends = True
         removed = records.record(records.Kind.NODE_REMOVED, self.number, replaces=self.added_at)
-        self.seek_table_at = at + len(removed)
         table = b"".join(records.SEEK_ENTRY.pack(*entry) for entry in [(0, 0, 0), *self.entries])
+        if len(table) > records.MAX_IMAGE_BYTES:  # the player reads it into the same buffer
+            return removed
+        self.seek_table_at = at + len(removed)
         return removed + records.record(records.Kind.SEEK_TABLE, self.number, payload=table)
 
     @property

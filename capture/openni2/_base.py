@@ -12,7 +12,7 @@ from denseface.capture.errors import FrameError, SensorError
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
 from denseface.capture.openni2._calibration import Size, derive_calibration, fit
 from denseface.capture.openni2._library import close_handle, open_sources
-from denseface.capture.openni2._streams import COLOR, DEPTH, Image, Streams
+from denseface.capture.openni2._streams import COLOR, DEPTH, Streams
 from denseface.capture.pairing import Pair, Pairer
 from denseface.capture.source import Source
 
@@ -56,7 +56,7 @@ class OpenNI2Source(Source):
             raise
         return streams
 
-    def _add(self, kind: str, image: Image) -> Pair[Any, Any] | None:
+    def _add(self, kind: str, image: tuple[int, Any]) -> Pair[Any, Any] | None:
         if self._streams is not None and COLOR not in self._streams.kinds:
             return Pair(image[1], None, image[0], image[0])
         return (self.pairer.add_depth if kind == DEPTH else self.pairer.add_color)(*image)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from numpy.typing import NDArray
 from primesense import openni2
 
 from denseface.capture.calibration import ChosenCalibration
@@ -19,7 +20,7 @@ from denseface.capture.openni2._base import OpenNI2Source
 from denseface.capture.openni2._library import binding_errors, load, open_sources
 from denseface.capture.openni2._path import ascii_name
 from denseface.capture.openni2._streams import COLOR, DEPTH, Streams
-from denseface.capture.pairing import Pair
+from denseface.capture.pairing import Pair, Pairer
 
 _FILE_WAIT_S = 2.0
 """Longest wait for a frame of a file, seconds: longer, and the file is damaged."""
@@ -53,6 +54,8 @@ class RecordingSource(OpenNI2Source):
         self._expected = {
             kind: node.frames for kind, node in
             ((DEPTH, self._recorded.depth), (COLOR, self._recorded.color)) if node is not None}
+        if self._recorded.in_pairs:
+            self.pairer = Pairer(0)
         self.frame_count = self._recorded.pairs
         if not self.frame_count:
             raise UnreadableSourceError(f"{self.uri}: holds no pair of depth and color: "
@@ -83,9 +86,20 @@ class RecordingSource(OpenNI2Source):
             if max(left.values()) <= 0:
                 # At the end the player's thread would busy-wait.
                 streams.stop()
-            stamp_us, pixels = image
-            if pair := self._add(kind, (stamp_us + self._recorded.shift_us[_NODES[kind]], pixels)):
+            if pair := self._paired(kind, self._expected[kind] - left[kind], *image):
                 yield self._frame(pair)
+
+    def _paired(
+        self, kind: str, number: int, stamp_us: int, pixels: NDArray[Any]
+    ) -> Pair[Any, Any] | None:
+        """Pair an image by its stamp, or by its number in a file of pairs."""
+        stamp_us += self._recorded.shift_us[_NODES[kind]]
+        if not self._recorded.in_pairs or COLOR not in self._expected:
+            return self._add(kind, (stamp_us, pixels))
+        pair = self._add(kind, (number, (stamp_us, pixels)))
+        if pair is None:
+            return None
+        return Pair(pair.depth[1], pair.color[1], pair.depth[0], pair.color[0])
 
     def close(self) -> None:
         """Stop the streams and close the file; harmless when repeated."""

@@ -10,7 +10,8 @@ import pytest
 
 from denseface.capture.oni.file import read_oni
 from tests.virtual_sensor.clip import write_clip
-from tests.virtual_sensor.process import environment, play, record_clip, run_python
+from tests.virtual_sensor.control import Control, Format, Mode
+from tests.virtual_sensor.process import RECORD, environment, play, record_clip, run_python
 
 _JPEG_LOSS = 3.0
 _OPEN = "import sys; from denseface.capture import open_source\nlist(open_source(sys.argv[1]))"
@@ -49,6 +50,24 @@ def test_what_is_recorded_is_played(recorded, shown):
 
 def test_the_file_ends_where_its_records_do(recorded):
     assert read_oni(recorded).end == recorded.stat().st_size
+
+
+@pytest.mark.parametrize("pixel_format", [Format.YUV422, Format.YUYV])
+def test_colour_that_was_recorded_in_another_format_is_read(shown, tmp_path, pixel_format):
+    """As OpenNI2's tools record it: in the mode in which the sensor starts."""
+    write_clip(tmp_path / "clip", shown)
+    oni = tmp_path / "take.oni"
+    with Control(tmp_path / "control", tmp_path / "clip") as control:
+        control.color.offer(Mode(format=pixel_format))
+        done = run_python(RECORD, oni, 4, env=environment(controls=[control]))
+    assert done.returncode == 0, done.stderr
+    frames, _ = play(oni)
+    assert len(frames) >= 4
+    for frame in frames:
+        number = next(i for i, (depth, _) in enumerate(shown)
+                      if (depth == frame.depth).mean() > 0.999)
+        # Its colours are halved along the rows.
+        assert np.abs(frame.color.astype(int) - shown[number][1]).mean() < 3 * _JPEG_LOSS
 
 
 def test_a_file_beside_a_recording_says_that_its_depth_is_registered(recorded, tmp_path):

@@ -219,6 +219,24 @@ def test_a_sensor_without_color_whose_unit_is_a_tenth_of_a_millimetre(control, t
         assert frame["rounding"] == "cut"
 
 
+def test_pairs_that_are_far_apart_stay_pairs(tmp_path):
+    code = ("import sys\nfrom dataclasses import replace\nfrom pathlib import Path\n"
+            "from denseface.capture import open_source\n"
+            "from denseface.capture.oni.writer import OniWriter\n"
+            "writer = OniWriter(Path(sys.argv[2]))\n"
+            "shown = list(open_source(sys.argv[1], raw=True))\n"
+            "for one in shown:\n"
+            "    writer.add(replace(one, color_timestamp_us=one.depth_timestamp_us + 40_000))\n"
+            "writer.close()\n"
+            "played = list(open_source(sys.argv[2], raw=True))\n"
+            "assert [a.skew_us for a in played] == [-40_000] * len(shown) != []\n"
+            "for a, b in zip(shown, played):\n"
+            "    assert (a.depth == b.depth).all()\n"
+            "    assert abs(a.color.astype(int) - b.color).mean() < 3\n")
+    done = run_python(code, RECORDINGS / "turned_18.oni", tmp_path / "b.oni", env=environment())
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_so_many_seconds_into_a_folder(control, tmp_path):
     out = tmp_path / "take"
     with recording(control, out, "--seconds", 0.5) as process:

@@ -29,7 +29,7 @@ from tests.virtual_sensor.build import build
 from tests.virtual_sensor.control import Control
 from tests.waiting import LIMIT_S
 
-__all__ = ["environment", "play", "record_clip", "run_python"]
+__all__ = ["RECORD", "environment", "play", "record_clip", "run_python"]
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PLAY = """
@@ -42,7 +42,7 @@ with open_source(sys.argv[1]) as source:
         save_frame(f"{sys.argv[2]}/{number}.npz", frame)
         print(frame.calibration_origin)
 """
-_RECORD = """
+RECORD = """
 import sys
 from pathlib import Path
 from tests.virtual_sensor.recorder import record
@@ -87,7 +87,7 @@ def run_python(
 
 
 def record_clip(
-    clip: Path, out: Path, frames: int, *, code: str = _RECORD, attempts: int = 8
+    clip: Path, out: Path, frames: int, *, code: str = RECORD, attempts: int = 8
 ) -> None:
     """Record the virtual sensor with OpenNI2's own recorder: exactly the clip's frames.
 

@@ -98,6 +98,27 @@ def test_what_the_frames_mean_is_kept(writer):
         "A00365", "2026-11-29T12:00:00.033+00:00", skew_known_by="stamps")
 
 
+@pytest.mark.parametrize("skew_us", [25_000, -40_000, 900_000])
+def test_pairs_that_are_far_apart_stay_pairs(writer, skew_us):
+    """As of a sensor whose streams are slow, or have clocks of their own."""
+    for number in range(4):
+        one = frame(number)
+        writer.add(replace(one, color_timestamp_us=one.depth_timestamp_us - skew_us))
+    recorded = Recorded(writer.path)
+    assert recorded.pairs == 4
+    assert recorded.shift_us == {DEPTH_NODE: 0, IMAGE_NODE: 0}
+
+
+def test_more_frames_than_the_player_has_room_for_in_their_table(writer, monkeypatch):
+    for number in range(3):
+        writer.add(frame(number))
+    monkeypatch.setattr(records, "MAX_IMAGE_BYTES", 70)
+    writer.close()
+    found = read_oni(writer.path)
+    assert found.cut is None
+    assert [(node.frames, node.seek_table_at) for node in found.nodes.values()] == [(3, 0), (3, 0)]
+
+
 def test_a_sensor_without_color(writer):
     writer.add(without_color())
     writer.close()
