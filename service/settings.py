@@ -67,6 +67,8 @@ class ServiceSettings(BaseModel):
     """Times that a frame is tried before it becomes a dead letter."""
     take_timeout_s: _Seconds = 10.0
     """Longest wait for the sensor's frame after a press, seconds."""
+    sensor_delay_ms: Annotated[float, Field(ge=0, le=1000)] = 70.0
+    """Longest time from an exposure of a live sensor to its frame's arrival, milliseconds."""
     max_frame_pixels: Annotated[int, Field(ge=1, le=_MESSAGE_PIXELS)] = 2**23
     """Most pixels of a frame's depth or colour image; a larger frame is refused."""
     job_timeout_s: _Seconds = 60.0

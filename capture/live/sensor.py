@@ -13,6 +13,7 @@ from typing import Protocol
 
 from denseface.capture.calibration_files import choose_calibration
 from denseface.capture.frame import RgbdFrame
+from denseface.capture.live.clock import TRANSPORT_S
 from denseface.capture.live.states import LiveFigures, LiveState
 from denseface.capture.source import ReplayOptions
 
@@ -97,7 +98,8 @@ class LiveSensor(Protocol):
 
 
 def open_sensor(
-    uri: str, calibration: Path | None = None, *, rotation: int = 0, raw: bool = False
+    uri: str, calibration: Path | None = None, *, rotation: int = 0, raw: bool = False,
+    transport_s: float = TRANSPORT_S,
 ) -> LiveSensor | None:
     """Begin to look after a live sensor, or to play a recording as if it were one (`rate=real`).
 
@@ -106,6 +108,7 @@ def open_sensor(
     Parameters
     ----------
     uri, calibration, rotation, raw : as of `open_source`
+    transport_s : longest time from a frame's exposure to its arrival
 
     Raises
     ------
@@ -126,5 +129,6 @@ def open_sensor(
     module, kind = name.split(":")
     maker = getattr(import_module(f"denseface.capture.{module}"), kind)
     sensor: LiveSensor = maker(
-        address or None, choose_calibration(None, calibration), rotation, raw=raw)
+        address or None, choose_calibration(None, calibration), rotation, raw=raw,
+        transport_s=transport_s)
     return sensor

@@ -82,7 +82,7 @@ HANG_S: dict[LiveState, float] = dict.fromkeys(LiveState, 5.0) | {
 process helps. Where nothing is amiss, waiting for a frame takes 0.1 s at most and opening 0.25 s.
 """
 
-PATIENCE_S: dict[LiveState, float] = {LiveState.WARMING: 4.0, LiveState.STALLED: 0.7}
+PATIENCE_S: dict[LiveState, float] = {LiveState.WARMING: 4.0, LiveState.STALLED: 0.5}
 """States that wait for frames, and how long, seconds; beyond, the sensor is closed and opened
 again. A PS1080 sends its first frame within 1 s of the start; two more seconds are the exposure's.
 """

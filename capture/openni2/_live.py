@@ -9,6 +9,7 @@ from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.errors import SensorError, SensorTimeoutError, WrongSizeError
 from denseface.capture.frame import FrameOrigin, RgbdFrame
 from denseface.capture.identity import Identity, find_calibration
+from denseface.capture.live.clock import TRANSPORT_S
 from denseface.capture.live.pairs import LivePair, LivePairs
 from denseface.capture.live.ring import Ring
 from denseface.capture.live.sensor import Shot
@@ -44,6 +45,7 @@ class LiveSource(OpenNI2Source):
         sensor says of itself
     timeout_s : how long to wait for a pair
     start : start the streams at once; a recorder has to be attached before
+    transport_s : longest time from a frame's exposure to its arrival
 
     Attributes
     ----------
@@ -65,10 +67,10 @@ class LiveSource(OpenNI2Source):
 
     def __init__(
         self, wanted: str | Identity | None = None, chosen: ChosenCalibration | None = None, *,
-        timeout_s: float = 5.0, start: bool = True,
+        timeout_s: float = 5.0, start: bool = True, transport_s: float = TRANSPORT_S,
     ) -> None:
         super().__init__(f"openni2:{wanted or ''}", chosen)
-        self.timeout_s = timeout_s
+        self.timeout_s, self._transport_s = timeout_s, transport_s
         self.no_room = self.wrong_size = 0
         self._settled = self._locked = False
         load()
@@ -93,7 +95,8 @@ class LiveSource(OpenNI2Source):
         self.streams.start()
         # Some sensors keep what another program locked; some take it while they stream only.
         self.streams.exposure.unlock()
-        self.pairs = LivePairs(dict.fromkeys(self.streams.kinds, started_s))
+        self.pairs = LivePairs(
+            dict.fromkeys(self.streams.kinds, started_s), self._transport_s)
 
     def __iter__(self) -> Iterator[RgbdFrame]:
         while self._streams is not None:

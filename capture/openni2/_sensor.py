@@ -7,6 +7,7 @@ from collections.abc import Callable
 from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.errors import CaptureError, SensorError, WrongSizeError
 from denseface.capture.identity import Identity, usb_devices
+from denseface.capture.live.clock import TRANSPORT_S
 from denseface.capture.live.pairs import LivePair, PairLog
 from denseface.capture.live.sensor import LiveSensor, Shot
 from denseface.capture.live.states import HANG_S, LiveEvent, LiveFigures, LiveState, LiveStates
@@ -34,16 +35,17 @@ class WatchedSensor(LiveSensor):
     chosen : calibration; None for what the sensor says of itself
     rotation : degrees by which frames are turned, clockwise
     raw : give frames as they are, see `open_source`
+    transport_s : longest time from a frame's exposure to its arrival
     """
 
     def __init__(
         self, wanted: str | None = None, chosen: ChosenCalibration | None = None,
-        rotation: int = 0, *, raw: bool = False,
+        rotation: int = 0, *, raw: bool = False, transport_s: float = TRANSPORT_S,
     ) -> None:
         self.uri = f"openni2:{wanted or ''}"
         self.on_change: Callable[[], object] = lambda: None
         self._wanted, self._chosen = wanted, chosen
-        self._rotation, self._raw = rotation, raw
+        self._rotation, self._raw, self._transport_s = rotation, raw, transport_s
         self._lock_exposure = self._exposure_locked = False
         self._states = LiveStates(time.monotonic())
         self._past = LiveFigures()
@@ -175,7 +177,7 @@ class WatchedSensor(LiveSensor):
 
     def _open(self) -> None:
         try:
-            source = LiveSource(self._found, self._chosen)
+            source = LiveSource(self._found, self._chosen, transport_s=self._transport_s)
             source.rotation, source.raw = self._rotation, self._raw
         except Exception as error:  # whatever a driver makes the binding raise
             known = isinstance(error, CaptureError)

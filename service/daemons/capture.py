@@ -76,7 +76,8 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None,
 def _supply(
     settings: ServiceSettings, uri: str, calibration: Path | None, rotation: int
 ) -> Iterator[Supply]:
-    if sensor := open_sensor(uri, calibration, rotation=rotation):
+    if sensor := open_sensor(
+            uri, calibration, rotation=rotation, transport_s=settings.sensor_delay_ms / 1e3):
         yield LiveSupply(sensor, settings.take_timeout_s / 2)
         return
     with Background[JudgedFrame | None]("sensor") as driver:
