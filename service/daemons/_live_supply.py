@@ -3,9 +3,12 @@
 import math
 import time
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 from denseface.capture import RgbdFrame
+from denseface.capture.burst import fuse
+from denseface.capture.errors import FrameError
 from denseface.capture.live.sensor import LiveSensor, Shot
 from denseface.capture.live.states import LiveState
 from denseface.service.daemons._supply import NotTaken, Outcome, Picture, Supply, SupplyState, Taken
@@ -33,6 +36,8 @@ class _Press:
     """How long its gate may wait for a good one."""
     gated: bool = False
     """Whether the gate chooses its first frame."""
+    fusing: Future[RgbdFrame] | None = None
+    """Its burst, when it has all shots."""
 
     @property
     def next_s(self) -> float:
@@ -57,6 +62,7 @@ class LiveSupply(Supply):
         self._shown_s = 0.0
         """`latest_s` of the pair that the last preview showed."""
         self._gate = LiveGate(sensor, self.wake.wake)
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix="burst")
         sensor.on_change = self.wake.wake
 
     @property
@@ -100,7 +106,8 @@ class LiveSupply(Supply):
                 del self._presses[press.capture_id]
                 self._gate.withdraw(press.capture_id)
                 yield outcome
-        self._sensor.lock_exposure(on=any(one.wanted > 1 for one in self._presses.values()))
+        self._sensor.lock_exposure(on=any(
+            len(one.shots) < one.wanted > 1 for one in self._presses.values()))
         if self._preview_due and not busy:
             shot = self._sensor.latest()
             # Picture and hint are of one frame: while it is judged the picture waits.
@@ -125,18 +132,36 @@ class LiveSupply(Supply):
                 return NotTaken(press.capture_id, (
                     f"no frame within {waited_s:.1f} s: " + (reason or "none is new enough")))
             return None
-        return Taken(press.capture_id, _pressed(press))
+        return self._finish(press)
+
+    def _finish(self, press: _Press) -> Outcome | None:
+        """Give the frame of a press that has its shots; several are fused in a thread."""
+        if press.wanted == 1:
+            return Taken(press.capture_id, _pressed(press))
+        if press.fusing is None:
+            press.fusing = self._pool.submit(_pressed, press)
+            press.fusing.add_done_callback(lambda _: self.wake.wake())
+        if not press.fusing.done():
+            return None
+        try:
+            return Taken(press.capture_id, press.fusing.result())
+        except FrameError as error:
+            return NotTaken(press.capture_id, str(error))
 
     def hangs(self) -> str:
         return self._sensor.needs_new_process()
 
     def close(self) -> bool:
         self._gate.close()
+        self._pool.shutdown()
         return self._sensor.close()
 
 
 def _pressed(press: _Press) -> RgbdFrame:
-    """Give the frame of a press that has its shots, with how much later it was exposed."""
-    shot = press.shots[0]
-    after_ms = round((shot.earliest_s - press.at_s) * 1e3, 3)
-    return replace(shot.frame, origin=replace(shot.frame.origin, exposed_after_press_ms=after_ms))
+    """Make the frame of a press of its shots, with how much later the first was exposed."""
+    frame = fuse([shot.frame for shot in press.shots])
+    missed = press.shots[-1].number - press.shots[0].number + 1 - len(press.shots)
+    if missed:
+        frame = frame.with_note(f"{missed} frames between those of the burst were lost")
+    after_ms = round((press.shots[0].earliest_s - press.at_s) * 1e3, 3)
+    return replace(frame, origin=replace(frame.origin, exposed_after_press_ms=after_ms))

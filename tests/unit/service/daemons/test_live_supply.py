@@ -12,6 +12,7 @@ from denseface.service.daemons._live_supply import LiveSupply
 from denseface.service.daemons._supply import NotTaken, Picture, Taken
 from denseface.service.protocol.messages import Take
 from tests.unit.service.faces import small_frame
+from tests.waiting import until
 
 
 class FakeSensor:
@@ -110,8 +111,19 @@ def test_a_burst_takes_pairs_that_follow_each_other(supply, sensor):
     assert outcomes(supply) == []
     assert sensor.locked == [True]
     sensor.shoot(math.nextafter(100.033, math.inf))
-    assert len(outcomes(supply)) == 1
+    (taken,) = until(lambda: outcomes(supply))
+    assert taken.frame.origin.fused == 3
+    assert taken.frame.origin.notes == ()
     assert sensor.locked == [True, False]
+
+
+def test_frames_that_a_burst_missed_are_a_note(supply, sensor):
+    supply.press(Take(capture_id="a", frames=2))
+    sensor.shoot(100.0)
+    outcomes(supply)
+    sensor.shots.append(replace(sensor.shots[-1], number=4, earliest_s=100.1))
+    (taken,) = until(lambda: outcomes(supply))
+    assert taken.frame.origin.notes == ("2 frames between those of the burst were lost",)
 
 
 def test_a_preview_shows_the_newest_pair_once(supply, sensor):
