@@ -17,6 +17,7 @@ from denseface.service.protocol.hint import Hint
 from denseface.service.protocol.messages import Take
 from tests.unit.service.daemons.test_capture import Driver, FakeReader
 from tests.unit.service.daemons.test_live_supply import FakeSensor
+from tests.waiting import until
 
 HINT = Hint(timestamp_us=7, codes=("nobody",), text="step in front of the camera")
 NOBODY = Judged(Quality(7, somebody=False), (Fault.NOBODY,), HINT)
@@ -105,7 +106,7 @@ def test_a_gated_burst_begins_with_that_frame(supply, sensor, gate):
     gate.says.append(Passed("a", sensor.shots[0]))
     assert outcomes(supply) == []
     sensor.shoot(1e9 + 1)
-    (taken,) = outcomes(supply)
+    (taken,) = until(lambda: outcomes(supply))
     assert isinstance(taken, Taken)
 
 

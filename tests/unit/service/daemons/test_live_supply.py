@@ -27,7 +27,8 @@ class FakeSensor:
         self.locked = []
 
     def lock_exposure(self, *, on):
-        self.locked.append(on)
+        if [on] != self.locked[-1:]:
+            self.locked.append(on)
 
     def shoot(self, at_s):
         self.shots.append(Shot(small_frame(), len(self.shots) + 1, at_s, at_s + 0.03))
