@@ -85,8 +85,9 @@ def run(
             complain(f"denseface record: {end.error}")
             exit_now(_FAILED)
         raise end.error
+    held = f"{writer.frames} frames" if writer.frames else "nothing was recorded"
     lost = f", {reader.lost} were lost" if reader.lost else ""
-    say(f"{out}: {writer.frames} frames{lost}; {end.why}")
+    say(f"{out}: {held}{lost}; {end.why}")
     if hangs:
         sys.stdout.flush()
         exit_now(end.status)

@@ -1,0 +1,129 @@
+"""Recording without a driver: frame files, played as they are or as if they were live."""
+
+import io
+import os
+import signal
+import sys
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from denseface.capture.frame import FrameOrigin
+from denseface.capture.npz import save_frame
+from denseface.capture.oni.recorded import Recorded
+from denseface.capture.oni.writer import OniWriter
+from denseface.service.errors import UsageError
+from denseface.service.tools import _recording, record
+from tests.unit import frames
+from tests.waiting import LIMIT_S, until
+
+
+@pytest.fixture
+def folder(tmp_path):
+    folder = tmp_path / "shown"
+    folder.mkdir()
+    for number in range(4):
+        one = frames.frame(np.full((120, 160), 700 + number, np.uint16),
+                           np.zeros((120, 160, 3), np.uint8))
+        save_frame(folder / f"{number}.npz", replace(
+            one, depth_timestamp_us=number * 20_000, color_timestamp_us=number * 20_000))
+    return folder
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_what_is_done_is_shown_on_a_terminal(folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
+    out = tmp_path / "take.oni"
+    assert record.run(str(folder), None, out, frames=3) == 0
+    assert capsys.readouterr().out == f"{out}: 3 frames; as long as asked for\n"
+    shown = terminal.getvalue()
+    assert "1 frames, 0.0 s, 0 lost" in shown
+    assert shown.endswith("\r\x1b[K"), "cleared in the end"
+
+
+@pytest.mark.parametrize(("limits", "held"), [
+    ({"seconds": 0.04}, 2), ({"seconds": 0.045}, 3), ({"seconds": 60.0}, 4), ({"frames": 9}, 4),
+    ({"frames": 2, "seconds": 60.0}, 2), ({"frames": 4, "seconds": 0.015}, 1)])
+def test_a_recording_is_as_long_as_the_stamps_of_its_source_say(folder, tmp_path, limits, held):
+    out = tmp_path / "take.oni"
+    assert record.run(str(folder), None, out, **limits) == 0
+    assert Recorded(out).pairs == held
+
+
+def test_doubts_are_printed_once(folder, tmp_path, monkeypatch, capsys):
+    note = "the colour is from yesterday"
+    real = _recording.open_source
+
+    def doubtful(*arguments, **more):
+        source = real(*arguments, **more)
+        source.prepared = lambda one: replace(one, origin=FrameOrigin(notes=(note,)))
+        return source
+
+    monkeypatch.setattr(_recording, "open_source", doubtful)
+    assert record.run(str(folder), None, tmp_path / "take.oni") == 0
+    assert capsys.readouterr().err == f"warning: {note}\n"
+
+
+def test_frames_that_come_faster_than_they_can_be_written_are_counted(
+        folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(_recording, "_QUEUED", 2)
+    readers = []
+    real = _recording.FrameReader
+
+    def reader(*arguments):
+        readers.append(real(*arguments))
+        return readers[0]
+
+    def slow(writer, frame):
+        until(lambda: readers[0].lost > 3 * writer.frames)
+        return add(writer, frame)
+
+    add = OniWriter.add
+    monkeypatch.setattr(record, "FrameReader", reader)
+    monkeypatch.setattr(OniWriter, "add", slow)
+    out = tmp_path / "take.oni"
+    assert record.run(f"{folder}?rate=real", None, out, frames=3) == 0
+    assert Recorded(out).pairs == 3
+    assert "3 frames, " in (said := capsys.readouterr().out)
+    assert "were lost; as long as asked for" in said
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_before_the_first_frame(folder, tmp_path, monkeypatch, capsys, number):
+    (folder / "0.npz").rename(folder / "late")
+    asked = threading.Event()
+
+    def never(*_, **__):
+        asked.set()
+        threading.Event().wait(LIMIT_S)
+
+    monkeypatch.setattr(_recording, "open_sensor", never)
+    monkeypatch.setattr(_recording, "_CLOSING_S", 0.1)
+    ended = []
+    monkeypatch.setattr(record, "exit_now", ended.append)
+    threading.Thread(target=lambda: asked.wait(LIMIT_S) and os.kill(os.getpid(), number)).start()
+    out = tmp_path / "take.oni"
+    status = record.run(str(folder), None, out)
+    assert status == (130 if number == signal.SIGINT else 0)
+    assert ended == [status], "a driver that hangs does not keep the process"
+    by = "Ctrl-C" if number == signal.SIGINT else "SIGTERM"
+    assert capsys.readouterr().out == f"{out}: nothing was recorded; stopped by {by}\n"
+    assert not out.exists()
+
+
+def test_where_a_recording_cannot_be(folder, tmp_path):
+    with pytest.raises(UsageError, match=r"expected NAME\.oni or a folder"):
+        record.run(str(folder), None, tmp_path / "take.mp4")
+    (tmp_path / "take.oni").write_text("precious")
+    with pytest.raises(UsageError, match="there is a recording already"):
+        record.run(str(folder), None, tmp_path / "take.oni")
+    with pytest.raises(UsageError, match="there is a recording already"):
+        record.run(str(folder), None, folder)
+    with pytest.raises(FileNotFoundError):
+        record.run(str(folder), None, tmp_path / "no" / "take.oni")
