@@ -57,6 +57,11 @@ class FramePreparation:
         self._due = float("-inf")
         self._strict = refuse
 
+    @property
+    def agrees(self) -> bool:
+        """Whether frames were measured and found to be what they say of themselves."""
+        return self._found.verdict is Verdict.AGREES
+
     def of(self, frame: RgbdFrame) -> RgbdFrame:
         """Give a frame as its user gets it.
 

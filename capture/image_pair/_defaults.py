@@ -74,36 +74,47 @@ def default_calibration(
 ) -> DefaultCameras:
     """Choose cameras by the images' sizes, (width, height) pixels.
 
-    Where the depth is registered, or there is no colour, both are one camera.
+    Where the depth is registered, the colour camera is what both images are of.
     """
-    if registered or color_size is None:
-        size = depth_size
-        focal, sensor = _REGISTERED.get(size, (0.0, ""))
-        if color_size is None:
-            focal, sensor = next(((pair.depth[size][0], pair.sensor) for pair in _PAIRS
-                                  if size in pair.depth), (focal, sensor))
-        camera = _centered(size, focal or _unknown_focal(size))
+    if color_size is None:
+        focal, sensor = next(((pair.depth[depth_size][0], pair.sensor) for pair in _PAIRS
+                              if depth_size in pair.depth), _REGISTERED.get(depth_size, (0.0, "")))
+        camera = _centered(depth_size, focal or _unknown_focal(depth_size))
         return DefaultCameras(Calibration(depth=camera, color=camera), _words(camera, sensor))
-    for pair in _PAIRS:
-        if depth_size in pair.depth and color_size in pair.color:
-            focal, cx, cy = pair.depth[depth_size]
-            depth = CameraModel(width=depth_size[0], height=depth_size[1], fx=focal, fy=focal,
-                                cx=cx, cy=cy)
-            color = _centered(color_size, pair.color[color_size])
-            return DefaultCameras(
-                Calibration(depth=depth, color=color, depth_to_color=pair.pose),
-                f"those of a {pair.sensor}, by the images' sizes")
+    pair = next((pair for pair in _PAIRS if depth_size in pair.depth and color_size in pair.color),
+                None)
+    if registered:
+        focal, sensor = _REGISTERED.get(color_size, (0.0, ""))
+        camera = _centered(color_size, focal or _unknown_focal(color_size))
+        if pair is None or depth_size != color_size:
+            return DefaultCameras(Calibration(depth=camera, color=camera), _words(camera, sensor))
+        # The depth camera is there for the case that the depth turns out not to be registered.
+        return DefaultCameras(
+            Calibration(depth=_depth_camera(pair, depth_size), color=camera,
+                        depth_to_color=pair.pose), _words(camera, sensor))
+    if pair is not None:
+        color = _centered(color_size, pair.color[color_size])
+        return DefaultCameras(
+            Calibration(depth=_depth_camera(pair, depth_size), color=color,
+                        depth_to_color=pair.pose),
+            f"the cameras are taken for those of a {pair.sensor}, by the images' sizes")
     depth, color = (_centered(size, _unknown_focal(size)) for size in (depth_size, color_size))
     return DefaultCameras(
         Calibration(depth=depth, color=color),
-        f"two cameras in one place that see {_DEFAULT_FOV_DEG:g} degrees, of which nothing is "
-        "known")
+        f"the cameras are taken to stand in one place and to see {_DEFAULT_FOV_DEG:g} degrees")
 
 
 def _words(camera: CameraModel, sensor: str) -> str:
-    return (f"that of a {sensor}, by the image's size: focal length {camera.fx:g} pixels" if sensor
-            else f"one that sees {_DEFAULT_FOV_DEG:g} degrees, of which nothing is known: focal "
-                 f"length {camera.fx:.0f} pixels")
+    if sensor:
+        return (f"the camera is taken for that of a {sensor}, by the image's size: focal length "
+                f"{camera.fx:g} pixels")
+    return (f"the camera is taken for one that sees {_DEFAULT_FOV_DEG:g} degrees: focal length "
+            f"{camera.fx:.0f} pixels")
+
+
+def _depth_camera(pair: _Pair, size: _Size) -> CameraModel:
+    focal, cx, cy = pair.depth[size]
+    return CameraModel(width=size[0], height=size[1], fx=focal, fy=focal, cx=cx, cy=cy)
 
 
 def _unknown_focal(size: _Size) -> float:

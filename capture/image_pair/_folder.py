@@ -6,13 +6,12 @@ from pathlib import Path
 from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.image_pair._layouts import recognised
-from denseface.capture.image_pair._pair import NOTHING_SAID, PairReading, read_pair
-from denseface.capture.source import Source
+from denseface.capture.image_pair._pair import NOTHING_SAID, PairReading, PairSource, read_pair
 
 __all__ = ["FolderSource"]
 
 
-class FolderSource(Source):
+class FolderSource(PairSource):
     """The pairs of a folder in a layout that is known; each file is read when it is asked for."""
 
     def __init__(
@@ -42,7 +41,7 @@ class FolderSource(Source):
 
     def frames_from(self, number: int) -> Iterator[RgbdFrame]:
         """Read the frames from a number on, from 0, without those before it."""
-        return (self.prepared(read_pair(pair, self._reading)) for pair in self._pairs[number:])
+        return (self.settled(read_pair(pair, self._reading)) for pair in self._pairs[number:])
 
     def close(self) -> None:
         """Nothing is held open."""

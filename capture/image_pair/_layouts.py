@@ -4,7 +4,8 @@
 layout          what is in the folder
 =============== ==================================================================================
 TUM RGB-D       ``depth/``, ``rgb/`` and ``associations.txt``, or ``depth.txt`` and ``rgb.txt``
-ScanNet         ``depth/``, ``color/`` and ``intrinsic/intrinsic_depth.txt``, as SensReader exports
+ScanNet         ``depth/``, ``color/`` and ``intrinsic/intrinsic_depth.txt``, as SensReader exports,
+                or ``intrinsics_depth.txt``, as `scannet_frames_25k` has it
 two folders     ``depth/`` and one of ``color/``, ``rgb/``, ``image/``, ``images/``; Open3D's
                 recorders add ``intrinsic.json`` or ``camera_intrinsic.json``
 one folder      ``NAME.depth.png`` and ``NAME.color.png``, or names that differ in these words alone
@@ -80,11 +81,12 @@ def recognised(folder: Path) -> Layout:
         raise UnreadableSourceError(f"{folder}: {' and '.join(colors)} may both be the colour "
                                     "images, expected one of them")
     color = colors[0]
-    if "intrinsic" in names:
-        calibration = scannet_calibration(folder / "intrinsic")
+    if "intrinsic" in names or "intrinsics_depth.txt" in names:
+        calibration = (scannet_calibration(folder / "intrinsic") if "intrinsic" in names else
+                       scannet_calibration(folder, "intrinsics"))
         return Layout("ScanNet", _by_name(folder / "depth", folder / color), PairReading(
             1.0, registered=False,
-            chosen=ChosenCalibration(calibration, f"beside: {folder.name}/intrinsic")))
+            chosen=ChosenCalibration(calibration, "beside: ScanNet's matrices")))
     lists = [name for name in _ASSOCIATIONS if name in names]
     if lists or {"depth.txt", f"{color}.txt"} <= names:
         pairs = (_associated(folder, lists[0]) if lists else

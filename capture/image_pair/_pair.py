@@ -1,6 +1,7 @@
 """A frame made of two image files: depth, and colour where there is one."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,9 +17,10 @@ from denseface.capture.image_pair._files import MAX_PIXELS, read_color_image, re
 from denseface.capture.image_pair._units import counts_of, guess_unit
 from denseface.capture.source import Source
 
-__all__ = ["NOTHING_SAID", "ImagePair", "ImagePairSource", "PairReading", "read_pair"]
+__all__ = ["NOTHING_SAID", "ImagePair", "ImagePairSource", "PairReading", "PairSource", "read_pair"]
 
-_Image = NDArray[np.uint8]
+_GUESS = "the depth is taken to be"
+"""Begins the note that is dropped where agreement was measured."""
 
 
 class ImagePair(NamedTuple):
@@ -51,7 +53,19 @@ class PairReading(NamedTuple):
 NOTHING_SAID = PairReading()
 
 
-class ImagePairSource(Source):
+class PairSource(Source):
+    """A source whose frames are made by `read_pair`."""
+
+    def settled(self, frame: RgbdFrame) -> RgbdFrame:
+        """Give a frame as `prepared` does, without the guess that was measured and found right."""
+        frame = self.prepared(frame)
+        if self._preparation is None or not self._preparation.agrees:
+            return frame
+        notes = tuple(note for note in frame.origin.notes if not note.startswith(_GUESS))
+        return replace(frame, origin=replace(frame.origin, notes=notes))
+
+
+class ImagePairSource(PairSource):
     """The one frame that two image files make."""
 
     frame_count = 1
@@ -64,7 +78,7 @@ class ImagePairSource(Source):
         self._frame = read_pair(ImagePair(Path(depth), Path(color) if color else None), reading)
 
     def __iter__(self) -> Iterator[RgbdFrame]:
-        yield self.prepared(self._frame)
+        yield self.settled(self._frame)
 
     def close(self) -> None:
         """Nothing is held open."""
@@ -113,11 +127,9 @@ def _cameras(
     """Fit the chosen or a default calibration to images of these sizes."""
     registered, notes = _is_registered(depth, color, reading)
     if reading.chosen is None:
-        default = default_calibration(color if registered and color else depth, color, registered)
+        default = default_calibration(depth, color, registered)
         calibration, origin = default.calibration, "default"
-        notes += (f"no calibration was given: the camera is taken for {default.words}"
-                  if calibration.depth == calibration.color else
-                  f"no calibration was given: the cameras are taken for {default.words}",)
+        notes += (f"no calibration was given: {default.words}",)
     else:
         calibration, origin, assumed, _ = reading.chosen
         notes += assumed
@@ -151,8 +163,8 @@ def _is_registered(
     why = ("it has the colour image's size" if registered else
            "the calibration has two cameras and a pose" if two else
            f"it is {_by(depth)}, the colour image {_by(color)}")
-    return registered, (f"the depth is taken to be {'' if registered else 'not '}registered to the "
-                        f"colour: {why} (--registered says)",)
+    return registered, (f"{_GUESS} {'' if registered else 'not '}registered to the colour: {why} "
+                        "(--registered says)",)
 
 
 def _size(image: NDArray[np.uint8] | NDArray[np.uint16]) -> tuple[int, int]:

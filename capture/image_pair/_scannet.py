@@ -17,8 +17,12 @@ _DEPTH_SIZE, _COLOR_SIZE = (640, 480), (1296, 968)
 _M_TO_MM = 1000.0
 
 
-def scannet_calibration(folder: Path) -> Calibration:
+def scannet_calibration(folder: Path, intrinsic: str = "intrinsic") -> Calibration:
     """Read `intrinsic_depth.txt`, `intrinsic_color.txt` and the extrinsics of both.
+
+    Parameters
+    ----------
+    intrinsic : how the names of the first two begin; `intrinsics` in `scannet_frames_25k`
 
     An extrinsic matrix takes points from its camera to the device, in metres; one that is not
     there is the identity, as nearly all of the data set's are.
@@ -28,7 +32,7 @@ def scannet_calibration(folder: Path) -> Calibration:
     CalibrationError
         A file is missing, or holds no such matrix.
     """
-    depth, color = (_camera(folder / f"intrinsic_{name}.txt", size)
+    depth, color = (_camera(folder / f"{intrinsic}_{name}.txt", size)
                     for name, size in (("depth", _DEPTH_SIZE), ("color", _COLOR_SIZE)))
     to_device, from_device = (
         _matrix(path) if (path := folder / f"extrinsic_{name}.txt").exists() else np.eye(4)

@@ -53,6 +53,18 @@ def test_a_pair_of_files_is_as_good_as_the_recording(tmp_path, frame, files, dep
     assert error.mean_mm < BOUNDS["frontal_700"][0] + 0.15
 
 
+def test_a_pair_of_which_nothing_is_said_is_measured_and_put_right(tmp_path, files):
+    """Both images have one size, but each is as its own camera sees it."""
+    done = denseface("reconstruct", "--depth", files / "mm.png", "--color", files / "color.png",
+                     "--report", tmp_path / "r.json")
+    assert done.returncode == 0, done.stderr
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert not report["registered"]
+    assert report["initial_points"] > 13_500
+    assert any("corrected" in warning for warning in report["warnings"])
+    assert any("no calibration was given" in warning for warning in report["warnings"])
+
+
 def test_registered_depth_of_vga_and_a_colour_of_1280x1024(tmp_path, frame):
     """Registered depth is in the colour camera's pixels, half as many: the upper 960 rows."""
     camera = frame.calibration.color

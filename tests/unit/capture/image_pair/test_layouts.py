@@ -103,6 +103,17 @@ def test_scannet(tmp_path):
     assert next(source.frames_from(2)).depth_timestamp_us == 2 * 33_333
 
 
+def test_scannet_frames_25k(tmp_path):
+    scannet(tmp_path)
+    for name in ("depth", "color"):
+        (tmp_path / f"intrinsic/intrinsic_{name}.txt").rename(tmp_path / f"intrinsics_{name}.txt")
+        (tmp_path / f"intrinsic/extrinsic_{name}.txt").unlink()
+    (tmp_path / "intrinsic").rmdir()
+    frame = next(iter(FolderSource(tmp_path)))
+    assert frame.calibration.color.fx == 1170.19
+    assert "ScanNet" in frame.calibration_origin
+
+
 @pytest.mark.parametrize(("name", "text", "found"), [
     ("intrinsic_depth.txt", "1 2 3", r"expected a matrix of 4 x 4 numbers"),
     ("intrinsic_color.txt", "0 " * 16, "are of no camera of 1296x968"),

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from denseface.capture import Calibration, CameraModel, DepthToColor
+from denseface.capture.agreement import Agreement, Verdict
 from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.calibration_files import doubts_of
 from denseface.capture.errors import CalibrationError, FrameError
@@ -132,9 +133,25 @@ def test_sensors_are_known_by_the_sizes_of_their_images(depth, color, name, foca
 def test_one_camera_is_known_by_its_image_too(size):
     for registered, color in ((True, size), (False, None)):
         calibration, words = default_calibration(size, color, registered)
-        assert calibration.depth == calibration.color
-        assert 50 < np.degrees(2 * np.arctan(size[0] / 2 / calibration.depth.fx)) < 92
+        assert (calibration.color.width, calibration.color.height) == size
+        assert 50 < np.degrees(2 * np.arctan(size[0] / 2 / calibration.color.fx)) < 92
         assert "focal length" in words
+
+
+def test_a_pair_that_may_not_be_registered_has_the_depth_camera_too():
+    """What is measured then can say so."""
+    calibration, words = default_calibration((640, 480), (640, 480), registered=True)
+    assert (calibration.depth.fx, calibration.color.fx) == (575.8, 525)
+    assert calibration.depth_to_color.translation_mm == (-23, 0, 0)
+    assert "focal length 525" in words
+
+
+def test_a_guess_that_was_measured_is_not_told(paths):
+    guessed = ImagePairSource(*paths, PairReading(1.0, chosen=ChosenCalibration(ONE, "mine")))
+    note, = next(iter(guessed)).origin.notes
+    assert "taken to be registered" in note
+    guessed._preparation._found = Agreement(Verdict.AGREES)
+    assert next(iter(guessed)).origin.notes == ()
 
 
 def test_the_default_of_1280x1024_is_that_of_vga_with_more_rows_below():
