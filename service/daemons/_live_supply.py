@@ -19,6 +19,9 @@ from denseface.service.runtime.wake_pipe import WakePipe
 
 _HOPEFUL = (LiveState.OPENING, LiveState.WARMING, LiveState.STREAMING, LiveState.STALLED)
 """States in which a press waits: there will be frames soon, or it will be known that not."""
+_HOLD_S = 0.07
+"""Age up to which a picture waits for its hint, seconds: two frame periods of the three that a
+mirror may lag."""
 _LOOKED_AT_S = 1.0
 """After the last preview frames are judged for so long, seconds."""
 
@@ -109,12 +112,21 @@ class LiveSupply(Supply):
         self._sensor.lock_exposure(on=any(
             len(one.shots) < one.wanted > 1 for one in self._presses.values()))
         if self._preview_due and not busy:
-            shot = self._sensor.latest()
-            # Picture and hint are of one frame: while it is judged the picture waits.
-            if (shot is not None and shot.latest_s != self._shown_s
-                    and not self._gate.judges(shot)):
-                self._preview_due, self._shown_s = False, shot.latest_s
-                yield Picture(shot.frame, self._gate.hint_of(shot))
+            yield from self._picture()
+
+    def _picture(self) -> Iterator[Picture]:
+        """Give a picture that is newer than the last: the one with a hint of its own, if any."""
+        hinted, judging, newest = (
+            self._gate.last_hint(), self._gate.judging, self._sensor.latest())
+        hint = None
+        if hinted is not None and hinted[0].latest_s > self._shown_s:
+            newest, hint = hinted
+        elif (judging is not None and judging.latest_s > self._shown_s
+              and time.monotonic() - judging.latest_s < _HOLD_S):
+            return
+        if newest is not None and newest.latest_s > self._shown_s:
+            self._preview_due, self._shown_s = False, newest.latest_s
+            yield Picture(newest.frame, hint)
 
     def _serve(self, press: _Press) -> Outcome | None:
         while len(press.shots) < press.wanted:

@@ -88,7 +88,7 @@ class LiveGate:
         self._hints_until_s = self._clock() + seconds
 
     def look(self, seconds: float) -> None:
-        """Judge frames for so long, for the sake of `hint_of`."""
+        """Judge frames for so long, for the sake of `last_hint`."""
         self._looked_until_s = self._clock() + seconds
 
     def press(self, take: messages.Take) -> None:
@@ -102,15 +102,16 @@ class LiveGate:
         """Forget a press, where it waits."""
         self._waiting.pop(capture_id, None)
 
-    def hint_of(self, shot: Shot) -> Hint | None:
-        """Give the hint of a frame, where it was judged last."""
-        same = self._shot is not None and shot.earliest_s == self._shot.earliest_s
-        return self._judged.hint if same and self._judged is not None else None
+    @property
+    def judging(self) -> Shot | None:
+        """The frame that is being judged."""
+        return self._shot if self._call is not None else None
 
-    def judges(self, shot: Shot) -> bool:
-        """Whether a frame is being judged: `hint_of` will know in a moment."""
-        return (self._call is not None and self._shot is not None
-                and shot.earliest_s == self._shot.earliest_s)
+    def last_hint(self) -> tuple[Shot, Hint] | None:
+        """Give the frame that was judged last, with its hint."""
+        if self._shot is None or self._judged is None:
+            return None
+        return self._shot, self._judged.hint
 
     def step(self) -> Iterator[Passed | NotPassed | Hinted]:
         """Give what became of presses, and hints; begin to judge the next frame that is due."""

@@ -47,10 +47,7 @@ class FakeGate:
     def send_hints(self, seconds):
         self.hints_s = seconds
 
-    def judges(self, shot):
-        return shot is self.judging
-
-    def hint_of(self, _):
+    def last_hint(self):
         return self.hint
 
     def step(self):
@@ -144,14 +141,37 @@ def test_a_gated_press_waits_as_long_as_its_gate_and_the_sensor_together(
     assert len(outcomes(supply)) == 1
 
 
-def test_a_picture_waits_for_its_hint(supply, sensor, gate):
+def test_a_picture_waits_for_its_hint(supply, sensor, gate, monkeypatch):
+    clock = [99.04]
+    monkeypatch.setattr(_live_supply.time, "monotonic", lambda: clock[0])
     sensor.shoot(99.0)
     supply.preview()
     assert gate.looked_s > 0
     gate.judging = sensor.shots[0]
     assert outcomes(supply) == []
-    gate.judging, gate.hint = None, HINT
+    sensor.shoot(99.03)  # a newer one does not go first: then none would have a hint
+    assert outcomes(supply) == []
+    gate.judging, gate.hint = None, (sensor.shots[0], HINT)
     assert outcomes(supply) == [Picture(sensor.shots[0].frame, HINT)]
+    supply.preview()
+    assert outcomes(supply) == [Picture(sensor.shots[1].frame, None)]
+    supply.preview()
+    assert outcomes(supply) == []
+
+
+def test_a_picture_does_not_wait_for_ever(supply, sensor, gate, monkeypatch):
+    clock = [99.08]
+    monkeypatch.setattr(_live_supply.time, "monotonic", lambda: clock[0])
+    sensor.shoot(99.0)
+    sensor.shoot(99.05)
+    supply.preview()
+    gate.judging = sensor.shots[0]
+    assert outcomes(supply) == []
+    clock[0] += 0.1
+    assert outcomes(supply) == [Picture(sensor.shots[1].frame, None)]
+    gate.judging, gate.hint = None, (sensor.shots[0], HINT)
+    supply.preview()
+    assert outcomes(supply) == []  # a mirror does not go back
 
 
 def test_hints_are_asked_for_and_given(supply, gate):

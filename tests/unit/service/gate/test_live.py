@@ -92,9 +92,9 @@ def test_while_previews_are_looked_at_frames_are_judged_and_no_hints_sent(gate):
     gate.gate.look(1.0)
     assert gate.run(1.0) == []
     assert len(gate.measured) >= 9
-    judged = gate.sensor.shots[gate.measured[-1]]
-    assert gate.gate.hint_of(judged).timestamp_us == judged.number
-    assert gate.gate.hint_of(gate.sensor.shots[gate.measured[-1] - 1]) is None
+    shot, hint = gate.gate.last_hint()
+    assert hint.timestamp_us == shot.number == gate.sensor.shots[gate.measured[-1]].number
+    assert gate.gate.judging is None
 
 
 def test_who_waits_gets_the_first_good_frame_and_no_other(gate):
