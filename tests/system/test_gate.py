@@ -43,7 +43,7 @@ def capturing(source, tmp_path, *controls):
              address], cwd=REPOSITORY, stderr=stderr, env=environment(controls=controls))
         try:
             with Client(address) as client:
-                until(lambda: client.status().sensors)
+                until(lambda: client.status(timeout=LIMIT_S).sensors)
                 yield client
         finally:
             process.terminate()

@@ -112,7 +112,7 @@ def ask(socket, **fields):
 
 
 def known(client):
-    return {one.name: one.state for one in client.status().sensor_states}
+    return {one.name: one.state for one in client.status(timeout=LIMIT_S).sensor_states}
 
 
 def test_a_press_goes_to_the_sensor_of_its_name_and_hears_what_to_do(address):
@@ -127,7 +127,7 @@ def test_a_press_goes_to_the_sensor_of_its_name_and_hears_what_to_do(address):
         assert left.takes() == []
         with pytest.raises(PressRefusedError, match="no sensor middle is connected; there: left"):
             client.press(sensor="middle")
-        one = client.status().sensor_states[0]
+        one = client.status(timeout=LIMIT_S).sensor_states[0]
         assert (one.identity, one.figures.drops) == (f"serial {one.name}", 2)
 
 
@@ -135,7 +135,7 @@ def test_a_press_hears_at_once_why_there_is_no_frame(address):
     with closing(RawSensor(address, "kinect", "blocked", "no permission for /dev/bus/usb/1/4")), \
             Client(address) as client:
         until(lambda: known(client) == {"kinect": "blocked"})
-        assert not client.status().ready
+        assert not client.status(timeout=LIMIT_S).ready
         with pytest.raises(PressRefusedError) as refused:
             client.press()
         assert refused.value.reason == "no_sensor"
@@ -146,7 +146,7 @@ def test_a_press_hears_at_once_why_there_is_no_frame(address):
 def test_what_an_older_client_says_is_taken_and_answered(address):
     with closing(RawSensor(address, "s")) as sensor, raw(zmq.DEALER, address) as socket, \
             Client(address) as client:
-        until(lambda: client.status().sensors)
+        until(lambda: client.status(timeout=LIMIT_S).sensors)
         answer = ask(socket, kind="press", capture_id="a")
         assert (answer["kind"], answer["reason"]) == ("press_refused", "quality")
         (take,) = sensor.takes()
@@ -175,7 +175,7 @@ def test_previews_are_jpegs_and_hints_are_small(address):
 
 def test_nothing_is_asked_for_while_nobody_looks(address):
     with closing(RawSensor(address, "s")) as sensor, Client(address) as client:
-        until(lambda: client.status().sensors)
+        until(lambda: client.status(timeout=LIMIT_S).sensors)
         with closing(client.hints(timeout=LIMIT_S)) as hints:
             assert next(hints).text == "come closer"
         with closing(client.previews(timeout=LIMIT_S)) as previews:
