@@ -10,6 +10,7 @@ from functools import partial
 import structlog
 
 from denseface.capture import CaptureError, RgbdFrame
+from denseface.capture.burst import fuse
 from denseface.capture.errors import SensorError
 from denseface.service.daemons._supply import (
     Hinted,
@@ -40,6 +41,8 @@ _log = structlog.get_logger("capture")
 class _Press:
     capture_id: str
     gate: GatedPress
+    frames: int = 1
+    """Of so many one is made, the first of which the gate judges."""
     waited: bool = False
     """Whether a frame was not good enough for it."""
 
@@ -76,7 +79,8 @@ class ReaderSupply(Supply):
         if all(press.capture_id != take.capture_id for press in self._presses):
             now = time.monotonic()
             self._presses.append(_Press(
-                take.capture_id, GatedPress(take.gate, now, now + take.gate_timeout)))
+                take.capture_id, GatedPress(take.gate, now, now + take.gate_timeout),
+                take.frames))
 
     def preview(self) -> None:
         self._preview_due = True
@@ -146,7 +150,8 @@ class ReaderSupply(Supply):
         if press.waited:
             time.sleep(_PACE_S)
         frame = self._reader.take()
-        return frame, None if press.gate.gate == "off" else self._judge.judge(frame)
+        judged = None if press.gate.gate == "off" else self._judge.judge(frame)
+        return fuse([frame, *(self._reader.take() for _ in range(press.frames - 1))]), judged
 
     def _peek(self) -> JudgedFrame:
         frame = self._reader.peek()

@@ -194,3 +194,13 @@ def test_the_hub_is_told_each_state_once_and_again_when_it_asks():
 def test_a_sensor_without_a_name_is_named_after_its_identity_or_its_source(source, identity, name):
     assert sensor_name(source, identity) == name
     SensorReady(name=name, source=source)
+
+
+def test_of_a_recording_a_burst_is_one_frame_of_the_next_ones():
+    driver, reader = Driver(), FakeReader(live=False)
+    connection = Connection(driver, [messages.Take(capture_id="a", frames=3), ENDED, safe("a")])
+    _Capture(ServiceSettings(address="ipc:///unused"), connection,
+             ReaderSupply(reader, driver, 10.0), "x").serve(None)
+    assert reader.calls == ["take"] * 3
+    (frame,) = [one for one in connection.sent if one.kind == "frame"]
+    assert frame.frame.fused == 3
