@@ -9,12 +9,14 @@ import pytest
 
 from denseface.capture.agreement import Verdict, measure_agreement
 from denseface.capture.npz import load_frame, save_frame
+from denseface.capture.rotation import rotate_frame
 from tests.faults import FAULTS, registered_depth
 from tests.simulator import KINECT_DEFAULT, Person, Scene, shared_folder, simulate
 from tests.system.running import RECORDINGS, denseface
 from tests.virtual_sensor.clip import write_clip
+from tests.virtual_sensor.control import Control, Honesty
 from tests.virtual_sensor.fixtures import FIXTURES
-from tests.virtual_sensor.process import play, record_clip
+from tests.virtual_sensor.process import environment, play, record_clip
 
 TURNED = {"colour mirrored": (True, False), "depth mirrored": (False, True),
           "both mirrored": (True, True)}
@@ -90,6 +92,45 @@ def test_a_recording_made_with_registration_on_is_put_right_and_said_to_be(tmp_p
     assert (good.returncode, good.stderr) == (0, "")
     spacing = json.loads((tmp_path / "g.json").read_text())["mean_spacing_mm"]
     assert report["mean_spacing_mm"] == pytest.approx(spacing * 575.8 / 525, rel=0.03)
+
+
+@pytest.mark.parametrize("said", [True, False])
+def test_what_the_user_says_of_registration_is_taken_and_measured(tmp_path, said):
+    """The key `registered` in the file beside: right without a word, wrong put right with one."""
+    right = frames_of("frontal_700")
+    write_clip(tmp_path / "clip", [(registered_depth(frame).depth, frame.color)
+                                   for frame in right])
+    record_clip(tmp_path / "clip", tmp_path / "on.oni", len(right))
+    beside = json.loads(right[0].calibration.to_json()) | {"registered": said}
+    (tmp_path / "on.calibration.json").write_text(json.dumps(beside))
+    done = denseface("reconstruct", tmp_path / "on.oni", "--report", tmp_path / "r.json")
+    assert done.returncode == 0
+    assert json.loads((tmp_path / "r.json").read_text())["registered"] is True
+    assert len(done.stderr.splitlines()) == (0 if said else 1)
+
+
+def test_a_sensor_that_mirrors_without_a_word_is_turned_back(tmp_path):
+    right = frames_of("frontal_700")[0]
+    write_clip(tmp_path / "clip", [(right.depth, right.color)] * 2)
+    with Control(tmp_path / "sensor", tmp_path / "clip") as sensor:
+        for stream in (sensor.depth, sensor.color):
+            stream.mirroring = Honesty.MISSING
+            stream.mirrored_at_start = True
+        (seen, *_), _ = play("openni2:", environment(controls=[sensor]), max_frames=2)
+    assert np.array_equal(seen.depth, right.depth)
+    assert np.array_equal(seen.color, right.color)
+
+
+def test_a_recording_on_its_side_is_turned(tmp_path):
+    upright = frames_of("wall_close")[0]
+    save_frame(tmp_path / "lying.npz", rotate_frame(upright, 270))
+    done = denseface("reconstruct", tmp_path / "lying.npz")
+    assert done.returncode == 1
+    assert "--rotate 90" in done.stderr
+    done = denseface("reconstruct", tmp_path / "lying.npz", "--rotate", 90)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.split("points")[0] == denseface(
+        "reconstruct", RECORDINGS / "wall_close.oni").stdout.split("points")[0]
 
 
 def test_a_frame_that_fits_in_no_way_is_refused_by_name(tmp_path):
