@@ -10,7 +10,7 @@ import pytest
 
 from tests.system.watched_sensor import Watched
 from tests.virtual_sensor.clip import write_clip
-from tests.virtual_sensor.control import Control, DeviceState, Mode, OpenFault, Stamps
+from tests.virtual_sensor.control import Control, DeviceState, Format, Mode, OpenFault, Stamps
 from tests.virtual_sensor.process import environment
 from tests.waiting import until
 
@@ -169,10 +169,26 @@ def test_no_sensor_is_said_and_waited_for(clip, tmp_path):
         assert not stale(sensor.presses(3))
 
 
-RATES = {
-    "60 and 30": ([Mode(fps=60)], [Mode(fps=30, format="rgb888")]),
-    "15": ([Mode(fps=15)], [Mode(fps=15, format="rgb888")]),
-}
+@pytest.mark.parametrize(("depth_fps", "color_fps", "delay_us", "apart_s"), [
+    (60, 30, 0, 1 / 120), (30, 60, 0, 1 / 120), (60, 15, 5_000, 1 / 120),
+    (15, 15, 33_333, 1 / 30), (60, 60, 0, 1 / 120)])
+def test_streams_of_any_rate_are_paired_by_the_nearest_exposure(
+    control, sensor, depth_fps, color_fps, delay_us, apart_s
+):
+    control.depth.offer(Mode(fps=depth_fps))
+    control.color.offer(Mode(fps=color_fps, format=Format.RGB888))
+    control.color.delay_us = delay_us
+    control.unplug()  # modes are read when it is opened
+    sensor.wait_state("absent")
+    control.replug()
+    sensor.wait_state("streaming")
+    presses = sensor.presses(10)
+    assert not stale(presses)
+    for press in presses:
+        depth_s, color_s = press["exposed_s"]
+        assert abs(depth_s - color_s) < 1.06 * apart_s + 1e-3
+        assert press["skew_us"] / 1e6 == pytest.approx(depth_s - color_s, abs=1e-3)
+        assert press["skew_known_by"] == "stamps"
 
 
 @pytest.mark.parametrize(("stamps", "offset_us", "note"), [
