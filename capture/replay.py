@@ -195,7 +195,7 @@ class ReplaySensor(LiveSensor):
         with self._changed:
             shots = reversed(self._shots) if newest else iter(self._shots)
             found = next((shot for shot in shots if shot.earliest_s >= after_s), None)
-            self._asked = found is None
+            self._asked = True  # what is found may not be new enough, and others may ask too
         return found
 
     def _run(self) -> None:

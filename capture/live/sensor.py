@@ -44,8 +44,8 @@ class LiveSensor(Protocol):
     Attributes
     ----------
     uri : what was asked for
-    on_change : called, in the driver's thread, when the state changed, and when a pair came after
-        `latest` or `first_after` had none to give; must return at once and not raise
+    on_change : called, in the driver's thread, when the state changed, and when the first pair came
+        after `latest` or `first_after` was called; must return at once and not raise
     """
 
     uri: str

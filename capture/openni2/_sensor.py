@@ -60,7 +60,8 @@ class WatchedSensor(LiveSensor):
         self._source: LiveSource | None = None
         self._log = PairLog()
         self._asked = False
-        """Whether somebody asked for a pair that was not there."""
+        """Whether somebody asked for a pair since the last one came. What was given may not be new
+        enough, and others may have asked too."""
         self._last_pair_s = 0.0
         self._called_s = time.monotonic()
         """When the driver's thread last showed itself."""
@@ -117,7 +118,6 @@ class WatchedSensor(LiveSensor):
         pair = find() if source is not None else None
         if pair is None or source is None:
             return None
-        self._asked = False
         if closely:
             source.look_closely()
         try:

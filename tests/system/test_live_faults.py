@@ -266,6 +266,12 @@ def test_a_sensor_that_linux_lists_and_openni2_does_not_needs_a_new_process(
         assert "Xtion 1d27:0601 at port 1-4 was plugged in" in until(lambda: sensor.ask("stuck"))
 
 
+def test_who_asked_is_told_of_the_next_pair_whatever_was_given(sensor):
+    sensor.wait_state("streaming")
+    for _ in range(3):
+        assert sensor.ask("told_again")
+
+
 def test_lost_frames_are_counted(control, sensor):
     sensor.wait_state("streaming")
     before = sensor.ask("figures")["drops"]

@@ -84,7 +84,23 @@ def _serve(uri: str) -> None:
         if not history or history[-1][:2] != now:
             history.append((*now, time.monotonic()))
 
-    sensor.on_change = note
+    told = threading.Event()
+
+    def changed() -> None:
+        told.set()
+        note()
+
+    def told_again() -> bool:
+        """Ask for the newest pair, and again in between, and wait to be told of the next."""
+        shot = sensor.latest()
+        told.clear()
+        again = sensor.latest()
+        sensor.first_after(0.0)  # as somebody else would
+        assert shot is not None
+        assert again is not None
+        return told.wait(LIMIT_S)
+
+    sensor.on_change = changed
     note()
 
     def state() -> Any:
@@ -128,7 +144,7 @@ def _serve(uri: str) -> None:
 
     calls: dict[str, Callable[..., Any]] = {
         "state": state, "press": press, "burst": burst, "history": lambda: history,
-        "figures": lambda: asdict(sensor.figures), "identity": lambda: sensor.identity,
+        "told_again": told_again, "figures": lambda: asdict(sensor.figures), "identity": lambda: sensor.identity,
         "stuck": sensor.needs_new_process, "close": sensor.close,
         "cpu": time.process_time,
     }
