@@ -144,7 +144,8 @@ def _serve(uri: str) -> None:
 
     calls: dict[str, Callable[..., Any]] = {
         "state": state, "press": press, "burst": burst, "history": lambda: history,
-        "told_again": told_again, "figures": lambda: asdict(sensor.figures), "identity": lambda: sensor.identity,
+        "told_again": told_again, "figures": lambda: asdict(sensor.figures),
+        "identity": lambda: sensor.identity,
         "stuck": sensor.needs_new_process, "close": sensor.close,
         "cpu": time.process_time,
     }
