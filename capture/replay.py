@@ -168,7 +168,7 @@ class ReplaySensor(LiveSensor):
         """Give the newest frame."""
         return self._find(float("-inf"), newest=True)
 
-    def first_after(self, after_s: float) -> Shot | None:
+    def first_after(self, after_s: float, *, closely: bool = True) -> Shot | None:  # noqa: ARG002
         """Give the first frame that was due at a time or later, monotonic clock."""
         return self._find(after_s, newest=False)
 

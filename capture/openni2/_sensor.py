@@ -95,8 +95,8 @@ class WatchedSensor(LiveSensor):
     def latest(self) -> Shot | None:
         return self._shot(self._log.newest)
 
-    def first_after(self, after_s: float) -> Shot | None:
-        return self._shot(lambda: self._log.first_after(after_s), closely=True)
+    def first_after(self, after_s: float, *, closely: bool = True) -> Shot | None:
+        return self._shot(lambda: self._log.first_after(after_s), closely=closely)
 
     def wait(self, number: int, timeout_s: float) -> bool:
         return self._log.wait(number, timeout_s)

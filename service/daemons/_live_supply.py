@@ -99,7 +99,7 @@ class LiveSupply(Supply):
                 case Hinted():
                     yield judged
                 case Passed(capture_id, good):
-                    self._presses[capture_id].shots.append(good)
+                    self._presses[capture_id].shots.append(self._looked_at(good))
                 case NotPassed(capture_id, last):
                     del self._presses[capture_id]
                     yield NotTaken(capture_id, last.refusal, last.hint)
@@ -159,6 +159,11 @@ class LiveSupply(Supply):
             return Taken(press.capture_id, press.fusing.result())
         except FrameError as error:
             return NotTaken(press.capture_id, str(error))
+
+    def _looked_at(self, judged: Shot) -> Shot:
+        """Give the same pair with what is found at a closer look, as long as the sensor has it."""
+        again = self._sensor.first_after(judged.earliest_s)
+        return again if again is not None and again.earliest_s == judged.earliest_s else judged
 
     def hangs(self) -> str:
         return self._sensor.needs_new_process()

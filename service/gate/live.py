@@ -29,7 +29,7 @@ _WARM_S = 0.5
 
 @dataclass(frozen=True)
 class Passed:
-    """A press gets this frame."""
+    """A press gets this frame; whether its depth and colour belong together was not measured."""
 
     capture_id: str
     shot: Shot
@@ -122,7 +122,7 @@ class LiveGate:
             if self._clock() < self._hints_until_s:
                 yield Hinted(judged.hint)
         if self._call is None and (due_s := self._due_s()) is not None:
-            shot = self._sensor.first_after(due_s)
+            shot = self._sensor.first_after(due_s, closely=False)
             if shot is not None:
                 self._shot, self._judged = shot, None
                 self._call = self._pool.submit(self._judge_shot, shot)

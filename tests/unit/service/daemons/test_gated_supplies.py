@@ -97,6 +97,16 @@ def test_a_gated_press_gets_the_frame_that_its_gate_passed_and_no_other(supply, 
     assert taken.frame.depth is sensor.shots[1].frame.depth
 
 
+def test_a_frame_that_the_sensor_has_no_more_is_taken_as_it_was_judged(supply, sensor, gate):
+    for at_s in (1e9, 1e9 + 1):
+        sensor.shoot(at_s)
+    press(supply)
+    judged = sensor.shots.pop(0)
+    gate.says.append(Passed("a", judged))
+    (taken,) = outcomes(supply)
+    assert taken.frame.depth is judged.frame.depth
+
+
 def test_a_gated_burst_begins_with_that_frame(supply, sensor, gate):
     press(supply, frames=2)
     sensor.shoot(1e9)

@@ -36,7 +36,7 @@ class FakeSensor:
     def latest(self):
         return self.shots[-1] if self.shots else None
 
-    def first_after(self, after_s):
+    def first_after(self, after_s, *, closely=True):  # noqa: ARG002
         return next((shot for shot in self.shots if shot.earliest_s >= after_s), None)
 
     def needs_new_process(self):

@@ -27,7 +27,8 @@ class Sensor:
                            100 + index * PERIOD_S, 100 + index * PERIOD_S + 0.01)
                       for index in range(1000)]
 
-    def first_after(self, after_s):
+    def first_after(self, after_s, *, closely):
+        assert not closely
         known = [shot for shot in self.shots if shot.latest_s <= self.now][-4:]
         return next((shot for shot in known if shot.earliest_s >= after_s), None)
 
