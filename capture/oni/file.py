@@ -20,6 +20,7 @@ from denseface.capture.oni.records import (
     HEADER,
     IMAGE_NODE,
     MAGIC,
+    MAX_STAMP_US,
     MODE,
     NODE_ADDED,
     NODE_TAIL,
@@ -29,7 +30,7 @@ from denseface.capture.oni.records import (
 )
 from denseface.files import open_regular
 
-__all__ = ["OniFile", "OniNode", "read_oni"]
+__all__ = ["MAX_NODES", "OniFile", "OniNode", "read_oni"]
 
 _MODE = "xnMapOutputMode"
 """Property that holds the size of the images."""
@@ -37,9 +38,9 @@ _KEPT = ("xnCropping", "oniOriginalDevice", "DeviceName", "ID", "USBPath", DESCR
 """Properties that are not whole numbers, and are asked for."""
 _MAX_FIELDS = 1 << 20
 """Bytes of a record's fields; more is damage."""
-_MAX_NODES, _MAX_PROPERTIES, _MAX_NAME_BYTES = 64, 1024, 256
-"""Nodes of a file, properties of one of them and bytes of a name; more is damage. A sensor has
-three nodes, of some thirty properties each."""
+MAX_NODES, _MAX_PROPERTIES, _MAX_NAME_BYTES = 64, 1024, 256
+"""Nodes of a file, and the largest number of one, properties of one and bytes of a name; more is
+damage. A sensor has three nodes, of some thirty properties each."""
 
 
 @dataclass
@@ -170,11 +171,14 @@ def _note(found: OniFile, kind: int, number: int, content: bytes) -> None:
         if key == _MODE and len(value) >= U32.size + 8:
             known.sides = MODE.unpack_from(value.ljust(U32.size + MODE.size, b"\0"), U32.size)[:2]
     elif kind == Kind.NEW_DATA and known:
-        known.frames += 1
-        if known.kind in (DEPTH_NODE, IMAGE_NODE) and len(content) >= FRAME.size:
+        if known.kind in (DEPTH_NODE, IMAGE_NODE):
+            stamp_us = FRAME.unpack_from(content)[0] if len(content) >= FRAME.size else MAX_STAMP_US
+            if stamp_us >= MAX_STAMP_US:
+                raise _DamageError("damaged: a frame has no time stamp")
             found.order.append(known.kind)
-            found.stamps_us.append(FRAME.unpack_from(content)[0])
-    if (len(found.nodes) > _MAX_NODES
+            found.stamps_us.append(stamp_us)
+        known.frames += 1
+    if (max(found.nodes, default=0) > MAX_NODES
             or (known and len(known.properties) + len(known.texts) > _MAX_PROPERTIES)):
         raise _DamageError("damaged: more nodes or properties than a sensor has")
 

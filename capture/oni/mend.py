@@ -6,6 +6,7 @@ cropped.
 """
 
 import shutil
+import struct
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import BinaryIO
 
 from denseface.capture.errors import UnreadableSourceError
 from denseface.capture.oni import records
-from denseface.capture.oni.file import OniFile
+from denseface.capture.oni.file import MAX_NODES, OniFile
 from denseface.capture.oni.records import HEAD, HEADER, Kind
 from denseface.files import open_regular
 
@@ -30,7 +31,7 @@ def what_is_missing(found: OniFile) -> str | None:
     missing = [f"the Cropping property of the {name} stream" for kind, name in
                ((records.DEPTH_NODE, "depth"), (records.IMAGE_NODE, "color"))
                if (node := found.node(kind)) and not node.croppable]
-    if found.max_node < max(found.nodes):
+    if not max(found.nodes) <= found.max_node <= MAX_NODES:
         missing.append("the number of streams in its header")
     if any(node.seek_table_at >= found.end for node in found.nodes.values()):
         missing.append("the table of its frames")
@@ -55,13 +56,12 @@ def mended(path: Path, found: OniFile) -> BinaryIO:
     try:
         with open_regular(path) as file:
             *version, _, _ = HEADER.unpack(file.read(HEADER.size))
-            copy.write(HEADER.pack(*version, records.UNKNOWN_STAMP,
-                                   max(found.max_node, *found.nodes)))
+            copy.write(HEADER.pack(*version, records.UNKNOWN_STAMP, max(found.nodes)))
             for part in _records(file, found):
                 copy.write(part)
         copy.write(records.record(Kind.END, 0))
         copy.flush()
-    except (OSError, ValueError) as error:
+    except (OSError, struct.error) as error:
         copy.close()
         raise UnreadableSourceError(f"{path}: cannot be mended: {error}") from error
     except BaseException:

@@ -5,6 +5,7 @@ stamps is depth and colour of different times. The records lie in the file in th
 the frames came, which shows the lag, to within one frame.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -34,15 +35,28 @@ def color_lag_us(kinds: Sequence[int], stamps_us: Sequence[int]) -> int:
     """
     stamps, is_depth = np.asarray(stamps_us, np.int64), np.asarray(kinds) == DEPTH_NODE
     depth, color = stamps[is_depth], stamps[~is_depth]
-    following = np.cumsum(is_depth)[~is_depth]  # of each colour frame, among the depth frames
-    between = (following > 0) & (following < len(depth))
-    if not between.any():
+    steps = [float(np.median(np.diff(each))) for each in (depth, color) if len(each) > 1]
+    if not steps or not len(depth) or not len(color):
         return 0
-    half_period = max(float(np.median(np.diff(each)))
-                      for each in (depth, color) if len(each) > 1) / 2
-    following, color = following[between], color[between]
-    least = float(np.median(depth[following - 1] - color))
-    most = float(np.median(depth[following] - color))
-    if least <= half_period and most >= -half_period:
-        return 0
-    return round(most if is_depth[-1] else least)
+    half_period = max(steps) / 2
+    depths_before = np.cumsum(is_depth)[~is_depth]  # of each colour frame
+    between = (depths_before > 0) & (depths_before < len(depth))
+    if between.any():
+        following, color = depths_before[between], color[between]
+        least = float(np.median(depth[following - 1] - color))
+        most = float(np.median(depth[following] - color))
+    else:
+        # One stream's frames come after the other's, as also where both came in a burst: then not
+        # all of them contradict their stamps.
+        colors_before = np.cumsum(~is_depth)[is_depth]  # of each depth frame
+        after, before = depths_before > 0, colors_before > 0
+        least, most = -math.inf, math.inf
+        if after.any():
+            least = float(np.min(depth[depths_before[after] - 1] - color[after]))
+        if before.any():
+            most = float(np.max(depth[before] - color[colors_before[before] - 1]))
+    if least > half_period:
+        return round(most if is_depth[-1] and most < math.inf else least)
+    if most < -half_period:
+        return round(most if is_depth[-1] or least == -math.inf else least)
+    return 0

@@ -65,6 +65,8 @@ PROPERTIES = (Kind.INT, Kind.REAL, Kind.STRING, Kind.GENERAL)
 
 MAX_IMAGE_BYTES = 1600 * 1200 * 3
 """Of an image that OpenNI2's player takes: the size of its buffer."""
+MAX_STAMP_US = 10**17
+"""Of a frame: three thousand years; more is damage."""
 UNKNOWN_FRAMES, UNKNOWN_STAMP = 2**32 - 1, 2**64 - 1
 """Number of frames and last stamp while they are not known."""
 

@@ -159,9 +159,9 @@ class OniWriter:
         written, entries = [start], []
         at = self._end + len(start)
         for node, (stamp_us, payload) in zip(nodes, images, strict=True):
-            if not 0 <= stamp_us < records.UNKNOWN_STAMP:
-                raise FrameError(f"{self.path}: a time stamp of {stamp_us} us; an .oni has no "
-                                 "negative ones")
+            if not 0 <= stamp_us < records.MAX_STAMP_US:
+                raise FrameError(f"{self.path}: a time stamp of {stamp_us} us; an .oni has 0 to "
+                                 f"{records.MAX_STAMP_US}")
             written.append(node.frame(stamp_us, payload))
             entries.append((stamp_us, 0, at))
             at += len(written[-1])

@@ -77,6 +77,15 @@ def test_what_was_whole_before_a_cut_is_found(tmp_path, content, frames, words):
     assert len(found.order) == frames == sum(node.frames for node in found.nodes.values())
 
 
+@pytest.mark.parametrize("content", [
+    recording(record(0x0A, 1, struct.pack("<QI", 2**63, 9))),
+    recording(record(0x0A, 1, struct.pack("<Q", 5))),
+])
+def test_a_frame_without_a_time_stamp_is_damage(tmp_path, content):
+    with pytest.raises(UnreadableSourceError, match="a frame has no time stamp"):
+        read_oni(written(tmp_path, content))
+
+
 @pytest.mark.parametrize(("content", "words"), [
     (b"", "empty"),
     (b"hello, I am not a recording at all", "not an .oni recording"),

@@ -25,7 +25,7 @@ def lag(order: str, skew_us: int = 0, lost: tuple[int, ...] = (), period_us: int
 
 @pytest.mark.parametrize("order", [
     "dcdcdc", "cdcdcd", "dcdcdcd", "dccddccddc", "dcddccdcddcc", "d", "c", "", "dddd", "cccc",
-    "dc", "cd", "ddcc", "dcdcdc" * 100,
+    "dc", "cd", "ddcc", "ccdd", "dddccc", "cccddd", "dddddccccc", "dcdcdc" * 100,
 ])
 def test_a_clean_recording_has_no_lag(order):
     assert lag(order, jitter_us=2_000) == 0
@@ -42,6 +42,12 @@ def test_cameras_half_a_period_apart_are_no_lag(order, skew_us):
 def test_color_began_late(late, pairs):
     assert lag("d" * late + "dc" * pairs) == late * PERIOD
     assert lag("d" * late + "cd" * pairs) in (late * PERIOD, (late - 1) * PERIOD)
+
+
+@pytest.mark.parametrize("late", [2, 3, 30])
+def test_one_pair_of_a_stream_that_began_late(late):
+    assert lag("d" * late + "dc") == late * PERIOD
+    assert lag("c" * late + "cd") == -late * PERIOD
 
 
 @pytest.mark.parametrize("late", [1, 3, 30])
