@@ -19,6 +19,11 @@ _TIFF_WIDTH, _TIFF_HEIGHT = 256, 257
 """Tags of the first directory (TIFF 6.0)."""
 _TIFF_TYPES = {3: "H", 4: "I", 16: "Q"}
 """SHORT, LONG and BigTIFF's LONG8."""
+_MOST_PARTS = 100_000
+"""Chunks of a PNG or segments of a JPEG before its pixels; a picture of 256 MiB in chunks of 8 KiB
+has a third of that."""
+_MOST_TEXT = 256
+"""Bytes of a name in an EXR header."""
 _MOST_ENTRIES = 1024
 """Tags of a directory, attributes of an EXR header; files have a score."""
 _EXR_ODD = {0x800: "deep data", 0x1000: "several parts"}
@@ -59,7 +64,9 @@ def _png(data: bytes) -> tuple[int, int]:
         raise ValueError("a PNG image without IHDR")
     width, height = struct.unpack_from(">II", data, 16)
     at, kind = 8, b""
-    while kind != b"IEND":
+    for _ in range(_MOST_PARTS):
+        if kind == b"IEND":
+            return width, height
         if at + 12 > len(data):
             raise ValueError("a PNG image that is cut short (no IEND)")
         length, = struct.unpack_from(">I", data, at)
@@ -68,12 +75,12 @@ def _png(data: bytes) -> tuple[int, int]:
         if end + 4 > len(data) or zlib.crc32(data[at + 4:end]) != int.from_bytes(data[end:end + 4]):
             raise ValueError(f"a PNG image that is cut short or damaged at byte {at}")
         at = end + 4
-    return width, height
+    raise ValueError(f"a PNG image of more than {_MOST_PARTS} chunks")
 
 
 def _jpeg(data: bytes) -> tuple[int, int]:
     at, size = 2, None
-    while True:
+    for _ in range(_MOST_PARTS):
         if data[at] != 0xFF:
             raise ValueError(f"a JPEG image that is damaged at byte {at}")
         marker = data[at + 1]
@@ -140,8 +147,8 @@ def _exr(data: bytes) -> tuple[int, int]:
     for _ in range(_MOST_ENTRIES):
         if data[at] == 0:
             break
-        name_end = data.index(0, at)
-        type_end = data.index(0, name_end + 1)
+        name_end = _end_of_text(data, at)
+        type_end = _end_of_text(data, name_end + 1)
         length, = struct.unpack_from("<i", data, type_end + 1)
         if length < 0:
             raise ValueError("an EXR image with a damaged header")
@@ -152,6 +159,14 @@ def _exr(data: bytes) -> tuple[int, int]:
     if size is None:
         raise ValueError("an EXR image without a size")
     return size
+
+
+def _end_of_text(data: bytes, at: int) -> int:
+    """Find the 0 that ends a text of a header."""
+    end = data.find(0, at, at + _MOST_TEXT)
+    if end < 0:
+        raise ValueError(f"an EXR image with a damaged header (byte {at})")
+    return end
 
 
 _KINDS: tuple[tuple[bytes, int, str, Callable[[bytes], tuple[int, int]]], ...] = (

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays_of
 
 from denseface.capture import open_source
-from denseface.capture.calibration import Calibration
+from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
 from denseface.capture.errors import CalibrationError, FrameError, UnreadableSourceError
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
 from denseface.capture.npz import FolderWriter, load_frame, save_frame
@@ -234,6 +234,21 @@ def test_a_failed_save_leaves_the_old_file(tmp_path, monkeypatch):
                                       CALIBRATION))
     assert path.read_bytes() == old
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_depth_registered_at_another_resolution_than_the_colour(tmp_path):
+    """Of VGA depth in the pixels of a camera of 1280x1024, halved: its upper 960 rows."""
+    color = CameraModel(width=1280, height=1024, fx=1050, fy=1050, cx=639.5, cy=479.5)
+    path = tmp_path / "f.npz"
+    np.savez(path, depth=np.full((480, 640), 700, np.uint16), depth_timestamp_us=np.int64(0),
+             color=np.zeros((1024, 1280, 3), np.uint8), color_timestamp_us=np.int64(0),
+             registered=np.True_,
+             calibration=np.array(Calibration(depth=color, color=color).to_json()))
+    frame = load_frame(path)
+    camera = frame.depth_camera
+    assert (camera.width, camera.height, camera.fx, camera.cy) == (640, 480, 525, 239.5)
+    assert frame.depth_to_color == DepthToColor()
+    assert frame.origin.notes == ()
 
 
 def test_calibration_of_another_size_names_both(tmp_path):

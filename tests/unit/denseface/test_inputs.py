@@ -8,6 +8,7 @@ import pytest
 from denseface import load_face, open_source
 from denseface.capture.calibration_files import read_calibration
 from denseface.capture.errors import CaptureError
+from denseface.capture.image_pair import FolderSource, read_color_image, read_depth_image
 from denseface.capture.oni.file import read_oni
 from denseface.service.errors import ServiceError
 from denseface.service.protocol.roles import Role
@@ -26,6 +27,13 @@ def calibration_beside(path):
     open_source(recording)
 
 
+def list_of_a_folder(path):
+    for name in ("depth", "rgb"):
+        (path.parent / name).mkdir()
+    (path.parent / "rgb.txt").write_text("# timestamp filename\n")
+    FolderSource(path.parent)
+
+
 READERS = {
     "input.npz": open_source,
     "input.oni": open_source,
@@ -33,6 +41,10 @@ READERS = {
     "face.npz": load_face,
     "calibration.json": read_calibration,
     "beside.json": calibration_beside,
+    "depth.png": read_depth_image,
+    "depth.npy": read_depth_image,
+    "color.jpg": read_color_image,
+    "depth.txt": list_of_a_folder,
     "hub.secret": read_pair,
     "hub.public": read_public,
     "a.frame": read_parts,

@@ -117,6 +117,18 @@ def test_a_bomb_is_refused_by_its_header(tmp_path, monkeypatch, width, height):
         read_depth_image(tmp_path / "bomb.png")
 
 
+def test_headers_that_never_end_are_given_up(tmp_path):
+    exr = write(tmp_path / "whole.exr", METRES).read_bytes()
+    (tmp_path / "a.exr").write_bytes(exr[:8] + b"x" * 5000)
+    (tmp_path / "b.jpg").write_bytes(b"\xff\xd8" + b"\xff" * 2**20)
+    empty = struct.pack(">I", 0) + b"abCd" + struct.pack(">I", zlib.crc32(b"abCd"))
+    (tmp_path / "c.png").write_bytes(png_of(4, 4)[:33] + empty * 100_001)
+    for name, found in (("a.exr", "damaged header"), ("b.jpg", "without a frame"),
+                        ("c.png", "more than 100000 chunks")):
+        with pytest.raises(UnreadableSourceError, match=found):
+            read_depth_image(tmp_path / name)
+
+
 def test_the_setting_for_pixels_holds_for_each_format(tmp_path):
     for name, image in (("a.png", DEPTH), ("a.tiff", DEPTH), ("a.exr", METRES), ("a.npy", DEPTH)):
         path = write(tmp_path / name, image)
