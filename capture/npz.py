@@ -88,24 +88,29 @@ class FolderWriter:
 
     The files are not compressed: that would take longer than a sensor's next frame.
 
+    Parameters
+    ----------
+    mode : of the files, whatever the umask; a folder that is made is for this user alone
+
     Raises
     ------
     OSError
         As from the system; also where there are frame files already.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, mode: int = 0o600) -> None:
         self.path = folder
+        self._mode = mode
         self.frames = 0
         """How many are in the folder."""
         self._made = not folder.exists()
-        folder.mkdir(exist_ok=True)
+        folder.mkdir(0o700, exist_ok=True)
         if _frame_files(folder):
             raise FileExistsError(errno.EEXIST, "Holds frame files already", str(folder))
 
     def add(self, frame: RgbdFrame) -> None:
         """Write one more; OSError as from the system."""
-        save_frame(self.path / f"{self.frames:06}.npz", frame, quickly=True)
+        save_frame(self.path / f"{self.frames:06}.npz", frame, quickly=True, mode=self._mode)
         self.frames += 1
 
     def close(self) -> None:
@@ -172,12 +177,15 @@ def _size(image: NDArray[Any]) -> tuple[int, int]:
     return image.shape[1], image.shape[0]
 
 
-def save_frame(path: str | Path, frame: RgbdFrame, *, quickly: bool = False) -> None:
+def save_frame(
+    path: str | Path, frame: RgbdFrame, *, quickly: bool = False, mode: int | None = None
+) -> None:
     """Write a frame file: whole, or not at all; OSError as from the system.
 
     Parameters
     ----------
     quickly : do not compress, and do not wait for the disk
+    mode : of the file, exactly; None for 666 less the umask
     """
     arrays: dict[str, Any] = {
         "depth": frame.depth,
@@ -192,7 +200,7 @@ def save_frame(path: str | Path, frame: RgbdFrame, *, quickly: bool = False) -> 
     for name, text in (("sensor", frame.origin.sensor), ("captured_at", frame.origin.captured_at)):
         if text:
             arrays[name] = np.array(text[:_MAX_LINE])
-    with replacing(Path(path)) as file:
+    with replacing(Path(path), mode) as file:
         if quickly:
             np.savez(file, allow_pickle=False, **arrays)
             return

@@ -115,17 +115,23 @@ class OniWriter:
     Depth is stored without loss, in the codec of OpenNI's recorder; colour as JPEG. Stamps are the
     frames' own. What `RgbdFrame` has besides is in a property that other programs ignore.
 
+    Parameters
+    ----------
+    mode : of the file, whatever the umask
+
     Raises
     ------
     OSError
         As from the system; also where there is a file of that name.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, mode: int = 0o600) -> None:
         self.path = path
         self.frames = 0
         """How many are in the file."""
-        self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+        self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode)
+        with suppress(PermissionError):  # a file system without modes
+            os.fchmod(self._file, mode)
         self._end = 0
         self._nodes: list[_Node] = []
         self._kind: tuple[object, ...] = ()

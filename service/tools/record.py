@@ -52,7 +52,7 @@ class _End:
 
 def run(
     uri: str, calibration: Path | None, out: Path, *, frames: int | None = None,
-    seconds: float | None = None,
+    seconds: float | None = None, mode: int = 0o600,
 ) -> int:
     """Record until so many frames or seconds, the source's end, SIGINT or SIGTERM.
 
@@ -60,6 +60,7 @@ def run(
     ----------
     out : `NAME.oni`, or a folder; neither may hold anything yet
     frames, seconds : both None: without a limit
+    mode : of the files
 
     Returns
     -------
@@ -73,7 +74,7 @@ def run(
         Nothing could be recorded.
     """
     cv2.setNumThreads(1)
-    with StopSignal() as stop, _writing(out) as writer:
+    with StopSignal() as stop, _writing(out, mode) as writer:
         reader = FrameReader(uri, calibration)
         try:
             end = _record(reader, writer, stop, _Limits(frames, seconds))
@@ -152,7 +153,7 @@ def _record(reader: FrameReader, writer: _Writer, stop: StopSignal, limits: _Lim
 
 
 @contextmanager
-def _writing(out: Path) -> Iterator[_Writer]:
+def _writing(out: Path, mode: int) -> Iterator[_Writer]:
     """Give what writes there; it is closed in the end."""
     folder = out.is_dir() or not out.suffix
     if not folder and out.suffix.lower() != ".oni":
@@ -160,7 +161,7 @@ def _writing(out: Path) -> Iterator[_Writer]:
     try:
         if full := _no_room(out):
             raise full
-        writer: _Writer = FolderWriter(out) if folder else OniWriter(out)
+        writer: _Writer = (FolderWriter if folder else OniWriter)(out, mode)
     except FileExistsError as error:
         raise UsageError(f"{out}: there is a recording already; name another, or remove it"
                          ) from error

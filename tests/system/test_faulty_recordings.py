@@ -11,6 +11,7 @@ import pytest
 
 from denseface.capture.oni.file import read_oni
 from denseface.capture.oni.records import HEADER
+from tests.system.running import RECORDINGS, denseface
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.edited import began_late, edited, records_of, without_cropping
 from tests.virtual_sensor.process import environment, record_clip, run_python
@@ -204,3 +205,16 @@ def test_no_room_for_a_mended_copy(recorded, tmp_path):
             "from denseface.capture import open_source\nopen_source(sys.argv[1])")
     done = run_python(code, path, env=environment())
     assert "a mended copy needs 0 MiB and 64 MiB to spare in" in done.stderr
+
+
+def test_what_was_doubtful_about_a_recording_is_printed_and_reported(tmp_path):
+    """Colour began two of three frames late, and the last record is cut."""
+    path, report = tmp_path / "take.oni", tmp_path / "report.json"
+    path.write_bytes(began_late((RECORDINGS / "frontal_700.oni").read_bytes(), _COLOR, 2)[:-9])
+    done = denseface("reconstruct", path, "--report", report, "-o", tmp_path / "face.ply")
+    assert done.returncode == 0, done.stderr
+    said = json.loads(report.read_text())
+    assert said["skew_known_by"] == "record order"
+    for words in ("the 1 whole frames before that are used", "color stream began 67 ms after"):
+        assert any(words in warning for warning in said["warnings"])
+        assert words in done.stderr

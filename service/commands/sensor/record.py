@@ -13,6 +13,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seconds", type=_options.seconds, metavar="S",
                         help="end after S seconds (default: at Ctrl-C, or the source's end)")
     parser.add_argument("--frames", type=_options.count, metavar="N", help="end after N frames")
+    _options.add_mode(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -22,4 +23,4 @@ def run(args: argparse.Namespace) -> int:
     from denseface.service.tools import record
 
     return record.run(args.source, args.calibration, args.output, frames=args.frames,
-                      seconds=args.seconds)
+                      seconds=args.seconds, mode=args.mode)

@@ -56,6 +56,20 @@ def test_a_recording_is_as_long_as_the_stamps_of_its_source_say(folder, tmp_path
     assert Recorded(out).pairs == held
 
 
+@pytest.mark.parametrize("name", ["take.oni", "take"])
+@pytest.mark.parametrize("mode", [0o600, 0o640])
+def test_pictures_of_people_are_for_those_who_may_see_them(folder, tmp_path, name, mode):
+    before = os.umask(0)
+    try:
+        record.run(str(folder), None, tmp_path / name, frames=1, mode=mode)
+    finally:
+        os.umask(before)
+    out = tmp_path / name
+    for path in out.iterdir() if out.is_dir() else [out]:
+        assert path.stat().st_mode & 0o777 == mode
+    assert not out.is_dir() or out.stat().st_mode & 0o777 == 0o700
+
+
 def test_doubts_are_printed_once(folder, tmp_path, monkeypatch, capsys):
     note = "the colour is from yesterday"
     real = _recording.open_source
