@@ -122,9 +122,6 @@ class LiveSource(OpenNI2Source):
             f"{self._name}: no {' and '.join(clocks)} pair within {self.timeout_s:g} s (received "
             + " and ".join(f"{clock.frames} {kind}" for kind, clock in clocks.items()) + " frames)")
 
-    def flush(self) -> None:
-        """Nothing is to be thrown away: `read` gives only what arrived after its call."""
-
     def poll(self, timeout_s: float) -> LivePair | None:
         """Wait for the next frame of either stream, copy it, and give the pair that it completes.
 

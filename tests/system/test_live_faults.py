@@ -47,7 +47,7 @@ def stale(presses):
 def test_every_press_gets_a_frame_that_was_exposed_after_it(control, sensor, pipeline_us):
     control.pipeline_us = pipeline_us
     sensor.wait_state("streaming")
-    presses = sensor.presses(60)
+    presses = sensor.presses(40)
     assert not stale(presses)
     for press in presses:
         assert press["earliest_s"] <= min(press["exposed_s"])

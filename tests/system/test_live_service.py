@@ -90,7 +90,7 @@ def test_frames_and_previews_come_from_one_process_that_stays(hub, control, tmp_
         assert control.loads == 1
 
 
-@pytest.mark.parametrize("call", [Call.STOP, Call.DESTROY_STREAM, Call.CLOSE])
+@pytest.mark.parametrize("call", [Call.STOP, Call.CLOSE])
 def test_a_driver_that_hangs_when_it_is_closed_ends_the_process(hub, control, tmp_path, call):
     log = tmp_path / "log"
     with capture_process(hub, control, log) as process, Client(hub) as client:
@@ -101,7 +101,7 @@ def test_a_driver_that_hangs_when_it_is_closed_ends_the_process(hub, control, tm
     assert re.search(r"the driver hangs \(closing for [23]\.\d s\)", log.read_text())
 
 
-@pytest.mark.parametrize("call", [Call.STOP, Call.DESTROY_STREAM, Call.CLOSE, Call.SHUTDOWN])
+@pytest.mark.parametrize("call", [Call.DESTROY_STREAM, Call.SHUTDOWN])
 def test_a_driver_that_hangs_does_not_keep_the_process_at_its_end(hub, control, tmp_path, call):
     with capture_process(hub, control, tmp_path / "log") as process, Client(hub) as client:
         until(lambda: not pressed(client))
@@ -130,7 +130,7 @@ def test_the_service_brings_back_a_sensor_whose_driver_hung(control, tmp_path):
         until(lambda: not pressed(client))
 
 
-@pytest.mark.parametrize("call", [Call.STOP, Call.CLOSE, Call.SHUTDOWN])
+@pytest.mark.parametrize("call", [Call.CLOSE, Call.SHUTDOWN])
 def test_a_program_that_read_a_sensor_ends_though_the_driver_hangs(control, call):
     """Any command that opens a sensor, not only the service."""
     control.hang = call
