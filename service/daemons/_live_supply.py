@@ -19,9 +19,9 @@ from denseface.service.runtime.wake_pipe import WakePipe
 
 _HOPEFUL = (LiveState.OPENING, LiveState.WARMING, LiveState.STREAMING, LiveState.STALLED)
 """States in which a press waits: there will be frames soon, or it will be known that not."""
-_HOLD_S = 0.07
-"""Age up to which a picture waits for its hint, seconds: two frame periods of the three that a
-mirror may lag."""
+_HOLD_S = 0.05
+"""Age up to which a picture waits for its hint, seconds: half of the three frame periods that a
+mirror may lag. On a machine with time to spare that is long enough."""
 _LOOKED_AT_S = 1.0
 """After the last preview frames are judged for so long, seconds."""
 
@@ -116,17 +116,16 @@ class LiveSupply(Supply):
 
     def _picture(self) -> Iterator[Picture]:
         """Give a picture that is newer than the last: the one with a hint of its own, if any."""
-        hinted, judging, newest = (
-            self._gate.last_hint(), self._gate.judging, self._sensor.latest())
-        hint = None
-        if hinted is not None and hinted[0].latest_s > self._shown_s:
-            newest, hint = hinted
-        elif (judging is not None and judging.latest_s > self._shown_s
-              and time.monotonic() - judging.latest_s < _HOLD_S):
-            return
-        if newest is not None and newest.latest_s > self._shown_s:
-            self._preview_due, self._shown_s = False, newest.latest_s
-            yield Picture(newest.frame, hint)
+        shot, hint = self._gate.last_hint() or (None, None)
+        if shot is None or shot.latest_s <= self._shown_s:
+            shot, hint = self._sensor.latest(), None  # asked, it tells of the next one
+            judging = self._gate.judging
+            if (judging is not None and judging.latest_s > self._shown_s
+                    and time.monotonic() - judging.latest_s < _HOLD_S):
+                return
+        if shot is not None and shot.latest_s > self._shown_s:
+            self._preview_due, self._shown_s = False, shot.latest_s
+            yield Picture(shot.frame, hint)
 
     def _serve(self, press: _Press) -> Outcome | None:
         while len(press.shots) < press.wanted:
