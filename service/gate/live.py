@@ -21,6 +21,8 @@ __all__ = ["Hinted", "LiveGate", "NotPassed", "Passed"]
 
 _PERIOD_S = 0.1
 """Between two frames that are judged for hints, seconds."""
+_MOST_SHARE = 0.2
+"""Of a core that hints may take: where a scene is costly to search, fewer frames are judged."""
 _SLACK_S = 0.005
 """The third frame of thirty a second counts as after that, also where its time jitters."""
 _WARM_S = 0.5
@@ -65,21 +67,25 @@ class LiveGate:
     sensor : whose frames
     wake : called in another thread when `step` has something to give
     clock : the sensor's
+    cost_clock : processor time of the calling thread, seconds
     """
 
     def __init__(
         self, sensor: LiveSensor, wake: Callable[[], object],
         clock: Callable[[], float] = time.monotonic,
+        cost_clock: Callable[[], float] = time.thread_time,
     ) -> None:
         self._sensor = sensor
         self._wake = wake
-        self._clock = clock
+        self._clock, self._cost_clock = clock, cost_clock
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="gate")
         self._judge = FrameJudge(clock)
         self._call: Future[Judged] | None = None
         self._shot: Shot | None = None
         """The one that is judged, or was judged last."""
         self._judged: Judged | None = None
+        self._cost_s = 0.0
+        """Processor time of the frame that was judged last."""
         self._hints_until_s = self._looked_until_s = 0.0
         self._waiting: dict[str, _Waiting] = {}
 
@@ -140,7 +146,8 @@ class LiveGate:
         if now >= max(self._hints_until_s, self._looked_until_s):
             return None
         last_s = self._shot.earliest_s if self._shot is not None else -math.inf
-        return max(last_s + _PERIOD_S - _SLACK_S, now - _PERIOD_S)
+        period_s = max(_PERIOD_S, self._cost_s / _MOST_SHARE)
+        return max(last_s + period_s - _SLACK_S, now - _PERIOD_S)
 
     def _decide(self, shot: Shot, judged: Judged) -> Iterator[Passed | NotPassed]:
         now = self._clock()
@@ -159,4 +166,7 @@ class LiveGate:
 
     def _judge_shot(self, shot: Shot) -> Judged:
         """Judge a frame, in the thread."""
-        return self._judge.judge(shot.frame, round(shot.earliest_s * 1e6))
+        begun_s = self._cost_clock()
+        judged = self._judge.judge(shot.frame, round(shot.earliest_s * 1e6))
+        self._cost_s = self._cost_clock() - begun_s
+        return judged

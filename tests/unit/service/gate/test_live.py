@@ -41,11 +41,14 @@ class Gate:
         self.measured = []
         self.good_from = good_from
         monkeypatch.setattr(frame_judge, "measure", self.measure)
-        self.gate = LiveGate(self.sensor, lambda: None, clock=lambda: self.sensor.now)
+        self.spent_s = self.costs_s = 0.0
+        self.gate = LiveGate(self.sensor, lambda: None, clock=lambda: self.sensor.now,
+                             cost_clock=lambda: self.spent_s)
 
     def measure(self, frame, previous, at_us):
         number = frame.depth_timestamp_us
         self.measured.append(number)
+        self.spent_s += self.costs_s
         assert at_us == round(self.sensor.shots[number].earliest_s * 1e6)
         if number < self.good_from:
             return Quality(number, somebody=False)
@@ -87,6 +90,20 @@ def test_hints_come_ten_times_a_second_while_they_are_asked_for(gate):
     assert all(isinstance(one, Hinted) for one in hints)
     assert {one.hint.codes for one in hints} == {("nobody",)}
     assert len(gate.measured) <= 21
+
+
+def test_what_is_costly_to_judge_is_judged_less_often(gate):
+    gate.gate.send_hints(10.0)
+    gate.costs_s = 0.06
+    gate.run(6.0)
+    assert 0.15 <= gate.spent_s / 6 <= 0.21
+
+
+def test_who_waits_does_not_wait_for_that(gate):
+    gate.costs_s = 0.06
+    gate.gate.press(take(timeout=1.0))
+    gate.run(0.9)
+    assert len(gate.measured) >= 25
 
 
 def test_while_previews_are_looked_at_frames_are_judged_and_no_hints_sent(gate):
