@@ -7,8 +7,9 @@ import numpy as np
 
 from denseface.capture.frame import RgbdFrame
 from denseface.recon.detection import close_face, follow_face, look_for_faces
-from denseface.recon.errors import NoDepthError
+from denseface.recon.errors import NoDepthError, NoFaceError
 from denseface.recon.face import FaceCandidate
+from denseface.recon.intermediate import Registration
 from denseface.recon.quality._head import heads_by_depth
 from denseface.recon.quality._light import light, sharpness
 from denseface.recon.quality._motion import Patch, motion_mm
@@ -103,15 +104,18 @@ def _too_near(frame: RgbdFrame, depth: SparseDepth) -> bool:
 
 
 def _find(frame: RgbdFrame, memory: Memory) -> _Found:
-    """Find the nearest face: near the last one, in the whole image, or by its depth."""
+    """Find the nearest face, or nothing where none could be seen at all."""
     sparse = slice(None, None, SPARSE)
-    focal_px = frame.calibration.color.fx
-    face: FaceCandidate | None
     try:
-        overview = register(frame, sparse, sparse, colors=False)
-    except NoDepthError:
+        return _find_in(frame, register(frame, sparse, sparse, colors=False), memory)
+    except (NoDepthError, NoFaceError):  # nothing before the colour camera; a strip of an image
         return _Found(None, Sight.DEPTH, 0, False)
-    color, face = frame.rgb, None
+
+
+def _find_in(frame: RgbdFrame, overview: Registration, memory: Memory) -> _Found:
+    """Find the nearest face: near the last one, in the whole image, or by its depth."""
+    color, focal_px = frame.rgb, frame.calibration.color.fx
+    face: FaceCandidate | None = None
     others, possible, frontal = memory.others, True, True
     if memory.followed is not None:
         again = follow_face(color, overview, focal_px, memory.followed, memory.count)

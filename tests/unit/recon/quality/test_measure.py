@@ -7,10 +7,11 @@ import cv2
 import numpy as np
 import pytest
 
+from denseface.capture.calibration import DepthToColor
 from denseface.capture.frame import DepthMeaning
 from denseface.recon.quality import Sight, measure
 from tests.simulator import Person, Scene, simulate
-from tests.unit.frames import resampled
+from tests.unit.frames import calibration, camera, frame, resampled
 from tests.unit.recon.quality.conftest import framed, stream
 
 TURNS = pytest.mark.parametrize("degrees", [-20, 15])
@@ -198,6 +199,23 @@ def test_a_wall_or_a_photograph_is_nobody(ahead):
 @pytest.mark.parametrize("depth", [0, 399, 65535])
 def test_depth_that_says_nothing(ahead, depth):
     assert stream(*[replace(ahead, depth=np.full_like(ahead.depth, depth))] * 2).face is None
+
+
+@pytest.mark.parametrize("translation", [(0.0, 0.0, -5000.0), (4000.0, 0.0, 0.0)])
+def test_a_calibration_by_which_the_camera_sees_nothing(ahead, translation):
+    pose = DepthToColor(translation_mm=translation)
+    calib = ahead.calibration.model_copy(update={"depth_to_color": pose})
+    assert stream(*[replace(ahead, calibration=calib)] * 2).face is None
+
+
+@pytest.mark.parametrize("size", [(1, 1), (300, 1), (1, 300), (3, 200), (9000, 2)])
+def test_images_of_every_size(ahead, size):
+    depth = np.ascontiguousarray(cv2.resize(ahead.depth, size).reshape(size[::-1]), np.uint16)
+    color = np.asarray(cv2.resize(ahead.rgb, size).reshape(*size[::-1], 3), np.uint8)
+    known = camera(*size, f=float(max(size)))
+    one = frame(depth, color, calibration(depth=known, color=known))
+    assert stream(one, one).face is None
+    assert stream(*[replace(one, color=None)] * 2).face is None
 
 
 def test_the_same_frames_give_the_same_measures(ahead):
