@@ -69,7 +69,8 @@ class LiveSource(OpenNI2Source):
         self, wanted: str | Identity | None = None, chosen: ChosenCalibration | None = None, *,
         timeout_s: float = 5.0, start: bool = True, transport_s: float = TRANSPORT_S,
     ) -> None:
-        super().__init__(f"openni2:{wanted or ''}", chosen)
+        name = wanted.name if isinstance(wanted, Identity) else wanted or ""
+        super().__init__(f"openni2:{name}", chosen)
         self.timeout_s, self._transport_s = timeout_s, transport_s
         self.no_room = self.wrong_size = 0
         self._settled = self._locked = False
@@ -81,9 +82,12 @@ class LiveSource(OpenNI2Source):
         self._device_uri = bytes(device.uri)
         lost_devices.discard(self._device_uri)
         streams = self._opened = self._open_streams(device)
-        self.known_as = identity_of(device)
-        if self._chosen is None:
-            self._chosen = self._own_calibration()
+        try:
+            self.known_as = identity_of(device)
+            self._chosen = self._chosen or find_calibration(self.known_as)
+        except BaseException:
+            self.close()
+            raise
         self._rings = {kind: Ring(_SLOTS, streams.frame_bytes(kind)) for kind in streams.kinds}
         self.pairs: LivePairs | None = None
         if start:
@@ -223,14 +227,6 @@ class LiveSource(OpenNI2Source):
     def identity(self) -> str:
         """What the sensor is known by: serial number, else USB port, else URI."""
         return self.known_as.name
-
-    def _own_calibration(self) -> ChosenCalibration | None:
-        """Read the calibration file of this sensor; the source is closed where that fails."""
-        try:
-            return find_calibration(self.known_as)
-        except BaseException:
-            self.close()
-            raise
 
     @property
     def streams(self) -> Streams:

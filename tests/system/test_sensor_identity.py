@@ -87,6 +87,10 @@ def test_a_calibration_is_found_by_the_sensor(pair, tmp_path):
     said = opened(tmp_path, pair, "A1", "B2", DENSEFACE_CALIBRATIONS=str(folder))
     assert [one[2] for one in said] == [
         "by USB port: 1-1.calibration.json", "by serial: B2.calibration.json"]
+    (folder / "A1.calibration.json").write_text("{}")
+    done = run_python(_OPEN, tmp_path / "usb", "A1", env=environment(controls=pair)
+                      | {"DENSEFACE_CALIBRATIONS": str(folder)})
+    assert "A1.calibration.json: depth: Field required" in done.stderr
 
 
 def test_a_sensor_comes_back_under_another_uri(pair, tmp_path):
