@@ -168,8 +168,11 @@ class ReplaySensor(LiveSensor):
         """Give the newest frame."""
         return self._find(float("-inf"), newest=True)
 
-    def first_after(self, after_s: float, *, closely: bool = True) -> Shot | None:  # noqa: ARG002
-        """Give the first frame that was due at a time or later, monotonic clock."""
+    def first_after(self, after_s: float, *, closely: bool = False) -> Shot | None:  # noqa: ARG002
+        """Give the first frame that was due at a time or later, monotonic clock.
+
+        closely : nothing; frames are prepared when they are read
+        """
         return self._find(after_s, newest=False)
 
     def lock_exposure(self, *, on: bool) -> None:

@@ -70,7 +70,7 @@ class LiveSensor(Protocol):
     def latest(self) -> Shot | None:
         """Give the newest pair; None while the sensor does not stream."""
 
-    def first_after(self, after_s: float, *, closely: bool = True) -> Shot | None:
+    def first_after(self, after_s: float, *, closely: bool = False) -> Shot | None:
         """Give the first pair of which both images were surely exposed at a time or later.
 
         None while there is none: `on_change` is called when to ask again. The pair after a shot is
@@ -81,6 +81,11 @@ class LiveSensor(Protocol):
         after_s : monotonic clock, seconds
         closely : measure whether its depth and colour belong together, however short ago that was
             done: for a frame that becomes a face. It takes longer than to judge its quality.
+
+        Raises
+        ------
+        MismatchedFrameError
+            They do not, and that was to be measured.
         """
 
     def lock_exposure(self, *, on: bool) -> None:

@@ -95,7 +95,7 @@ class WatchedSensor(LiveSensor):
     def latest(self) -> Shot | None:
         return self._shot(self._log.newest)
 
-    def first_after(self, after_s: float, *, closely: bool = True) -> Shot | None:
+    def first_after(self, after_s: float, *, closely: bool = False) -> Shot | None:
         return self._shot(lambda: self._log.first_after(after_s), closely=closely)
 
     def wait(self, number: int, timeout_s: float) -> bool:
@@ -119,7 +119,7 @@ class WatchedSensor(LiveSensor):
         if pair is None or source is None:
             return None
         if closely:
-            source.look_closely()
+            source.look_closely(refuse=True)
         try:
             return source.shot(pair)
         except WrongSizeError:  # the driver has changed the size meanwhile

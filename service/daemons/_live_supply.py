@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from denseface.capture import RgbdFrame
 from denseface.capture.burst import fuse
-from denseface.capture.errors import FrameError
+from denseface.capture.errors import FrameError, MismatchedFrameError
 from denseface.capture.live.sensor import LiveSensor, Shot
 from denseface.capture.live.states import LiveState
 from denseface.service.daemons._supply import NotTaken, Outcome, Picture, Supply, SupplyState, Taken
@@ -132,7 +132,11 @@ class LiveSupply(Supply):
             # The state first: a pair that comes in between is not overlooked.
             state, reason = self._sensor.state, self._sensor.reason
             left_to_gate = press.gated and not press.shots
-            shot = None if left_to_gate else self._sensor.first_after(press.next_s)
+            try:
+                shot = None if left_to_gate else self._sensor.first_after(
+                    press.next_s, closely=not press.shots)
+            except MismatchedFrameError as error:
+                return NotTaken(press.capture_id, str(error))
             if shot is not None:
                 press.shots.append(shot)
                 continue

@@ -57,6 +57,8 @@ class SensorReader:
         if self._flush_due and isinstance(self._source, _LiveSource):
             self._source.flush()  # frames that wait since the last preview are older than the press
         self._flush_due = False
+        if self._source is not None:
+            self._source.look_closely(refuse=True)
         return self._next()
 
     def peek(self) -> RgbdFrame:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from denseface.capture.errors import MismatchedFrameError
 from denseface.capture.live.sensor import Shot
 from denseface.capture.live.states import LiveFigures, LiveState
 from denseface.service.daemons import _live_supply
@@ -36,7 +37,8 @@ class FakeSensor:
     def latest(self):
         return self.shots[-1] if self.shots else None
 
-    def first_after(self, after_s, *, closely=True):  # noqa: ARG002
+    def first_after(self, after_s, *, closely=False):
+        self.closely = closely
         return next((shot for shot in self.shots if shot.earliest_s >= after_s), None)
 
     def needs_new_process(self):
@@ -64,6 +66,19 @@ def supply(sensor, now):
 
 def outcomes(supply, **options):
     return list(supply.step(**{"busy": False} | options))
+
+
+def test_a_pair_that_does_not_belong_together_is_refused(supply, sensor):
+    def first_after(after_s, *, closely):
+        assert closely
+        raise MismatchedFrameError("fake:: depth and colour do not belong together")
+
+    sensor.first_after = first_after
+    supply.press(Take(capture_id="a"))
+    (refused,) = outcomes(supply)
+    assert (refused.capture_id, refused.reason) == (
+        "a", "fake:: depth and colour do not belong together")
+    assert outcomes(supply) == []
 
 
 def test_a_press_gets_the_first_pair_after_it(supply, sensor):
