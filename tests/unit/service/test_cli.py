@@ -94,6 +94,8 @@ def outcome(capfd, *arguments):
     (["up", "--source", "a.oni", "--source", "a.oni"], "--source a.oni: given twice"),
     (["up", "--source", "a.oni", "--source", "b.oni", "--calibration", "c.json"],
      "--calibration: 1 given for 2 sources"),
+    (["up", "--source", "a.oni", *2 * ("--rotate", "90")], "--rotate: 2 given for 1 sources"),
+    (["up", "--rotate", "45"], "invalid choice: 45"),
     (["subscribe", "--save", "{tmp}/none"], "no such folder"),
     (["press", "--mode", "688"], "'688': expected three octal digits"),
     (["subscribe", "--mode", "040"], "'040': expected three octal digits"),
