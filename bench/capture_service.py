@@ -50,7 +50,7 @@ def capture_process(service: Running) -> psutil.Process:
     """Give the process that has the sensor; another one while the supervisor replaces it."""
     until = time.monotonic() + _COME_BACK_S
     while time.monotonic() < until:
-        with suppress(psutil.NoSuchProcess, IndexError):
+        with suppress(psutil.NoSuchProcess, StopIteration):
             return next(one for one in service.family() if kind_of(one) == "capture")
         time.sleep(0.1)
     raise RuntimeError("there is no capture process")
