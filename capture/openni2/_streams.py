@@ -204,7 +204,8 @@ class Streams:
             frame = stream.handle.read_frame()
         try:
             self._copy(stream, frame, memory)
-            return int(frame.timestamp)
+            # A driver may mean a time below zero, as of a clock that was set back.
+            return ctypes.c_int64(frame.timestamp).value
         finally:
             frame.close()
 

@@ -63,6 +63,15 @@ def pressed(client):
     return ""
 
 
+def test_a_press_is_answered_though_the_stamps_are_below_zero(hub, control, tmp_path):
+    """As of a clock that was set back: OpenNI2 gives them as numbers near 2**64."""
+    for stream in (control.depth, control.color):
+        stream.stamp_offset_us = -3_600_000_000
+    with capture_process(hub, control, tmp_path / "log"), Client(hub) as client:
+        until(lambda: not pressed(client))
+        assert control.loads == 1
+
+
 def test_the_reason_why_there_is_no_frame_reaches_the_presser(hub, control, tmp_path):
     control.plugged = False
     with capture_process(hub, control, tmp_path / "log"), Client(hub) as client:
