@@ -67,7 +67,10 @@ class ReplayOptions:
 
     @classmethod
     def split(cls, uri: str) -> tuple[str, Self | None]:
-        """Split options from a URI; None where it has none. A file may have a ``?`` in its name.
+        """Split options from a URI; None where it has none.
+
+        A file may have a ``?`` in its name, and a sensor in its address, as Freenect's have:
+        ``freenect://0?serial=A00``.
 
         Raises
         ------
@@ -75,7 +78,7 @@ class ReplayOptions:
             An option is unknown, or has no value that it may have.
         """
         name, mark, text = uri.rpartition("?")
-        if not mark or Path(uri).exists():
+        if not mark or f"{uri.partition(':')[0].lower()}:" in _SOURCES or Path(uri).exists():
             return uri, None
         given: dict[str, str] = {}
         for option in text.split("&"):
@@ -200,8 +203,6 @@ def open_source(
             found = ("is a folder, not a file" if path.is_dir() else
                      "is not a regular file" if path.exists() else "no such file")
             raise UnreadableSourceError(f"{text}: {found}")
-    elif options is not None:
-        raise UnreadableSourceError(f"{uri}: a live sensor has no options of a replay")
     source: Source = _class(_SOURCES[kind])(
         path or address or None, choose_calibration(path, calibration))
     source.rotation, source.raw = rotation, raw

@@ -45,6 +45,7 @@ def numbers(frames) -> list[int]:
     ("a.oni?rate=asked&end=stop", "a.oni", ReplayOptions(stops=True)),
     ("a?b.oni?end=loop&frame=12", "a?b.oni", ReplayOptions(frame=12)),
     ("openni2:", "openni2:", None),
+    ("OpenNI2:freenect://0?serial=A00", "OpenNI2:freenect://0?serial=A00", None),
 ])
 def test_options_of_a_uri(uri, name, options):
     assert ReplayOptions.split(uri) == (name, options)
@@ -65,11 +66,6 @@ def test_a_file_with_a_question_mark_in_its_name(tmp_path):
         assert numbers(source) == [3]
     with open_source(f"{path}?end=stop") as source:
         assert numbers(source) == [3]
-
-
-def test_a_live_sensor_has_no_options():
-    with pytest.raises(UnreadableSourceError, match="a live sensor has no options of a replay"):
-        open_source("openni2:?rate=real")
 
 
 def test_one_frame_of_a_folder(folder):
