@@ -18,9 +18,8 @@ from pathlib import Path
 from denseface.service.client import Client
 from denseface.service.tools import doctor
 folder = Path(sys.argv[1])
-with Client(f"ipc://{folder}/nobody") as client:
-    sys.exit(doctor.run(None, client, as_json_object=True, usb_root=folder / "usb", root=folder,
-                        limit_s=float(sys.argv[2])))
+sys.exit(doctor.run(None, lambda: Client(f"ipc://{folder}/nobody"), as_json_object=True,
+                    usb_root=folder / "usb", root=folder, limit_s=float(sys.argv[2])))
 """
 
 
@@ -89,8 +88,11 @@ def test_a_sensor_that_another_program_has(sensor, tmp_path):
 
 
 def test_the_command_without_a_sensor(tmp_path):
-    env = environment() | {"DENSEFACE_ADDRESS": f"ipc://{tmp_path}/nobody"}
-    done = denseface("doctor", **env)
+    done = denseface("doctor", "--address", f"ipc://{tmp_path}/nobody", **environment())
     assert (done.returncode, done.stderr) == (1, "")
     assert "problem  sensor: OpenNI2 lists none" in done.stdout
     assert f"warning  hub: ipc://{tmp_path}/nobody: no answer" in done.stdout
+    # A wrong address is a finding like any other.
+    done = denseface("doctor", "--address", "udp://", **environment())
+    assert "problem  sensor: OpenNI2 lists none" in done.stdout
+    assert "problem  hub: udp://" in done.stdout

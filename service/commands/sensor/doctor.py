@@ -16,5 +16,4 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from denseface.service.tools import doctor
 
-    with _options.client(args) as client:
-        return doctor.run(args.source, client, as_json_object=args.json)
+    return doctor.run(args.source, lambda: _options.client(args), as_json_object=args.json)

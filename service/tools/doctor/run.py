@@ -1,11 +1,11 @@
 """Everything that the doctor looks at, one after the other."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from denseface.capture.identity import USB_DEVICES, Identity, known_as, usb_devices
 from denseface.service.client import Client
-from denseface.service.errors import ServiceError
+from denseface.service.errors import ServiceError, SettingsError
 from denseface.service.protocol.messages import Status
 from denseface.service.runtime.terminal import say
 from denseface.service.tools.doctor.findings import (
@@ -14,6 +14,7 @@ from denseface.service.tools.doctor.findings import (
     as_json,
     as_lines,
     ok,
+    problem,
     warning,
     worst,
 )
@@ -33,7 +34,7 @@ _HUB_S = 3.0
 
 
 def run(
-    source: str | None, client: Client, *, as_json_object: bool = False,
+    source: str | None, connect: Callable[[], Client], *, as_json_object: bool = False,
     usb_root: Path = USB_DEVICES, root: Path = Path("/"), limit_s: float = LIMIT_S,
 ) -> int:
     """Look at everything, print what was found and give the exit status: 1 with a problem.
@@ -41,12 +42,12 @@ def run(
     Parameters
     ----------
     source : the one sensor to be opened, as of `--source`; None for all that there are
-    client : to ask the hub with
+    connect : makes the client to ask the hub with
     usb_root, root : instead of Linux's list of USB devices and `/`, for tests
     limit_s : longest time that a sensor has
     """
     findings = []
-    for finding in _look(source, client, usb_root, root, limit_s):
+    for finding in _look(source, connect, usb_root, root, limit_s):
         findings.append(finding)
         if not as_json_object:
             say(*as_lines([finding]), flush=True)
@@ -56,12 +57,12 @@ def run(
 
 
 def _look(
-    source: str | None, client: Client, usb_root: Path, root: Path, limit_s: float
+    source: str | None, connect: Callable[[], Client], usb_root: Path, root: Path, limit_s: float
 ) -> Iterator[Finding]:
     devices = usb_devices(usb_root)
     yield from look_at_library(devices)
     yield from look_at_usb(devices, root)
-    hub, status = _ask_hub(client)
+    hub, status = _ask_hub(connect)
     yield hub
     answers = ask(limit_s=limit_s)
     yield from look_at_list(answers, devices)
@@ -76,12 +77,16 @@ def _look(
         yield from look_at_frame(sensor.name, ask(sensor.uri, limit_s), serving)
 
 
-def _ask_hub(client: Client) -> tuple[Finding, Status | None]:
+def _ask_hub(connect: Callable[[], Client]) -> tuple[Finding, Status | None]:
     try:
-        status = client.status(timeout=_HUB_S)
+        with connect() as client:
+            status = client.status(timeout=_HUB_S)
+            text = f"{status.hub_version} at {client.address}, {status.state}"
+    except SettingsError as error:
+        return problem("hub", str(error), "correct the flag or the variable of the address or "
+                       "keys"), None
     except (ServiceError, OSError) as error:
         return warning("hub", str(error), "denseface up, as this user; or --address"), None
-    text = f"{status.hub_version} at {client.address}, {status.state}"
     if not status.sensors:
         return warning("hub", f"{text}, no sensor can be asked", "denseface status"), status
     return ok("hub", f"{text}, sensors: {', '.join(status.sensors)}"), status

@@ -141,10 +141,13 @@ def _failures(what: str, answers: Answers) -> Iterator[Finding]:
         yield problem(what, error["text"], "docs/operating.md, What the messages mean")
     if (hung := answers.get("hung")) is not None:
         where = _ASLEEP.get(hung["where"], f"after {hung['where']}")
-        yield problem(what, f"hangs {where} (given up after {hung['seconds']:g} s)", _HANGS)
+        say = warning if hung["where"] == "closed" else problem
+        yield say(what, f"hangs {where} (given up after {hung['seconds']:g} s)", _HANGS)
     if (crashed := answers.get("crashed")) is not None:
         where = _ASLEEP.get(crashed["where"], f"after {crashed['where']}")
-        yield problem(what, f"crashes {where}: {crashed['how']}", _HANGS)
+        # All was answered then: the service ends such a process by itself.
+        say = warning if crashed["where"] == "closed" else problem
+        yield say(what, f"crashes {where}: {crashed['how']}", _HANGS)
 
 
 def _answer(line: str) -> Answers:

@@ -201,6 +201,13 @@ def test_a_driver_that_hangs_or_crashes(script, text, monkeypatch, tmp_path):
     assert of_level(sensor.look_at_frame("S1", sensor.ask("uri", limit_s), [])) == [text]
 
 
+def test_one_that_crashes_when_all_was_answered_is_a_warning():
+    answers = frame() | {"crashed": {"where": "closed", "how": "SIGSEGV"}}
+    findings = [*sensor.look_at_frame("S1", answers, [])]
+    assert of_level(findings) == []
+    assert of_level(findings, Level.WARNING) == ["crashes when the program ends: SIGSEGV"]
+
+
 def test_findings_as_lines_and_json():
     findings = [ok("a", "fine"), warning("b", "so so", "do this")]
     assert as_lines(findings) == ["ok       a: fine", "warning  b: so so", "         -> do this"]
