@@ -18,8 +18,8 @@ _GAP_SHARE = 1 / 8
 Beyond a wider one nothing is known, and the outline is that of what was measured."""
 _SPECKLES_PX = 5
 """Side of the median that takes away specks of noise, which have outlines too."""
-_EVERY = 2
-"""Every so many rows and columns are searched."""
+_LINES = (240, 320)
+"""Rows and columns that are searched, about: every other one of a Kinect's."""
 _MOST = 3000
 """Samples that are kept, evenly spread over all."""
 
@@ -62,11 +62,13 @@ def find_outlines(depth: NDArray[np.uint16], unit_mm: float = 1.0) -> Outlines:
     depth : (H, W) uint16, counts of `unit_mm`, 0 = no reading
     """
     smooth = np.asarray(cv2.medianBlur(depth, _SPECKLES_PX), np.uint16)
-    rows = _Steps.along_rows(smooth[::_EVERY], unit_mm)
-    columns = _Steps.along_rows(np.ascontiguousarray(smooth[:, ::_EVERY].T), unit_mm)
+    down, across = (max(side // lines, 2) for side, lines in
+                    zip(depth.shape, _LINES, strict=True))
+    rows = _Steps.along_rows(smooth[::down], unit_mm)
+    columns = _Steps.along_rows(np.ascontiguousarray(smooth[:, ::across].T), unit_mm)
     found = Outlines(
-        np.concatenate([np.stack([rows.place, rows.line * _EVERY], axis=1),
-                        np.stack([columns.line * _EVERY, columns.place], axis=1)]
+        np.concatenate([np.stack([rows.place, rows.line * down], axis=1),
+                        np.stack([columns.line * across, columns.place], axis=1)]
                        ).astype(np.float32),
         np.concatenate([rows.z, columns.z]),
         np.arange(len(rows.z) + len(columns.z)) < len(rows.z),
