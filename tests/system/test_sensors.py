@@ -197,6 +197,16 @@ def test_up_serves_several_sources_each_by_a_process_of_its_own(tmp_path):
             assert jpeg_size(shown.jpeg) == shown.size
             assert len(shown.jpeg) < 100_000
             assert shown.image.std() > 20
+        publications = f"{up.address}.publications"
+        with raw(zmq.SUB, publications, b"preview") as previews:
+            _, header, picture = previews.recv_multipart()
+        shown = json.loads(header)["preview"]
+        assert jpeg_size(picture) == (shown["width"], shown["height"]) == (640, 480)
+        assert shown["hint"]["measures"]["faces"] == 1  # that of the very frame
+        with raw(zmq.SUB, publications, b"hints") as hints:
+            _, header = hints.recv_multipart()
+        assert len(header) < 1000
+        assert json.loads(header)["hint"]["measures"]["distance_mm"] > 500
         text = up.run("status").stdout
         assert "frontal_700 streaming" in text
         assert "far_1000 streaming" in text
