@@ -3,10 +3,10 @@
 ::
 
     ABSENT ---> OPENING ---> WARMING ---> STREAMING <---> STALLED
-      ^  ^       |   |          |             |              |
-      |  |       |   +----------+-- CLOSING <-+--------------+
-      |  |       v                     |
-      |  +--- BLOCKED                  |
+      ^  ^       |   |       ^  |             |              |
+      |  |       |   +-------|--+-- CLOSING <-+--------------+
+      |  |       v           |         |
+      |  +--- BLOCKED -------+         |
       +--------------------------------+
 
 A sensor is never given up. What ends when the driver hangs is the process, not the waiting.
@@ -68,7 +68,7 @@ TRANSITIONS: dict[tuple[LiveState, LiveEvent], LiveState] = {
     (LiveState.STREAMING, LiveEvent.LOST): LiveState.CLOSING,
     (LiveState.STALLED, LiveEvent.FRAME): LiveState.STREAMING,
     (LiveState.STALLED, LiveEvent.LOST): LiveState.CLOSING,
-    (LiveState.BLOCKED, LiveEvent.FOUND): LiveState.OPENING,
+    (LiveState.BLOCKED, LiveEvent.OPENED): LiveState.WARMING,
     (LiveState.BLOCKED, LiveEvent.LOST): LiveState.ABSENT,
     (LiveState.BLOCKED, LiveEvent.REFUSED): LiveState.BLOCKED,
     (LiveState.CLOSING, LiveEvent.CLOSED): LiveState.ABSENT,
@@ -162,7 +162,7 @@ class LiveStates:
             self._losses.popleft()
         if len(self._losses) < _LOOP_LOSSES:
             return reason
-        return (f"{reason} (lost {len(self._losses)} times within a minute: try another cable, "
+        return (f"{reason} (lost {_LOOP_LOSSES} times and more within a minute: try another cable, "
                 "port or power supply)")
 
     def explain(self, reason: str) -> None:

@@ -20,8 +20,9 @@ _SLICE_S = 0.1
 """Longest wait for a frame at once, seconds: an unplugged sensor is noticed in between."""
 _LOOK_S = 0.2
 """Time between two looks for a sensor that is not there or cannot be had, seconds."""
-_RETRY_S = 1.0
-"""Pause before a sensor that refused is asked again, seconds."""
+_RETRY_S, _MAX_RETRY_S = 1.0, 5.0
+"""Pause before a sensor that refused is asked again, or was opened in vain, once more for each time
+in a row, and the longest, seconds."""
 _SILENT_PERIODS, _SILENT_S = 5, 0.3
 """A sensor without a new pair for so many periods, and so many seconds, is silent."""
 
@@ -51,6 +52,8 @@ class WatchedSensor(LiveSensor):
         self._past = LiveFigures()
         """Of the time before the sensor was opened last."""
         self._usb = UsbWatch(usb_devices())
+        self._in_vain = 0
+        """How often it was opened since it streamed last."""
         self._stuck = ""
         """Why only another process can go on."""
         self._known_as: Identity | None = None
@@ -103,7 +106,9 @@ class WatchedSensor(LiveSensor):
 
     def needs_new_process(self) -> str:
         state, silent_s = self.state, time.monotonic() - self._called_s
-        if not self._thread.is_alive() or silent_s > HANG_S[state]:
+        if not self._thread.is_alive():
+            return "the thread that calls the driver has failed"
+        if silent_s > HANG_S[state]:
             return f"the driver hangs ({state.value} for {silent_s:.1f} s)"
         return self._stuck
 
@@ -163,11 +168,14 @@ class WatchedSensor(LiveSensor):
         if unlisted and (found is None or self._states.state is LiveState.BLOCKED):
             self._stuck = f"{unlisted} was plugged in, and OpenNI2 in this process does not list it"
             self.on_change()
+        self._found = found
         if found is not None:
-            if self._states.state is LiveState.BLOCKED:
-                self._stop.wait(_RETRY_S)
-            self._found = found
-            self._advance(LiveEvent.FOUND, "the sensor is being opened")
+            blocked = self._states.state is LiveState.BLOCKED
+            self._stop.wait(_RETRY_S if blocked else min(self._in_vain * _RETRY_S, _MAX_RETRY_S))
+            if blocked:
+                self._open()
+            else:
+                self._advance(LiveEvent.FOUND, "the sensor is being opened")
             return
         if self._states.state is LiveState.BLOCKED:
             self._advance(LiveEvent.LOST)
@@ -184,6 +192,7 @@ class WatchedSensor(LiveSensor):
             self._advance(LiveEvent.REFUSED, str(error) if known else f"{self.uri}: {error!r}")
             return
         self._source, self._exposure_locked = source, False
+        self._in_vain += 1
         self._past += LiveFigures(reconnects=int(self._known_as is not None))
         self._known_as = source.known_as
         self._usb.know(usb_devices())
@@ -221,6 +230,7 @@ class WatchedSensor(LiveSensor):
             if not source.warm:
                 pair.release()
                 return
+            self._in_vain = 0
             self._advance(LiveEvent.WARM)
         elif self._states.state is LiveState.STALLED:
             self._advance(LiveEvent.FRAME)

@@ -99,8 +99,8 @@ class _Capture:
     """The state that the hub was told last."""
     said_at: float = 0.0
     """When, monotonic clock, seconds."""
-    logged: tuple[str, str] = ("opening", "")
-    """State and reason that were logged last."""
+    logged: set[tuple[str, str]] = field(default_factory=set)
+    """States and reasons that were logged since it streamed last: each is said once."""
 
     def __post_init__(self) -> None:
         self.sender = FrameSender(self.connection, self.settings.resend_s)
@@ -155,8 +155,11 @@ class _Capture:
         sent = self.connection.send(messages.SensorState(
             name=self.name or sensor_name(self.uri, state.identity), state=state.state,
             reason=state.reason, identity=state.identity, figures=state.figures))
-        if changed and self.logged != (state.state, state.reason):
-            self.logged = state.state, state.reason
+        if changed and (state.state, state.reason) not in self.logged:
+            if state.state == "streaming":
+                self.logged.clear()
+            self.logged.discard(("streaming", ""))
+            self.logged.add((state.state, state.reason))
             say = _log.info if not state.reason or state.state in _COMING else _log.warning
             say("sensor", state=state.state, reason=state.reason, source=self.uri,
                 identity=state.identity)

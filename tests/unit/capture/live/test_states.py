@@ -44,6 +44,14 @@ def test_who_waits_for_frames_does_so_within_limits():
     assert not LiveStates(0.0, LiveState.STREAMING).overdue(1e9)
 
 
+def test_a_sensor_that_cannot_be_had_stays_blocked_while_it_is_tried_anew():
+    states = run(LiveStates(0.0), [(LiveEvent.FOUND, "opened"), (LiveEvent.REFUSED, "busy")], 1.0)
+    run(states, [(LiveEvent.REFUSED, "busy"), (LiveEvent.REFUSED, "no permission")], 9.0)
+    assert (states.state, states.reason, states.since_s) == (
+        LiveState.BLOCKED, "no permission", 1.0)
+    assert states.advance(LiveEvent.OPENED, 10.0, "warms up") is LiveState.WARMING
+
+
 def test_events_out_of_place_are_mistakes_of_ours():
     with pytest.raises(ValueError, match="closed means nothing while absent"):
         LiveStates(0.0).advance(LiveEvent.CLOSED, 1.0)
@@ -78,7 +86,8 @@ def lose(states, times):
 def test_a_loop_of_losses_is_named():
     assert lose(LiveStates(0.0), [1.0, 2.0]) == "unplugged"
     assert lose(LiveStates(0.0), [1.0, 2.0, 3.0]) == (
-        "unplugged (lost 3 times within a minute: try another cable, port or power supply)")
+        "unplugged (lost 3 times and more within a minute: try another cable, port or power "
+        "supply)")
     assert lose(LiveStates(0.0), [0.0, 100.0, 200.0, 300.0]) == "unplugged"
 
 

@@ -1,9 +1,13 @@
 """The capture process: a press goes before a preview, whatever the driver is at."""
 
+from typing import ClassVar
+
 import pytest
+from structlog.testing import capture_logs
 
 from denseface.capture.errors import SensorError, UnreadableSourceError
 from denseface.service.daemons._reader_supply import ReaderSupply
+from denseface.service.daemons._supply import SupplyState
 from denseface.service.daemons.capture import _Capture, sensor_name
 from denseface.service.protocol import messages
 from denseface.service.protocol.messages import SensorReady
@@ -55,6 +59,7 @@ class Connection:
     """
 
     now = 0.0
+    step = 0
 
     def __init__(self, driver, script):
         self.driver = driver
@@ -204,3 +209,28 @@ def test_of_a_recording_a_burst_is_one_frame_of_the_next_ones():
     assert reader.calls == ["take"] * 3
     (frame,) = [one for one in connection.sent if one.kind == "frame"]
     assert frame.frame.fused == 3
+
+
+def test_each_state_is_logged_once_until_it_streams_again():
+    class Supply:
+        states: ClassVar = [("blocked", "busy"), ("opening", "o"), ("blocked", "busy"),
+                            ("streaming", ""), ("blocked", "busy"), ("streaming", "")]
+        wake = None
+
+        @property
+        def state(self):
+            return SupplyState(*self.states[min(Connection.step, len(self.states) - 1)])
+
+        def hangs(self):
+            return ""
+
+        def step(self, *, busy):  # noqa: ARG002
+            Connection.step += 1
+            return iter(())
+
+    Connection.step = -1
+    connection = Connection(Driver(), [0.0] * 7)
+    with capture_logs() as lines:
+        _Capture(ServiceSettings(address="ipc:///unused"), connection, Supply(), "x").serve(None)
+    assert [line["state"] for line in lines] == [
+        "blocked", "opening", "streaming", "blocked", "streaming"]
