@@ -105,7 +105,7 @@ def _row(value: float, shots: list[_Shot], of: Callable[[FaceQuality], float | N
         nearest, _ = cKDTree(face.dense.points).query(shot.whole, distance_upper_bound=NEAR_MM)
         whole.append(np.isfinite(nearest).mean())
         gross.append(found.gross)
-    cells = [f"{value:g}", ", ".join(f"{one:.3g}" for one in seen) or "-"]
+    cells = [f"{value:g}", ", ".join(f"{one:.4g}" for one in seen) or "-"]
     if errors:
         cells += [f"{np.mean(errors):.2f}", f"{100 * np.mean(covered):.0f}",
                   f"{100 * np.mean(whole):.0f}", f"{100 * np.mean(gross):.1f}"]
