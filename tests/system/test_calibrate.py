@@ -88,6 +88,8 @@ def test_too_few_views_are_one_line_and_status_1(tmp_path, checkerboard):
     (["--board", "9", "--square", "25"], "'9': expected columns and rows such as 9x6"),
     ([*CHECKERBOARD[:2], "--square", "0.025"], "'0.025': expected millimetres, 1 to 500"),
     ([*CHARUCO[:4], "--marker", "30", "-o", "x.calibration.json"], "expected less than --square"),
+    (["--charuco", "20x20", "--square", "28", "-o", "x.calibration.json"],
+     "--charuco 20x20 has 200 markers, --dictionary 4X4_50 has 50"),
 ])
 def test_wrong_usage_is_one_line_and_status_2(arguments, message):
     done = denseface("calibrate", "--infrared", "docs", "--color", "docs", *arguments)

@@ -15,6 +15,8 @@ _ENDING = ".calibration.json"
 _LEAST_SIDE, _MOST_SIDE = 2, 60
 """Corners or squares."""
 _SQUARE_MM = (1.0, 500.0)
+_ORIGINAL_MARKERS = 1024
+"""Of OpenCV's dictionary ARUCO_ORIGINAL; the others' names end in their number."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "order, or a folder with the same names or numbers")
     board = parser.add_mutually_exclusive_group(required=True)
     board.add_argument("--board", type=_sides, metavar="9x6",
-                       help="inner corners of a checkerboard")
+                       help="inner corners of a checkerboard: squares less one, both ways")
     board.add_argument("--charuco", type=_sides, metavar="7x5",
                        help="squares of a ChArUco board")
     parser.add_argument("--square", type=_length, required=True, metavar="MM",
@@ -115,6 +117,11 @@ def _board(args: argparse.Namespace) -> "Board":
     if marker >= args.square:
         raise UsageError(f"--marker {marker:g}: expected less than --square {args.square:g}")
     columns, rows = args.charuco
+    name = args.dictionary
+    most = _ORIGINAL_MARKERS if name == "ARUCO_ORIGINAL" else int(name.rpartition("_")[2])
+    if columns * rows // 2 > most:
+        raise UsageError(f"--charuco {columns}x{rows} has {columns * rows // 2} markers, "
+                         f"--dictionary {name} has {most}")
     return Charuco(columns, rows, args.square, marker, args.dictionary)
 
 
