@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.capture_faults import recoveries
 from bench.capture_probe import Copies, PressTimes
 from bench.capture_service import Resources, idle_and_previews, replugs, steady
 from bench.machine import describe
@@ -109,6 +110,18 @@ def _print_replugs(folder: Path, clip: Path, cycles: int) -> None:
     _print_resources("The same run", "cycles", taken)
 
 
+def _print_faults(folder: Path, clip: Path, rounds: int) -> None:
+    with Control(folder / "sensor", clip) as sensor:
+        found, held, processes = recoveries(sensor, rounds)
+    seconds = [one.seconds for one in found]
+    worst = max(found, key=lambda one: one.seconds)
+    print(f"\n{rounds} rounds of one to three random faults under `up`: from the end of the last "
+          f"to a press with a frame {statistics.median(seconds):.2f} s (p50), "
+          f"{worst.seconds:.2f} s (longest, after {', '.join(worst.faults)}). {processes} capture processes; the last "
+          f"holds {held.memory_mib:.0f} MiB, {held.descriptors} descriptors, {held.threads} "
+          "threads.", flush=True)
+
+
 def _print_resources(title: str, unit: str, taken: Iterable[tuple[int, Resources]]) -> None:
     print(f"\n{title}, the capture process:\n")
     print(f"| {unit} | memory (USS), MiB | descriptors | threads | process |\n|" + " --- |" * 5)
@@ -127,11 +140,12 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=30, help="of each processor load (30)")
     parser.add_argument("--frames", type=int, default=100_000, help="of the long run (100,000)")
     parser.add_argument("--cycles", type=int, default=500, help="of plugging (500)")
+    parser.add_argument("--faults", type=int, default=100, help="rounds of them (100)")
     args = parser.parse_args()
     print(describe(" ".join(["script/bench capture", *sys.argv[1:]])))
     parts = ((_print_presses, args.presses), (_print_copies, args.pairs),
              (_print_costs, args.seconds), (_print_steady, args.frames),
-             (_print_replugs, args.cycles))
+             (_print_replugs, args.cycles), (_print_faults, args.faults))
     with tempfile.TemporaryDirectory(prefix="df-") as name:
         clip = cheap_clip(Path(name) / "clip")
         for part, count in parts:

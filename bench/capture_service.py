@@ -15,7 +15,8 @@ from tests.virtual_sensor.control import Control
 from tests.virtual_sensor.marks import read_mark
 from tests.virtual_sensor.process import environment
 
-__all__ = ["Resources", "capture_process", "idle_and_previews", "replugs", "steady"]
+__all__ = ["Resources", "capture_process", "idle_and_previews", "press_until_taken", "replugs",
+           "steady"]
 
 _MIB = 2**20
 _DRIVER_THREAD = "virtual-sensor"
@@ -126,7 +127,7 @@ def replugs(
     """
     answered, streamed, taken = [], [], []
     with running("openni2:", 1, environment(controls=[sensor])) as service:
-        _press(service)
+        press_until_taken(service)
         for cycle in range(1, cycles + 1):
             sensor.unplug()
             time.sleep(_UNPLUGGED_S)
@@ -135,7 +136,7 @@ def replugs(
             start = time.monotonic()
             watch = threading.Thread(target=_wait_frames, args=(sensor, sent, streamed, start))
             watch.start()
-            _press(service)
+            press_until_taken(service)
             answered.append(time.monotonic() - start)
             watch.join()
             if cycle % max(1, cycles // _SAMPLES) == 0:
@@ -149,7 +150,7 @@ def _wait_frames(sensor: Control, sent: int, streamed: list[float], start: float
     streamed.append(time.monotonic() - start)
 
 
-def _press(service: Running) -> None:
+def press_until_taken(service: Running) -> None:
     """Press until a frame is taken."""
     until = time.monotonic() + _COME_BACK_S
     while True:
