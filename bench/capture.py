@@ -117,7 +117,8 @@ def _print_faults(folder: Path, clip: Path, rounds: int) -> None:
     worst = max(found, key=lambda one: one.seconds)
     print(f"\n{rounds} rounds of one to three random faults under `up`: from the end of the last "
           f"to a press with a frame {statistics.median(seconds):.2f} s (p50), "
-          f"{worst.seconds:.2f} s (longest, after {', '.join(worst.faults)}). {processes} capture processes; the last "
+          f"{worst.seconds:.2f} s (longest, after {', '.join(worst.faults)}). "
+          f"{processes} capture processes; the last "
           f"holds {held.memory_mib:.0f} MiB, {held.descriptors} descriptors, {held.threads} "
           "threads.", flush=True)
 
