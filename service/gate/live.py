@@ -23,6 +23,9 @@ _PERIOD_S = 0.1
 """Between two frames that are judged for hints, seconds."""
 _MOST_SHARE = 0.2
 """Of a core that hints may take: where a scene is costly to search, fewer frames are judged."""
+_LONGEST_PERIOD_S = 0.5
+"""The same where frames are costly, seconds: the first one's cost is that of loading kernels and
+cascades, and says nothing of the next."""
 _SLACK_S = 0.005
 """The third frame of thirty a second counts as after that, also where its time jitters."""
 _WARM_S = 0.5
@@ -146,7 +149,7 @@ class LiveGate:
         if now >= max(self._hints_until_s, self._looked_until_s):
             return None
         last_s = self._shot.earliest_s if self._shot is not None else -math.inf
-        period_s = max(_PERIOD_S, self._cost_s / _MOST_SHARE)
+        period_s = min(max(_PERIOD_S, self._cost_s / _MOST_SHARE), _LONGEST_PERIOD_S)
         return max(last_s + period_s - _SLACK_S, now - _PERIOD_S)
 
     def _decide(self, shot: Shot, judged: Judged) -> Iterator[Passed | NotPassed]:

@@ -99,6 +99,15 @@ def test_what_is_costly_to_judge_is_judged_less_often(gate):
     assert 0.15 <= gate.spent_s / 6 <= 0.21
 
 
+def test_the_cost_of_the_first_frame_does_not_silence_the_hints(gate):
+    """It is that of loading kernels: 3 s of it were 15 s without a hint."""
+    gate.gate.send_hints(10.0)
+    gate.costs_s = 3.0
+    gate.run(0.1)
+    gate.costs_s = 0.005
+    assert len(gate.run(3.0)) >= 20
+
+
 def test_who_waits_does_not_wait_for_that(gate):
     gate.costs_s = 0.06
     gate.gate.press(take(timeout=1.0))
