@@ -28,7 +28,7 @@ _NAME = "libOpenNI2.so"
 """File name of the library."""
 _VARIABLES = ("OPENNI2_REDIST64", "OPENNI2_REDIST")
 """Environment variables that name its folder."""
-_LEAVING_S = 3.0
+_LEAVING_S = 6.0
 """Longest time to close everything when the process ends, seconds."""
 _ERRORS_ONLY = 3
 """OpenNI2's log severity."""

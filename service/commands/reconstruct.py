@@ -28,6 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--registered", choices=("yes", "no", "auto"), default="auto",
                         help="whether a depth image is in the colour image's pixels "
                              "(default: auto)")
+    parser.add_argument("--rounding", choices=("cut", "round", "none"),
+                        help="how a depth image's depth became a whole number: cut, as "
+                             "PrimeSense's drivers do (default: round)")
     _options.add_outputs(parser, "-o", "--output")
     parser.add_argument("--calibration", type=Path, metavar="FILE",
                         help="calibration that wins over the file's own: JSON, or OpenCV's or "
@@ -60,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _frame(args: argparse.Namespace) -> "RgbdFrame":
+    from denseface.capture import DepthRounding
     from denseface.capture.image_pair import PairReading, parse_unit
     from denseface.service.errors import UsageError
     from denseface.service.tools.frames import read_frame, read_image_pair
@@ -75,12 +79,13 @@ def _frame(args: argparse.Namespace) -> "RgbdFrame":
     except ValueError as error:
         raise UsageError(f"--unit {error}") from error
     registered = None if args.registered == "auto" else args.registered == "yes"
-    reading = PairReading(unit_mm, registered, max_pixels=most)
+    rounding = DepthRounding(args.rounding or DepthRounding.ROUND)
+    reading = PairReading(unit_mm, registered, rounding=rounding, max_pixels=most)
     if args.depth:
         if args.frame or args.frames > 1:
             raise UsageError("--frame or --frames is given with --depth: a pair of images is one "
                              "frame")
         return read_image_pair(args.depth, args.color, args.calibration, reading, args.rotate)
-    said = unit_mm is not None or registered is not None
+    said = unit_mm is not None or registered is not None or args.rounding is not None
     return read_frame(args.input, args.frame, args.calibration, most, args.frames,
                       reading if said else None, args.rotate)

@@ -104,6 +104,6 @@ def _opened(
         return FolderSource(Path(path), choose_calibration(Path(path), calibration),
                             (reading or PairReading())._replace(max_pixels=max_pixels))
     if reading is not None:
-        raise UsageError(f"{path}: --unit and --registered are for image files: a folder of pairs, "
-                         "or --depth")
+        raise UsageError(f"{path}: --unit, --rounding and --registered are for image files: a "
+                         "folder of pairs, or --depth")
     return open_source(path, calibration=calibration)

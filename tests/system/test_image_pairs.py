@@ -34,7 +34,7 @@ def files(frame, tmp_path_factory):
 
 
 @pytest.mark.parametrize(("depth", "color", "more"), [
-    ("mm.png", "color.jpg", ["--unit", "mm"]), ("m.exr", "color.png", [])])
+    ("mm.png", "color.jpg", ["--unit", "mm", "--rounding", "cut"]), ("m.exr", "color.png", [])])
 def test_a_pair_of_files_is_as_good_as_the_recording(tmp_path, frame, files, depth, color, more):
     done = denseface(
         "reconstruct", "--depth", files / depth, "--color", files / color, "--calibration",
@@ -42,7 +42,8 @@ def test_a_pair_of_files_is_as_good_as_the_recording(tmp_path, frame, files, dep
         tmp_path / "r.json")
     assert done.returncode == 0, done.stderr
     report = json.loads((tmp_path / "r.json").read_text())
-    assert report["depth_unit_um"] == (1000 if depth == "mm.png" else 100)
+    assert (report["depth_unit_um"], report["depth_rounding"]) == (
+        (1000, "cut") if depth == "mm.png" else (100, "round"))
     said = [line for line in done.stderr.splitlines() if "unit" in line]
     assert len(said) == ("--unit" not in more)
     assert all(line.partition(": ")[2] in report["warnings"]

@@ -5,25 +5,21 @@ import subprocess
 import sys
 from contextlib import contextmanager
 
-import numpy as np
 import pytest
 
 from denseface.service.client import Client
 from denseface.service.errors import PressRefusedError
 from tests.system.running import REPOSITORY, hub_alone, service
-from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.control import Call, Control, OpenFault
 from tests.virtual_sensor.process import environment, run_python
+from tests.virtual_sensor.scenes import cheap_clip
 from tests.waiting import LIMIT_S, until
 
 
 @pytest.fixture(scope="module")
 def clip(tmp_path_factory):
-    rng = np.random.default_rng(9)
-    path = tmp_path_factory.mktemp("clip") / "clip"
-    write_clip(path, [(rng.integers(500, 900, (480, 640), np.uint16),
-                       rng.integers(0, 256, (480, 640, 3), np.uint8)) for _ in range(3)])
-    return path
+    """Depth and colour of one scene: a press is refused where they do not belong together."""
+    return cheap_clip(tmp_path_factory.mktemp("clip") / "clip")
 
 
 @pytest.fixture
@@ -149,5 +145,5 @@ def test_a_program_that_read_a_sensor_ends_though_the_driver_hangs(control, call
         "print(next(iter(source)).depth.shape, flush=True)",
         env=environment(controls=[control]))
     assert done.stdout == "(480, 640)\n"
-    assert done.stderr == ("denseface: OpenNI2 or its driver hangs; ended without it after 3 s\n")
+    assert done.stderr == ("denseface: OpenNI2 or its driver hangs; ended without it after 6 s\n")
     assert done.returncode == 1

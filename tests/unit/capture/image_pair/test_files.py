@@ -141,7 +141,7 @@ def test_the_setting_for_pixels_holds_for_each_format(tmp_path):
 
 
 def test_a_pickle_is_never_loaded(tmp_path):
-    np.save(tmp_path / "p.npy", np.array([{"a": 1}], object), allow_pickle=True)
+    np.save(tmp_path / "p.npy", np.array([{"a": 1}], object))
     with pytest.raises(CaptureError, match=r"p\.npy: "):
         read_depth_image(tmp_path / "p.npy")
 
