@@ -52,7 +52,8 @@ class FramePreparation:
     def look_closely(self, *, refuse: bool = False) -> None:
         """Measure the next frame, however short ago one was measured.
 
-        refuse : raise where nothing fits; otherwise such a frame has a note
+        refuse : raise where nothing fits; otherwise such a frame has a note. So has one of a source
+            whose frames belonged together before, unless the next says the same
         """
         self._due = float("-inf")
         self._strict = refuse
@@ -61,6 +62,11 @@ class FramePreparation:
     def agrees(self) -> bool:
         """Whether frames were measured and found to be what they say of themselves."""
         return self._found.verdict is Verdict.AGREES
+
+    @property
+    def _is_sure(self) -> bool:
+        """Whether what the last frame said holds; not where it alone contradicts those before."""
+        return self._found.verdict is Verdict.UNKNOWN or self._times >= _SURE
 
     def of(self, frame: RgbdFrame) -> RgbdFrame:
         """Give a frame as its user gets it.
@@ -79,7 +85,7 @@ class FramePreparation:
         if self._clock() >= self._due:
             strict, self._strict = self._strict, False
             now = self._measure(frame)
-            if now.verdict is Verdict.REFUSED and strict:
+            if now.verdict is Verdict.REFUSED and strict and self._is_sure:
                 raise MismatchedFrameError(now.note)
             if now.verdict in (Verdict.DOUBTFUL, Verdict.REFUSED):
                 notes.append(now.note)
@@ -95,8 +101,7 @@ class FramePreparation:
             self._silent = 0
             self._times = self._times + 1 if now.means_the_same(self._last) else 1
             self._last = now
-            if now.verdict is not Verdict.REFUSED and (
-                    self._found.verdict is Verdict.UNKNOWN or self._times >= _SURE):
+            if now.verdict is not Verdict.REFUSED and self._is_sure:
                 self._found = now
         if now.verdict is Verdict.REFUSED:
             self._due = self._clock() + _AGAIN_S

@@ -113,6 +113,20 @@ def test_what_nothing_fits_is_refused_where_that_is_asked_for(monkeypatch):
     assert notes(prepared) == [()]
 
 
+def test_one_frame_of_a_source_that_agreed_is_not_refused_and_a_second_is(monkeypatch):
+    """Somebody who moves, or a curtain, is no reason to send a person away."""
+    measured = Measured(monkeypatch, AGREES, REFUSED, AGREES, REFUSED)
+    prepared = FramePreparation(clock=measured.clock)
+    found = []
+    for _ in range(4):
+        prepared.look_closely(refuse=True)
+        found += notes(prepared)
+    assert found == [(), ("nothing fits",), (), ("nothing fits",)]
+    prepared.look_closely(refuse=True)
+    with pytest.raises(MismatchedFrameError, match="nothing fits"):
+        prepared.of(FRAME)
+
+
 def test_what_tells_nothing_is_not_looked_at_for_ever(monkeypatch):
     measured = Measured(monkeypatch, UNKNOWN)
     prepared = FramePreparation(clock=measured.clock)
