@@ -38,8 +38,10 @@ def look_at_library(devices: Sequence[UsbDevice]) -> Iterator[Finding]:
     if not drivers:
         yield problem("drivers", f"none in {folder}", "apt install libopenni2-0")
         return
-    yield ok("drivers", f"{', '.join(drivers)} in {folder}")
     names = " ".join(drivers).lower()
+    more = "" if "freenect" in names else (
+        "; no Freenect, which a Kinect v1 needs and Debian does not ship (docs/operating.md)")
+    yield ok("drivers", f"{', '.join(drivers)} in {folder}{more}")
     for vendor, driver in _DRIVERS.items():
         if driver.lower() not in names and any(
                 device.vendor == vendor and device.kind for device in devices):

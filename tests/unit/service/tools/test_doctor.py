@@ -51,7 +51,11 @@ def library(tmp_path, monkeypatch):
 
 def test_the_drivers_that_are_there(library):
     (finding,) = machine.look_at_library([XTION, MOUSE])
-    assert (finding.level, finding.text) == (Level.OK, f"OniFile, PS1080 in {library}")
+    assert finding.level is Level.OK
+    assert finding.text.startswith(f"OniFile, PS1080 in {library}; no Freenect")
+    (library / "libFreenectDriver.so.0").touch()
+    (finding,) = machine.look_at_library([XTION, MOUSE])
+    assert finding.text == f"FreenectDriver, OniFile, PS1080 in {library}"
 
 
 def test_a_kinect_without_its_driver(library):
