@@ -29,6 +29,8 @@ __all__: list[str] = []
 _PERIOD_MS = 1000 / 30
 _PIPELINES_MS = (0, 33, 66)
 _JITTER_US = 3000
+_MARGIN_MS = 5
+"""More than the delay, where it is said to be known: the jitter, and the driver's own work."""
 _FIRST_FRAME_US = 300_000
 """From the start of the streams to the first exposure: real sensors take 0.3 to 1 s."""
 _SPEED = 10.0
@@ -37,10 +39,12 @@ _REPLUG_S = 2.0
 """Goal for the time from the plug to a press that is answered, without the warm-up."""
 
 
-def _probe(folder: Path, clip: Path, what: str, count: int, **fields: object) -> object:
+def _probe(
+    folder: Path, clip: Path, what: str, count: int, *more: object, **fields: object
+) -> object:
     with Control(folder / "sensor", clip, marks=True, **fields) as sensor:
         done = subprocess.run(
-            [sys.executable, "-m", "bench.capture_probe", what, str(count)],
+            [sys.executable, "-m", "bench.capture_probe", what, str(count), *map(str, more)],
             env=os.environ | environment(controls=[sensor]), stdout=subprocess.PIPE, check=True)
     return json.loads(done.stdout)
 
@@ -48,6 +52,8 @@ def _probe(folder: Path, clip: Path, what: str, count: int, **fields: object) ->
 def _print_presses(folder: Path, clip: Path, count: int) -> None:
     for first_frame_us in (0, _FIRST_FRAME_US):
         _print_presses_of(folder, clip, count, first_frame_us)
+    print(f"\nThe same where the delay is known to {_MARGIN_MS} ms (DENSEFACE_SENSOR_DELAY_MS):\n")
+    _print_press_table(folder, clip, count, _FIRST_FRAME_US, known=True)
 
 
 def _print_presses_of(folder: Path, clip: Path, count: int, first_frame_us: int) -> None:
@@ -56,12 +62,20 @@ def _print_presses_of(folder: Path, clip: Path, count: int, first_frame_us: int)
           f"gets, in frame periods of {_PERIOD_MS:.1f} ms; {count:,} presses each, at any phase; "
           f"up to {_JITTER_US / 1000:g} ms of jitter in the delivery. Stale: exposed before the "
           "press. The estimate is how much too early the exposure was taken to be, at most:\n")
+    _print_press_table(folder, clip, count, first_frame_us)
+
+
+def _print_press_table(
+    folder: Path, clip: Path, count: int, first_frame_us: int, *, known: bool = False
+) -> None:
     print("| from exposure to delivery, ms | stale | p50 | p99 | goal | answered after, ms, p50 | "
           "p99 | largest true skew, ms | estimate, ms |")
     print("|" + " --- |" * 9)
     for pipeline_ms in _PIPELINES_MS:
-        found = _probe(folder, clip, "presses", count, pipeline_us=pipeline_ms * 1000,
-                       jitter_us=_JITTER_US, first_frame_us=first_frame_us)
+        transport_s = [(pipeline_ms + _MARGIN_MS) / 1000] if known else []
+        found = _probe(folder, clip, "presses", count, *transport_s,
+                       pipeline_us=pipeline_ms * 1000, jitter_us=_JITTER_US,
+                       first_frame_us=first_frame_us)
         times = [PressTimes(**one) for one in found]  # type: ignore[attr-defined]
         after = np.array([one.exposed_after for one in times]) / _PERIOD_MS
         answered = np.array([one.answered_after for one in times])

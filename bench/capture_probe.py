@@ -1,7 +1,7 @@
 """What the benchmark of the capture asks of a live sensor, in a process of its own.
 
-.venv/bin/python -m bench.capture_probe presses|copies COUNT, under an `environment` of the virtual
-sensor; answers with a line of JSON.
+.venv/bin/python -m bench.capture_probe presses|copies COUNT [TRANSPORT_S], under an `environment`
+of the virtual sensor; answers with a line of JSON.
 """
 
 import json
@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from denseface.capture.live.clock import TRANSPORT_S
 from denseface.capture.live.sensor import open_sensor
 from denseface.capture.live.states import LiveState
 from denseface.capture.openni2 import LiveSource
@@ -53,8 +54,8 @@ class Copies:
     """Largest memory that was allocated while reading: a second copy would need some."""
 
 
-def _presses(count: int) -> list[PressTimes]:
-    sensor = open_sensor("openni2:")
+def _presses(count: int, transport_s: float) -> list[PressTimes]:
+    sensor = open_sensor("openni2:", transport_s=transport_s)
     if sensor is None:
         raise RuntimeError("openni2: is no live sensor")
     changed = threading.Event()
@@ -122,7 +123,8 @@ def _release(source: LiveSource) -> bool:
 def main() -> int:
     """Do what is asked."""
     what, count = sys.argv[1], int(sys.argv[2])
-    print(json.dumps([asdict(one) for one in _presses(count)] if what == "presses"
+    transport_s = float(sys.argv[3]) if sys.argv[3:] else TRANSPORT_S
+    print(json.dumps([asdict(one) for one in _presses(count, transport_s)] if what == "presses"
                      else asdict(_copies(count))))
     return 0
 

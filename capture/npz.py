@@ -29,6 +29,7 @@ _KINDS = {
     "registered": ArrayKind("bool"),
     "depth_rounding": ArrayKind("str"),
     "depth_unit_um": ArrayKind("int64"),
+    "depth_max_mm": ArrayKind("int64"),
     "sensor": ArrayKind("str"),
     "captured_at": ArrayKind("str"),
 }
@@ -165,7 +166,8 @@ def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> Rgb
             calibration, registered, calibration_origin=origin,
             depth_meaning=DepthMeaning(
                 int(arrays.get("depth_unit_um", 1000)),
-                _rounding(_text(path, arrays, "depth_rounding", DepthRounding.ROUND))),
+                _rounding(_text(path, arrays, "depth_rounding", DepthRounding.ROUND)),
+                int(arrays["depth_max_mm"]) if "depth_max_mm" in arrays else None),
             origin=FrameOrigin(_text(path, arrays, "sensor"), _text(path, arrays, "captured_at"),
                                notes=notes),
         )
@@ -195,6 +197,8 @@ def save_frame(
         "depth_rounding": np.array(str(frame.depth_meaning.rounding)),
         "depth_unit_um": np.int64(frame.depth_meaning.unit_um),
     }
+    if frame.depth_meaning.max_mm is not None:
+        arrays["depth_max_mm"] = np.int64(frame.depth_meaning.max_mm)
     if frame.color is not None:
         arrays |= {"color": frame.color, "color_timestamp_us": np.int64(frame.color_timestamp_us)}
     for name, text in (("sensor", frame.origin.sensor), ("captured_at", frame.origin.captured_at)):

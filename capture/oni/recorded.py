@@ -1,5 +1,6 @@
 """What a recording's file says of its frames, without their images."""
 
+from dataclasses import replace
 from datetime import datetime, timedelta
 from functools import cached_property
 from pathlib import Path
@@ -82,13 +83,13 @@ class Recorded:
         return ChosenCalibration(
             self._described.calibration, f"recording: {self._described.calibration_origin}")
 
-    def meaning(self, unit_um: int) -> DepthMeaning:
-        """Say what depths mean whose unit OpenNI2 knows.
+    def meaning(self, known: DepthMeaning) -> DepthMeaning:
+        """Say what depths mean whose unit and farthest reading OpenNI2 knows.
 
         PrimeSense's drivers, and the recordings made through them, cut the fraction off.
         """
         rounding = self._described.depth_rounding if self._described else DepthRounding.CUT
-        return DepthMeaning(unit_um, rounding)
+        return replace(known, rounding=rounding)
 
     def origin(self, depth_us: int) -> FrameOrigin:
         """Give the origin of the frame whose depth has that stamp, shifted."""

@@ -273,8 +273,7 @@ def _depth_properties(node: _Node, frame: RgbdFrame) -> bytes:
     shift_mm = calibration.depth_to_color.translation_mm[0]
     description = Description.of(frame).model_dump_json().encode() + b"\0"
     return b"".join([
-        records.int_property(node.number, "xnDeviceMaxDepth",
-                             frame.depth_meaning.max_mm or 2**16 - 1),
+        records.int_property(node.number, "xnDeviceMaxDepth", frame.depth_meaning.max_count),
         records.int_property(node.number, "ZPD", _ZPD_MM),
         records.real_property(node.number, "ZPPS", zpps_mm),
         records.real_property(node.number, "DCRCDIS", -shift_mm / 10),

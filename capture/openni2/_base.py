@@ -84,7 +84,8 @@ class OpenNI2Source(Source):
             frame = RgbdFrame(
                 depth, color, *stamps_us, calibration, registered,
                 calibration_origin=chosen,
-                depth_meaning=DepthMeaning(streams.depth_unit_um, DepthRounding.CUT),
+                depth_meaning=DepthMeaning(
+                    streams.depth_unit_um, DepthRounding.CUT, streams.max_mm),
                 origin=replace(origin, notes=notes))
         except FrameError as error:
             raise FrameError(f"{self._name}: {error} (calibration: {chosen})") from error

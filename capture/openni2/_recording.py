@@ -122,7 +122,7 @@ class RecordingSource(OpenNI2Source):
         frame = self._make_frame(self._streams, pair.depth, pair.color,
                                  (pair.depth_us, pair.color_us),
                                  self._recorded.origin(pair.depth_us))
-        return replace(frame, depth_meaning=self._recorded.meaning(frame.depth_meaning.unit_um))
+        return replace(frame, depth_meaning=self._recorded.meaning(frame.depth_meaning))
 
     def _open(self) -> Streams:
         load()

@@ -38,8 +38,12 @@ DEPTH, COLOR = "depth", "color"
 Image = tuple[int, NDArray[Any]]
 """Stamp (sensor clock, microseconds) and pixels: (H, W) uint16 counts or (H, W, 3) uint8 RGB."""
 
-_CROPPING, _FOV, _MIRRORING = 0, 1, 7
+_CROPPING, _FOV, _MAX_VALUE, _MIRRORING = 0, 1, 4, 7
 """OpenNI2's numbers of stream properties."""
+_ANY = 65535
+"""The farthest reading of a stream where each number may be one."""
+_LEAST_MAX_MM = 3000
+"""No sensor's farthest reading is nearer, mm; a driver that says less may mean another unit."""
 _REGISTRATION = 5
 """OpenNI2's number of a device's property: 1 where depth comes in the colour camera's pixels."""
 _ZPD, _ZPPS, _DCRCDIS = 0x1080100C, 0x1080100D, 0x1080100F
@@ -105,6 +109,8 @@ class Streams:
                 self._switch_off(device)
             self._check_modes()
             self.properties = self._read_properties(device, live=live)
+            self.max_mm = self._read_max_mm()
+            """The farthest reading, mm, as the driver says; None where it says nothing possible."""
         except BaseException:
             self.close()
             raise
@@ -150,6 +156,13 @@ class Streams:
     def depth_unit_um(self) -> int:
         """Micrometres of one count of a depth."""
         return 100 if self._streams[DEPTH].mode.pixel_format == "DEPTH_100_UM" else 1000
+
+    def _read_max_mm(self) -> int | None:
+        count = _property(self._streams[DEPTH].handle, _MAX_VALUE, ctypes.c_int)
+        if count is None or count >= _ANY:
+            return None
+        most = count * self.depth_unit_um // 1000
+        return most if most >= _LEAST_MAX_MM else None
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from denseface.capture.frame import DepthMeaning, DepthRounding
 from tests.virtual_sensor.fixtures import FIXTURES, FOLDER
 from tests.virtual_sensor.process import play
 
@@ -38,3 +39,4 @@ def test_a_fixture_plays(name):
         assert frame.depth.shape == (480, 640)
         assert np.count_nonzero(frame.depth) > 10_000
         assert frame.rgb.std() > 10
+        assert frame.depth_meaning == DepthMeaning(1000, DepthRounding.CUT, 10_000)

@@ -56,7 +56,7 @@ def test_what_is_saved_is_loaded(tmp_path, depth, color, stamps, registered, pos
 
 
 def test_what_a_depth_means_and_where_it_comes_from_is_kept(tmp_path):
-    meaning = DepthMeaning(100, DepthRounding.NONE)
+    meaning = DepthMeaning(100, DepthRounding.NONE, 4000)
     frame = RgbdFrame(good()["depth"], None, 5, 5, CALIBRATION, depth_meaning=meaning,
                       origin=FrameOrigin("B00366600000000A", "2026-11-29T12:00:00Z"))
     save_frame(tmp_path / "f.npz", frame)
@@ -74,6 +74,7 @@ def test_a_file_that_does_not_say_was_rounded(tmp_path):
 
 @pytest.mark.parametrize(("changes", "words"), [
     ({"depth_rounding": np.array("up")}, "depth_rounding must be cut, round, none, found 'up'"),
+    ({"depth_max_mm": np.int64(0)}, "max_mm must be positive, found 0"),
     ({"depth_unit_um": np.int64(0)}, "depth_unit_um must be 1 to 100000, found 0"),
     ({"sensor": np.array("two\nlines")}, "sensor: expected one line"),
     ({"color": None}, "expected both or neither"),

@@ -20,7 +20,7 @@ def test_nothing_is_changed_about_a_good_recording(path):
     assert recorded.shift_us == {DEPTH_NODE: 0, IMAGE_NODE: 0}
     assert not recorded.in_pairs
     assert recorded.calibration is None
-    assert recorded.meaning(1000) == DepthMeaning(1000, DepthRounding.CUT)
+    assert recorded.meaning(DepthMeaning()) == DepthMeaning(1000, DepthRounding.CUT)
     assert recorded.origin(0) == FrameOrigin(skew_known_by="record order")
 
 

@@ -92,7 +92,7 @@ def test_what_the_frames_mean_is_kept(writer):
     assert recorded.pairs == 2
     assert recorded.calibration == ChosenCalibration(
         frames.calibration(), "recording: unspecified")
-    assert recorded.meaning(1000) == DepthMeaning(1000, DepthRounding.CUT)
+    assert recorded.meaning(DepthMeaning()) == DepthMeaning(1000, DepthRounding.CUT)
     assert recorded.shift_us == {DEPTH_NODE: 0, IMAGE_NODE: 0}
     assert recorded.origin(DEPTH_US + PERIOD_US) == FrameOrigin(
         "A00365", "2026-11-29T12:00:00.033+00:00", skew_known_by="stamps")
