@@ -66,12 +66,11 @@ def fuse(frames: Sequence[RgbdFrame]) -> RgbdFrame:
               * np.float32(meaning.unit_um / 1000) for frame in frames]
     still = [depths[0]] + [depth for depth in depths[1:] if not _moved(depths[0], depth)]
     left_out = len(frames) - len(still)
-    notes = first.origin.notes
     if left_out:
-        notes += (f"{left_out} of the burst's {len(frames)} frames are left out: "
-                  "what stands before the sensor moved",)
+        first = first.with_note(f"{left_out} of the burst's {len(frames)} frames are left out: "
+                                "what stands before the sensor moved")
     if len(still) == 1:
-        return replace(first, origin=replace(first.origin, notes=notes))
+        return first
     mean = _robust_mean(np.stack(still))
     unit_um = next((unit for unit in _UNITS_UM if mean.max() * 1000 / unit <= 65535),
                    _UNITS_UM[-1])
@@ -79,7 +78,7 @@ def fuse(frames: Sequence[RgbdFrame]) -> RgbdFrame:
     return replace(
         first, depth=np.minimum(np.rint(counts), 65535).astype(np.uint16),
         depth_meaning=DepthMeaning(unit_um, DepthRounding.NONE, meaning.max_mm),
-        origin=replace(first.origin, fused=len(still), notes=notes))
+        origin=replace(first.origin, fused=len(still)))
 
 
 def _moved(reference: NDArray[np.float32], depth: NDArray[np.float32]) -> bool:

@@ -1,4 +1,4 @@
-"""What recordings and live sensors share: a device, its streams, a calibration, pairs."""
+"""What recordings and live sensors share: a device, its streams, a calibration, frames."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 
 from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.calibration_files import doubts_of
-from denseface.capture.errors import FrameError, SensorError
+from denseface.capture.errors import FrameError
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
 from denseface.capture.openni2._calibration import Size, derive_calibration, fit
 from denseface.capture.openni2._library import close_handle, open_sources
 from denseface.capture.openni2._streams import COLOR, DEPTH, Streams
-from denseface.capture.pairing import Pair, Pairer
 from denseface.capture.source import Source
 
 
@@ -28,7 +27,6 @@ class OpenNI2Source(Source):
     def __init__(self, uri: str, chosen: ChosenCalibration | None) -> None:
         self.uri = uri
         self._name = uri.rstrip(":")
-        self.pairer: Pairer[Any, Any] = Pairer()
         self._chosen = chosen
         self._registered = False
         self._fitted: tuple[tuple[Size, Size | None], ChosenCalibration] | None = None
@@ -56,16 +54,9 @@ class OpenNI2Source(Source):
             raise
         return streams
 
-    def _add(self, kind: str, image: tuple[int, Any]) -> Pair[Any, Any] | None:
-        if self._streams is not None and COLOR not in self._streams.kinds:
-            return Pair(image[1], None, image[0], image[0])
-        return (self.pairer.add_depth if kind == DEPTH else self.pairer.add_color)(*image)
-
-    def _frame(self, pair: Pair[Any, Any]) -> RgbdFrame:
-        if self._streams is None:
-            raise SensorError(f"{self._name}: is closed")
-        return self._make_frame(self._streams, pair.depth, pair.color,
-                                (pair.depth_us, pair.color_us), FrameOrigin())
+    def _meaning(self, streams: Streams) -> DepthMeaning:
+        """Say what depths mean: PrimeSense's drivers cut the fraction off."""
+        return DepthMeaning(streams.depth_unit_um, DepthRounding.CUT, streams.max_mm)
 
     def _make_frame(
         self, streams: Streams, depth: NDArray[np.uint16], color: NDArray[np.uint8] | None,
@@ -80,12 +71,10 @@ class OpenNI2Source(Source):
             calibration, registered = calibration.for_images(
                 (depth.shape[1], depth.shape[0]), (color.shape[1], color.shape[0]), registered)
         try:
-            # PrimeSense's drivers, and the recordings made through them, cut the fraction off.
             frame = RgbdFrame(
                 depth, color, *stamps_us, calibration, registered,
                 calibration_origin=chosen,
-                depth_meaning=DepthMeaning(
-                    streams.depth_unit_um, DepthRounding.CUT, streams.max_mm),
+                depth_meaning=self._meaning(streams),
                 origin=replace(origin, notes=notes))
         except FrameError as error:
             raise FrameError(f"{self._name}: {error} (calibration: {chosen})") from error

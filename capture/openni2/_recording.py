@@ -3,7 +3,6 @@
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -12,7 +11,7 @@ from primesense import openni2
 
 from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.errors import SensorError, UnreadableSourceError
-from denseface.capture.frame import RgbdFrame
+from denseface.capture.frame import DepthMeaning, RgbdFrame
 from denseface.capture.oni.mend import mended, what_is_missing
 from denseface.capture.oni.recorded import Recorded
 from denseface.capture.oni.records import DEPTH_NODE, IMAGE_NODE
@@ -54,8 +53,7 @@ class RecordingSource(OpenNI2Source):
         self._expected = {
             kind: node.frames for kind, node in
             ((DEPTH, self._recorded.depth), (COLOR, self._recorded.color)) if node is not None}
-        if self._recorded.in_pairs:
-            self.pairer = Pairer(0)
+        self._pairer: Pairer[Any, Any] = Pairer(0) if self._recorded.in_pairs else Pairer()
         self.frame_count = self._recorded.pairs
         if not self.frame_count:
             raise UnreadableSourceError(f"{self.uri}: holds no pair of depth and color: "
@@ -69,7 +67,7 @@ class RecordingSource(OpenNI2Source):
             self._close_device()
             streams = self._open()
         self._unread = False
-        self.pairer.clear()
+        self._pairer.clear()
         streams.start()
         left = dict(self._expected)
         while max(left.values()) > 0 and self._streams is streams:
@@ -101,6 +99,11 @@ class RecordingSource(OpenNI2Source):
             return None
         return Pair(pair.depth[1], pair.color[1], pair.depth[0], pair.color[0])
 
+    def _add(self, kind: str, image: tuple[int, Any]) -> Pair[Any, Any] | None:
+        if COLOR not in self._expected:
+            return Pair(image[1], None, image[0], image[0])
+        return (self._pairer.add_depth if kind == DEPTH else self._pairer.add_color)(*image)
+
     def close(self) -> None:
         """Stop the streams and close the file; harmless when repeated."""
         self._close_device()
@@ -119,10 +122,12 @@ class RecordingSource(OpenNI2Source):
     def _frame(self, pair: Pair[Any, Any]) -> RgbdFrame:
         if self._streams is None:
             raise SensorError(f"{self._name}: is closed")
-        frame = self._make_frame(self._streams, pair.depth, pair.color,
-                                 (pair.depth_us, pair.color_us),
-                                 self._recorded.origin(pair.depth_us))
-        return replace(frame, depth_meaning=self._recorded.meaning(frame.depth_meaning))
+        return self._make_frame(self._streams, pair.depth, pair.color,
+                                (pair.depth_us, pair.color_us),
+                                self._recorded.origin(pair.depth_us))
+
+    def _meaning(self, streams: Streams) -> DepthMeaning:
+        return self._recorded.meaning(super()._meaning(streams))
 
     def _open(self) -> Streams:
         load()

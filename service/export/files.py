@@ -12,7 +12,28 @@ from denseface.service.export.formats import check_ending, save_face
 if TYPE_CHECKING:
     from denseface.recon.face import Face
 
-__all__ = ["FaceFiles"]
+__all__ = ["FaceFiles", "check_outputs"]
+
+
+def check_outputs(*outputs: tuple[Path | None, str | None]) -> None:
+    """Check where files are to go, before there is anything to write.
+
+    Parameters
+    ----------
+    outputs : each a path, or None where it is not asked for, and the ending that it must have, or
+        None for any
+
+    Raises
+    ------
+    UsageError
+        An ending is wrong or a folder does not exist.
+    """
+    for path, ending in outputs:
+        if path and ending and path.suffix.lower() != ending:
+            raise UsageError(f"{path}: expected a name that ends in {ending}")
+    for path, _ in outputs:
+        if path and not path.absolute().parent.is_dir():
+            raise UsageError(f"{path}: no such folder: {path.parent}")
 
 
 @dataclass(frozen=True)
@@ -39,12 +60,7 @@ class FaceFiles:
     def __post_init__(self) -> None:
         if self.output:
             check_ending(self.output)
-        for path, ending in ((self.report, ".json"), (self.rendering, ".png")):
-            if path and path.suffix.lower() != ending:
-                raise UsageError(f"{path}: expected a name that ends in {ending}")
-        for path in (self.output, self.report, self.rendering):
-            if path and not path.absolute().parent.is_dir():
-                raise UsageError(f"{path}: no such folder: {path.parent}")
+        check_outputs((self.output, None), (self.report, ".json"), (self.rendering, ".png"))
 
     def write(self, face: "Face") -> None:
         """Write all; each file is whole or not there.

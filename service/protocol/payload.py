@@ -113,7 +113,7 @@ class FrameHeader(_PayloadHeader):
     calibration_origin: Annotated[str, Field(max_length=4096)] = "unspecified"
     has_color: bool = True
     depth_unit_um: int = 1000
-    depth_rounding: Literal["cut", "round", "none"] = "round"
+    depth_rounding: DepthRounding = DepthRounding.ROUND
     depth_max_mm: Annotated[int, Field(ge=1)] | None = None
     sensor: _Line = ""
     captured_at: _Line = ""
@@ -140,7 +140,7 @@ class FrameHeader(_PayloadHeader):
             calibration=frame.calibration, depth_timestamp_us=frame.depth_timestamp_us,
             color_timestamp_us=frame.color_timestamp_us, registered=frame.registered,
             calibration_origin=frame.calibration_origin[:4096], has_color=frame.color is not None,
-            depth_unit_um=meaning.unit_um, depth_rounding=meaning.rounding.value,
+            depth_unit_um=meaning.unit_um, depth_rounding=meaning.rounding,
             depth_max_mm=meaning.max_mm, sensor=origin.sensor[:_MAX_LINE],
             captured_at=origin.captured_at, fused=origin.fused,
             exposed_after_press_ms=origin.exposed_after_press_ms,
@@ -159,7 +159,7 @@ class FrameHeader(_PayloadHeader):
                 self.depth_timestamp_us, self.color_timestamp_us,
                 self.calibration, self.registered, calibration_origin=self.calibration_origin,
                 depth_meaning=DepthMeaning(
-                    self.depth_unit_um, DepthRounding(self.depth_rounding), self.depth_max_mm),
+                    self.depth_unit_um, self.depth_rounding, self.depth_max_mm),
                 origin=FrameOrigin(
                     self.sensor, self.captured_at, self.exposed_after_press_ms,
                     self.exposure_known_by, self.skew_known_by, self.fused, self.notes))

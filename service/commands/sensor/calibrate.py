@@ -89,16 +89,12 @@ def _lines(solution: "Solution") -> list[str]:
 def _outputs(args: argparse.Namespace) -> list[Path]:
     from denseface.capture.identity import calibration_folder, file_name
     from denseface.service.errors import UsageError
+    from denseface.service.export import check_outputs
 
     outputs = [args.output] if args.output else []
     if args.output and not args.output.name.endswith(_ENDING):
         raise UsageError(f"{args.output}: expected a name that ends in {_ENDING}")
-    for path, ending in ((args.picture, ".png"), (args.report, ".json")):
-        if path and path.suffix.lower() != ending:
-            raise UsageError(f"{path}: expected a name that ends in {ending}")
-    for path in (args.output, args.picture, args.report):
-        if path and not path.absolute().parent.is_dir():
-            raise UsageError(f"{path}: no such folder: {path.parent}")
+    check_outputs((args.output, None), (args.picture, ".png"), (args.report, ".json"))
     if args.sensor:
         outputs.append(calibration_folder() / file_name(args.sensor))
     if not outputs:
