@@ -29,6 +29,8 @@ COPY --from=build /opt/denseface /opt/denseface
 ENV PATH=/opt/denseface/bin:$PATH \
     DENSEFACE_DATA=/data \
     DENSEFACE_METRICS=127.0.0.1:9400
+# The kiosk's page, reached from outside only where DENSEFACE_KIOSK_ADDRESS says so.
+EXPOSE 8080
 USER denseface
 # Compiled for this processor into the user's cache: else the first start would wait for it.
 RUN python3 -c 'from denseface.service.daemons.worker import warm; warm()'

