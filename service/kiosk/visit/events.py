@@ -20,6 +20,9 @@ class PageCame:
 class PageWent:
     """The page of the visit is closed or loads itself anew."""
 
+    visit: int | None = None
+    """The one that the page had; None for the present one."""
+
 
 @dataclass(frozen=True)
 class ServiceIs:
@@ -31,9 +34,11 @@ class ServiceIs:
 
 @dataclass(frozen=True)
 class HintCame:
-    """A frame of the mirror was judged."""
+    """A frame of the mirror was judged; there is none after `Mirror(on=False)`."""
 
     hint: Hint
+    visit: int | None = None
+    """The one whose mirror it was; None for the present one."""
 
 
 @dataclass(frozen=True)
