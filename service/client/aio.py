@@ -88,6 +88,13 @@ class AsyncClient(BaseClient):
             capture_id, timeout, sensor=sensor, gate=gate, gate_timeout=gate_timeout,
             frames=frames))
 
+    async def withdraw(self, capture_id: str, *, timeout: float = 30.0) -> int:
+        """Remove a capture, wherever it stands; see `Client.withdraw`.
+
+        A `press` of it that is under way raises PressRefusedError.
+        """
+        return await self._run(self._exchanges.withdraw(capture_id, timeout))
+
     async def get(self, capture_id: str, *, timeout: float = 60.0) -> Face:
         """Wait for a capture's face; see `Client.get`."""
         return await self._run(self._exchanges.get(capture_id, timeout))
@@ -174,6 +181,7 @@ class AsyncClient(BaseClient):
         until = time.monotonic() + timeout
         try:
             while (left := until - time.monotonic()) > 0:
+                self._exchanges.check(message)
                 wait = self._send(parts, subscription)
                 self._watch()
                 await asyncio.wait([answer], timeout=min(left, wait))

@@ -94,6 +94,21 @@ class Client(Closing, BaseClient):
             capture_id, timeout, sensor=sensor, gate=gate, gate_timeout=gate_timeout,
             frames=frames))
 
+    def withdraw(self, capture_id: str, *, timeout: float = 30.0) -> int:
+        """Remove a capture that was pressed with this key, wherever it stands.
+
+        A press that waits for its frame is refused, a face that is being made is dropped. When this
+        returns nothing is left at the hub: no frame, no face, no row. The id cannot be pressed
+        again. Gives how many captures were removed: 0 where it was gone, or is another key's.
+
+        Raises
+        ------
+        RequestFailedError
+            The disk refuses or does not answer, or another program has the hub's database open:
+            withdraw again.
+        """
+        return self._run(self._exchanges.withdraw(capture_id, timeout))
+
     def get(self, capture_id: str, *, timeout: float = 60.0) -> Face:
         """Wait for a capture's face.
 
@@ -222,6 +237,7 @@ class Client(Closing, BaseClient):
         parts = encode(Packet(message))
         until = time.monotonic() + timeout
         while (left := until - time.monotonic()) > 0:
+            self._exchanges.check(message)
             wait = self._send(parts, subscription)
             if answer := self._answer(message.request, min(left, wait)):
                 return self._checked(answer)

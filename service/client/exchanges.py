@@ -23,9 +23,13 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.message_base import BaseRequest
 from denseface.service.protocol.sensor_messages import Gate
 from denseface.service.protocol.wire import Packet
+from denseface.service.runtime.bounded_dict import BoundedDict
 
 _T = TypeVar("_T")
 
+_BAD_ID = "capture id {!r}: expected letters, digits, - and _, at most 64"
+_MAX_WITHDRAWN = 1000
+"""Ids that this client withdrew and does not press again."""
 _LONGEST_WAIT_S = 20.0
 """Longest time for which the hub is asked to hold an answer back, seconds."""
 
@@ -79,6 +83,7 @@ class Exchanges:
         self._resend_s = resend_s
         self.next_number = itertools.count(1).__next__
         """Gives the number of the next request."""
+        self._withdrawn: BoundedDict[str, None] = BoundedDict(_MAX_WITHDRAWN)
 
     def press(
         self, capture_id: str | None, timeout: float, *, sensor: str | None, gate: Gate,
@@ -93,7 +98,7 @@ class Exchanges:
         except ValidationError as error:
             field, why = errors.first_error(error, found=True)
             raise errors.LocalProtocolError(
-                f"capture id {chosen!r}: expected letters, digits, - and _, at most 64"
+                _BAD_ID.format(chosen)
                 if field == "capture_id" else f"{field}: {why}") from error
         patience = timeout + (gate_timeout if gate == "wait" else 0.0)
         answer = (yield from send_request(message, patience)).message
@@ -104,6 +109,24 @@ class Exchanges:
                 *((hint.codes, hint.text) if hint else ()))
         expect(answer, messages.PressAccepted)
         return chosen
+
+    def withdraw(self, capture_id: str, timeout: float) -> Exchange[int]:
+        """See `Client.withdraw`."""
+        try:
+            message = messages.Withdraw(request=self.next_number(), capture_id=capture_id)
+        except ValidationError as error:
+            raise errors.LocalProtocolError(_BAD_ID.format(capture_id)) from error
+        self._withdrawn[capture_id] = None
+        answer = yield from send_request(message, timeout)
+        return expect(answer.message, messages.Removed).removed
+
+    def check(self, message: BaseRequest) -> None:
+        """Raise PressRefusedError for a press that was withdrawn meanwhile: it is not repeated.
+
+        A hub that was started again since would not know.
+        """
+        if isinstance(message, messages.Press) and message.capture_id in self._withdrawn:
+            raise errors.PressRefusedError("press refused: it was withdrawn", "purged")
 
     def get(self, capture_id: str, timeout: float) -> Exchange[Face]:
         """See `Client.get`."""

@@ -157,7 +157,7 @@ class _EventLoop:
             self._send_all([_denied(incoming, message, missing)])
             return
         self._send_all(self.hub.receive(
-            time.monotonic(), incoming.peer, packet, incoming.key), packet)
+            time.monotonic(), incoming.peer, packet, incoming.key, sender.roles), packet)
 
     def _send_all(self, outputs: list[Output], caused_by: Packet | None = None) -> None:
         for step in steps(outputs):

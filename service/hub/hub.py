@@ -27,16 +27,20 @@ from denseface.service.hub.sensors import SensorPeer
 from denseface.service.monitoring import Figures, Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, Publish, send
+from denseface.service.protocol.roles import Role
 from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.status import MAX_SENSOR_STATES
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
+from denseface.service.security.permissions import ALL_ROLES
 from denseface.service.settings import ServiceSettings
 
 _WRITES_S = 1.0
-"""Longest time for which a purge holds the hub up for files that are being written, seconds."""
+"""Longest time for which a removal holds the hub up for files that are being written, seconds."""
 _VERSION = version("denseface")
 """Of this package, as the status says it."""
+_BEING_SAVED = (CaptureState.SAVING_FRAME, CaptureState.SAVING_FACE)
+"""States of captures of which a file may be being written."""
 
 
 class Hub:
@@ -64,7 +68,8 @@ class Hub:
         self._rejections = rejections or Rejections(self._figures.counters)
         self._settings = settings
         self._peers = Peers()
-        common = Common(store, Captures(store), self._writer, self._peers, settings)
+        self._captures = Captures(store)
+        common = Common(store, self._captures, self._writer, self._peers, settings)
         self._outcomes = Outcomes(store, self._requeue_damaged)
         self._jobs = Jobs(
             common, self._outcomes.publish, self._rejections, self._figures.counters)
@@ -77,7 +82,10 @@ class Hub:
         self._status_due = 0.0
         self._log = structlog.get_logger("hub")
 
-    def receive(self, now: float, peer: bytes, packet: Packet, key: str = "") -> list[Output]:
+    def receive(
+        self, now: float, peer: bytes, packet: Packet, key: str = "",
+        roles: frozenset[Role] = ALL_ROLES,
+    ) -> list[Output]:
         """Handle one message and return what to send.
 
         DamagedDatabaseError where the hub must end; the next one rebuilds the database.
@@ -87,10 +95,11 @@ class Hub:
         now : seconds, of a monotonic clock
         peer : routing id of the sender's connection
         key : fingerprint of the sender's key; empty where it needed none
+        roles : of that key
         """
         outputs: list[Output] = []
         try:
-            outputs.extend(self._receive(now, peer, packet, key))
+            outputs.extend(self._receive(now, peer, packet, key, roles))
             outputs.extend(self._process_writes(now))
         except errors.DamagedDatabaseError:
             raise
@@ -208,7 +217,9 @@ class Hub:
         """Return the routing ids of all sensors and workers."""
         return [*self._peers.sensors, *self._peers.workers]
 
-    def _receive(self, now: float, peer: bytes, packet: Packet, key: str) -> Iterator[Output]:
+    def _receive(
+        self, now: float, peer: bytes, packet: Packet, key: str, roles: frozenset[Role]
+    ) -> Iterator[Output]:
         match packet.message:
             case messages.Press() as message:
                 yield from self._presses.press(now, peer, message, self._jobs.queued, key)
@@ -221,7 +232,10 @@ class Hub:
             case messages.ListDead() | messages.RetryDead() | messages.DropDead() as message:
                 yield from self._maintenance.receive(peer, message)
             case messages.Purge() as message:
-                yield from self._purge(now, peer, message)
+                yield from self._end_writes(now)
+                yield from self._maintenance.receive(peer, message)
+            case messages.Withdraw() as message:
+                yield from self._withdraw(now, peer, message, key, roles)
             case messages.GetStatus(request=request):
                 yield send(peer, self._status(request))
             case messages.SensorReady() | messages.SensorState() as message:
@@ -249,13 +263,29 @@ class Hub:
             case messages.JobFailed() as message:
                 yield from self._jobs.failed(now, peer, message, key)
 
-    def _purge(self, now: float, peer: bytes, message: messages.Purge) -> Iterator[Output]:
-        """Remove captures when what is being written is: no file of them appears afterwards."""
+    def _withdraw(
+        self, now: float, peer: bytes, message: messages.Withdraw, key: str,
+        roles: frozenset[Role],
+    ) -> Iterator[Output]:
+        """Remove a capture of this key; of another's nothing is done, and nothing else is said."""
+        capture_id = message.capture_id
+        owner = self._presses.pressed_by(capture_id)
+        owned = owner in (None, key) or Role.OPERATOR in roles
+        if owned and self._captures.state(capture_id) in _BEING_SAVED:
+            yield from self._end_writes(now)
+        self._presses.withdrawn.add(key, capture_id)
+        if owned and owner is not None:
+            self._presses.withdrawn.add(owner, capture_id)
+        self._log.info("withdrawn" if owned else "withdrawal of another key's capture ignored",
+                       capture_id=capture_id, key=key or LOCAL)
+        yield from self._maintenance.withdraw(peer, message, key, owned=owned)
+
+    def _end_writes(self, now: float) -> Iterator[Output]:
+        """Wait for what is being written: no file of what is removed next appears afterwards."""
         if not self._writer.wait(timeout_s=0.0 if self._presses.disk_hangs else _WRITES_S):
             raise errors.StoreError("the disk does not answer, nothing was removed")
         yield from self._written(now, self._writer.take_results())
         yield from self._presses.refuse_failed()
-        yield from self._maintenance.receive(peer, message)
 
     def _requeue_damaged(self, error: errors.DamagedFaceError, kept_before: bool) -> None:
         self._jobs.requeue_damaged(error.capture_id, str(error), reset_attempts=kept_before)

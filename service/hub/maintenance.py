@@ -8,6 +8,7 @@ removed when nothing of them is left, in no file and not in the database's log.
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from secrets import token_hex
 
 import structlog
 
@@ -30,11 +31,14 @@ _SWEEP_S = 600.0
 """Longest time between two sweeps for what is too old, seconds."""
 _MAX_ASKED = 64
 """Removals that may wait for their end; beyond, one is refused."""
+_MAX_ASKED_PER_KEY = 16
+"""Withdrawals of one key among them: whoever only presses keeps no operator from removing."""
 _LOG_RETRY_S = 1.0
 """Time after which the database's log is tried again that could not be emptied, seconds."""
 _LOG_WAIT_S = 5.0
 """Longest wait of an operator for that, seconds."""
-_WHY = {"retention": "removed after the retention", "operator": "removed by an operator"}
+_WHY = {"retention": "removed after the retention", "operator": "removed by an operator",
+        "withdrawal": "removed, as it was withdrawn"}
 """Reason of a removal, by which it is counted -> what the log says."""
 _LOG_READ = ("erased, but the database's log still names it: another program has the database "
              "open; the hub empties it as soon as that ends")
@@ -45,7 +49,7 @@ _Request = messages.ListDead | _DeadLetterRequest | messages.Purge
 
 @dataclass
 class _Asked:
-    """An operator's request to remove, answered when all is erased."""
+    """A request to remove, answered when all is erased."""
 
     peer: bytes
     request: int
@@ -53,6 +57,8 @@ class _Asked:
     """None: captures before a time, or all."""
     removed: int
     left: bool
+    key: str = ""
+    """Of whoever withdraws; empty for an operator, and where none was needed."""
     deadline: float = 0.0
     """Until then it waits for the database's log, seconds."""
 
@@ -161,8 +167,8 @@ class Maintenance:
 
     def receive(self, peer: bytes, message: _Request) -> Iterator[Output]:
         """Answer an operator."""
-        if any((one.peer, one.request) == (peer, message.request) for one in self._waiting()):
-            return  # a repeat; it is answered when all is erased
+        if self._is_repeat(peer, message.request):
+            return
         if not isinstance(message, messages.ListDead) and self._is_full():
             raise StoreError(f"{_MAX_ASKED} removals are under way already")
         match message:
@@ -173,6 +179,31 @@ class Maintenance:
                 yield from self._dead_letter(peer, message)
             case messages.Purge():
                 yield from self._purge(peer, message)
+
+    def withdraw(
+        self, peer: bytes, message: messages.Withdraw, key: str, *, owned: bool
+    ) -> Iterator[Output]:
+        """Remove a capture that is not being written, whatever became of it.
+
+        Where it is not owned, the same is done for an id that is nobody's: neither the answer nor
+        the time that it takes says that there is one. StoreError where too many wait.
+        """
+        if self._is_repeat(peer, message.request):
+            return
+        own = sum(one.key == key for one in self._waiting()) if key else 0
+        if self._is_full() or own >= _MAX_ASKED_PER_KEY:
+            raise StoreError("too many removals are under way already")
+        capture_id = message.capture_id if owned else token_hex(16)
+        yield from self._presses.purge(capture_id, "it was withdrawn")
+        going = [capture_id] if self._store.find(capture_id) else []
+        yield from self._withdraw(going)
+        self._erase(self._store.retention.prepare([capture_id]), _Erasure(
+            "withdrawal", len(going),
+            _Asked(peer, message.request, capture_id, len(going), left=False, key=key)))
+
+    def _is_repeat(self, peer: bytes, request: int) -> bool:
+        """Whether a request is waiting already: it is answered when all is erased."""
+        return any((one.peer, one.request) == (peer, request) for one in self._waiting())
 
     def _is_full(self) -> bool:
         return sum(1 for _ in self._waiting()) >= _MAX_ASKED

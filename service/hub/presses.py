@@ -13,6 +13,7 @@ from denseface.recon.settings import Settings
 from denseface.service.errors import FrameTooLargeError, ServiceError, StoreError
 from denseface.service.hub import sensors
 from denseface.service.hub._common import LOCAL, Common
+from denseface.service.hub.withdrawn import Withdrawn
 from denseface.service.monitoring import Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
@@ -97,6 +98,8 @@ class Presses:
         self._refused: defaultdict[str, _Refusals] = defaultdict(
             lambda: BoundedDict(_MAX_REFUSALS))
         """By key: nobody makes the hub forget what it said to another."""
+        self.withdrawn = Withdrawn()
+        """What nobody may press again."""
         self._failed: list[tuple[PendingWrite, ServiceError]] = []
         """Frames that could not be saved, and are not refused yet."""
         self._log = structlog.get_logger("hub")
@@ -117,6 +120,10 @@ class Presses:
         if refused := self._refused[key].get((peer, capture_id, request)):
             # A repeat that crossed its answer: the client has told its user already.
             yield send(peer, refused)
+            return
+        if self.withdrawn.has(key, capture_id):
+            yield from self._refuse_all(
+                capture_id, {peer: _Presser(request, key)}, "purged", "it was withdrawn")
             return
         if press := self._presses.get(capture_id):
             yield from self._press_again(press, peer, _Presser(request, key))
@@ -145,6 +152,17 @@ class Presses:
         yield send(sensor.peer, messages.Take(
             capture_id=capture_id, gate=message.gate, gate_timeout=message.gate_timeout,
             frames=message.frames))
+
+    def pressed_by(self, capture_id: str) -> str | None:
+        """Give the fingerprint of the key that pressed a capture first, accepted yet or not.
+
+        Empty where it needed none, None where there is no such capture; StoreError where it cannot
+        be read.
+        """
+        if press := self._presses.get(capture_id):
+            return press.key
+        stored = self._store.find(capture_id)
+        return stored.pressed_by if stored else None
 
     def asked_sensors(self) -> set[bytes]:
         """Return the sensors that are to send a frame at once."""
@@ -296,10 +314,12 @@ class Presses:
             self._refused[key][peer, capture_id, request] = refused
             yield send(peer, refused)
 
-    def purge(self, capture_id: str | None) -> Iterator[Output]:
+    def purge(
+        self, capture_id: str | None, why: str = "purged by an operator"
+    ) -> Iterator[Output]:
         """Refuse one press whose frame is awaited, or all where None."""
         for waiting in [capture_id] if capture_id else list(self._presses):
-            yield from self._refuse(waiting, "purged", "purged by an operator", CaptureEvent.PURGED)
+            yield from self._refuse(waiting, "purged", why, CaptureEvent.PURGED)
 
     def sensor_gone(self, peer: bytes, reason: str) -> Iterator[Output]:
         """Refuse the presses that a sensor was asked for."""

@@ -75,6 +75,13 @@ class Press(BaseRequest):
     frames: BurstFrames = 1
 
 
+class Withdraw(BaseRequest):
+    """Remove what the same key pressed, wherever it stands; an operator, what anybody did."""
+
+    kind: Literal["withdraw"] = "withdraw"
+    capture_id: CaptureId
+
+
 class GetFace(BaseRequest):
     """Give the outcome of a capture; wait for it up to `wait_s`."""
 
@@ -264,7 +271,7 @@ class DeadLetters(BaseAnswer):
 
 
 class Removed(BaseAnswer):
-    """The answer to `DropDead` and `Purge`."""
+    """The answer to `Withdraw`, `DropDead` and `Purge`: of these nothing is left."""
 
     kind: Literal["removed"] = "removed"
     removed: Number
@@ -352,6 +359,7 @@ class Job(FromHub):
 
 TO_HUB: dict[type[ToHub], frozenset[Role]] = {
     Press: frozenset({Role.PRESSER}),
+    Withdraw: frozenset({Role.PRESSER, Role.OPERATOR}),
     GetFace: frozenset({Role.SUBSCRIBER}),  # also a presser, for what it pressed itself
     GetNext: frozenset({Role.SUBSCRIBER}),
     FindStart: frozenset({Role.SUBSCRIBER}),

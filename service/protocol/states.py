@@ -63,7 +63,7 @@ class CaptureEvent(StrEnum):
     EXPIRED = "expired"
     """The retention has passed since the outcome."""
     PURGED = "purged"
-    """An operator wants it gone."""
+    """An operator wants it gone, or whoever pressed it."""
 
 
 _S, _E = CaptureState, CaptureEvent

@@ -127,7 +127,7 @@ class FakeHub:
                 found = [one for one in self.outcomes if one.message.capture_id == capture_id]
                 yield _again(found[0], request) if found else Packet(messages.CaptureUnknown(
                     request=request, capture_id=capture_id))
-            case messages.Purge():
+            case messages.Purge() | messages.Withdraw():
                 removed, left = self.removals.pop(0) if self.removals else (0, True)
                 yield Packet(messages.Removed(request=request, removed=removed, left=left))
             case messages.GetNext(after=after):

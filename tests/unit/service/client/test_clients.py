@@ -344,6 +344,29 @@ def test_it_is_part_of_the_public_face():
     assert denseface.AsyncClient is AsyncClient
 
 
+def test_a_withdrawal_ends_when_the_hub_says_so_and_its_press_with_it(hub):
+    async def main():
+        async with AsyncClient(hub.address) as client:
+            hub.ignored = {"press"}
+            pressing = asyncio.create_task(client.press("a", timeout=LIMIT_S))
+            await waited(hub, lambda: "press" in hub.received)
+            hub.removals = [(1, False)]
+            assert await client.withdraw("a", timeout=LIMIT_S) == 1
+            with pytest.raises(PressRefusedError, match="withdrawn") as refused:
+                await pressing
+            assert refused.value.reason == "purged"
+            with pytest.raises(LocalProtocolError, match="capture id"):
+                await client.withdraw("../x")
+
+    run(main())
+    with Client(hub.address) as client:
+        hub.removals = [(0, False)]
+        assert client.withdraw("a") == 0
+        with pytest.raises(PressRefusedError):
+            client.press("a")
+    assert hub.received.count("press") == 1
+
+
 def test_a_purge_goes_on_while_some_is_left(hub):
     hub.removals = [(2, True), (0, True), (0, True), (1, False)]
     with Operator(hub.address) as operator:

@@ -10,6 +10,7 @@ from denseface.service.protocol.outgoing import Output, Publish, Send
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
+from denseface.service.security.permissions import ALL_ROLES
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage import FolderStore
 from tests.unit.service.faces import small_face, small_frame
@@ -34,9 +35,10 @@ class Bench:
     published: list[BaseMessage] = field(default_factory=list)
 
     def say(
-        self, peer: bytes, message, arrays=None, key: str = ""
+        self, peer: bytes, message, arrays=None, key: str = "", roles=ALL_ROLES
     ) -> list[tuple[bytes, BaseMessage]]:
-        return self._sent(self.hub.receive(self.now, peer, Packet(message, arrays or {}), key))
+        return self._sent(self.hub.receive(
+            self.now, peer, Packet(message, arrays or {}), key, roles))
 
     def wait(self, seconds: float) -> list[tuple[bytes, BaseMessage]]:
         self.now += seconds
@@ -53,8 +55,10 @@ class Bench:
     def worker(self, peer: bytes = WORKER, credit: int = 0):
         return self.say(peer, messages.WorkerReady(name=peer.decode(), credit=credit))
 
-    def press(self, capture_id: str = "a", request: int = 7, peer: bytes = CLIENT):
-        return self.say(peer, messages.Press(request=request, capture_id=capture_id))
+    def press(
+        self, capture_id: str = "a", request: int = 7, peer: bytes = CLIENT, key: str = ""
+    ):
+        return self.say(peer, messages.Press(request=request, capture_id=capture_id), key=key)
 
     def frame(self, capture_id: str = "a"):
         return self.say(SENSOR, messages.Frame(capture_id=capture_id, frame=FRAME), FRAME_ARRAYS)

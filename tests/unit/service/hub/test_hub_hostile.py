@@ -41,7 +41,7 @@ _MEMORY = Path("/dev/shm")  # noqa: S108
 IDS = ("a", "b", "c", "d")
 PEERS = tuple(b"p%d" % number for number in range(6))
 KEYS = ("", "", "c0ffee")
-OPERATOR = {messages.Purge, messages.DropDead, messages.RetryDead}
+OPERATOR = {messages.Withdraw, messages.Purge, messages.DropDead, messages.RetryDead}
 CORPUS = [parts for parts in encoded() if json.loads(parts[0])["kind"] in ROLES_BY_KIND]
 
 

@@ -16,6 +16,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from denseface.recon.settings import Settings
 from denseface.service.hub import Hub, settings_hash
 from denseface.service.hub.captures import Captures
+from denseface.service.hub.withdrawn import Withdrawn
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Publish
 from denseface.service.protocol.states import TRANSITIONS, CaptureState
@@ -350,6 +351,17 @@ class AnyOrder(RuleBasedStateMachine):
         self.taken.discard(capture_id)
         assert not [path for path in (self.folder / "data").rglob("*.f*")
                     if capture_id in path.name.split(".")]
+
+    @rule(capture_id=ids)
+    def withdraw(self, capture_id):
+        answer = self.operate(messages.Withdraw(request=1, capture_id=capture_id))
+        assert self.killed or answer.removed == (capture_id in self.accepted)
+        self.tick()
+        self.accepted.discard(capture_id)
+        self.taken.discard(capture_id)
+        assert not [path for path in (self.folder / "data").rglob("*.f*")
+                    if capture_id in path.name.split(".")]
+        self.hub._presses.withdrawn = Withdrawn()  # as after a restart: there are few ids here
 
     @rule(capture_id=ids)
     def a_purge_waits_for_the_disk(self, capture_id):

@@ -70,6 +70,7 @@ to_hub = st.one_of(
     plain(messages.FindStart, request=numbers, last=st.integers(1, 2**31 - 1)),
     plain(messages.FindStart, request=numbers, since=times),
     plain(messages.GetStatus, request=numbers),
+    plain(messages.Withdraw, request=numbers, capture_id=ids),
     plain(messages.ListDead, request=numbers, after=numbers),
     plain(messages.RetryDead, request=numbers, capture_id=ids),
     plain(messages.DropDead, request=numbers, capture_id=ids),

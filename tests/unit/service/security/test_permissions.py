@@ -25,6 +25,7 @@ from tests.waiting import LIMIT_S
 FRAME, _ = FrameHeader.of(small_frame())
 SAID = [
     messages.Press(request=1, capture_id="a"),
+    messages.Withdraw(request=1, capture_id="a"),
     messages.GetFace(request=1, capture_id="a"),
     messages.GetNext(request=1, after=0),
     messages.GetStatus(request=1),
@@ -43,9 +44,10 @@ SAID = [
 MAY = {
     Role.SENSOR: {"get_status", "sensor_ready", "frame", "heartbeat"},
     Role.WORKER: {"get_status", "worker_ready", "job_failed", "heartbeat"},
-    Role.PRESSER: {"get_status", "press"},
+    Role.PRESSER: {"get_status", "press", "withdraw"},
     Role.SUBSCRIBER: {"get_status", "get_face", "get_next", "find_start"},
-    Role.OPERATOR: {"get_status", "list_dead", "retry_dead", "drop_dead", "purge"},
+    Role.OPERATOR: {"get_status", "list_dead", "retry_dead", "drop_dead", "purge",
+                    "withdraw"},
 }
 
 
