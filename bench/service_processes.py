@@ -96,7 +96,7 @@ def running(
         with (folder / "log").open("wb") as log:
             process = subprocess.Popen(
                 [sys.executable, "-m", "denseface", "up", "--source", str(source), "--address",
-                 address, "--data", str(folder / "data"), "--workers", str(workers)],
+                 address, "--data", str(folder / "data"), "--workers", str(workers), "--no-kiosk"],
                 stdin=subprocess.DEVNULL, stderr=log,
                 # Else nobody may measure its memory.
                 env={**(os.environ if env is None else env), "DENSEFACE_CORE_DUMPS": "1"})

@@ -17,6 +17,9 @@ settings.register_profile("same", deadline=None, derandomize=True)
 settings.register_profile("search", deadline=None)
 settings.load_profile("same")
 
+# Many services run at once, and one port is enough for one page: who tests that asks for it.
+os.environ.setdefault("DENSEFACE_KIOSK", "off")
+
 # The service, and the clients' requests that a test gives no time-out, may take longer, too.
 os.environ.update({name: value for name, value in SERVICE.items() if name not in os.environ})
 for _method in {method for client in (AsyncClient, Client, Operator)

@@ -5,6 +5,10 @@ import os
 from pathlib import Path
 
 from denseface.service.commands import _options
+from denseface.service.commands._options.kiosk import add_kiosk, kiosk_settings, repeated_kiosk
+
+KIOSK_VARIABLE = "DENSEFACE_KIOSK"
+"""`off` stands for `--no-kiosk`."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,6 +22,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=_worker_count, default=max(1, (os.cpu_count() or 2) - 1),
                         metavar="N", help="reconstruction processes (default: cores less one)")
     _options.add_hub(parser)
+    parser.add_argument("--no-kiosk", action="store_true",
+                        help=f"do not serve the page for visitors (also: {KIOSK_VARIABLE}=off)")
+    add_kiosk(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -35,9 +42,29 @@ def run(args: argparse.Namespace) -> int:
         common=_options.repeated(args, "address", "log", "debug"),
         hub=_options.repeated(args, "data", "keys", "key", "listen", "retention", "metrics",
                               "preset", "set"),
-        captures=_captures(args.source or ["openni2:"], args.calibration or [], args.rotate or []))
+        captures=_captures(args.source or ["openni2:"], args.calibration or [], args.rotate or []),
+        kiosk=_kiosk(args))
     with ServiceManager(os.environ) as manager:
         return Supervisor(table, max(settings.hang_timeout_s, settings.silence_s), manager).run()
+
+
+def _kiosk(args: argparse.Namespace) -> list[str] | None:
+    """Give the flags of the kiosk's process; None where there is to be none."""
+    import structlog
+
+    from denseface.service.errors import SettingsError
+    from denseface.service.kiosk.installed import why_not
+
+    given = os.environ.get(KIOSK_VARIABLE, "")
+    if given not in ("", "on", "off"):
+        raise SettingsError(f"{KIOSK_VARIABLE}: expected on or off, found {given!r}")
+    if args.no_kiosk or given == "off":
+        return None
+    kiosk_settings(args)
+    if reason := why_not():
+        structlog.get_logger("up").info(reason)
+        return None
+    return repeated_kiosk(args)
 
 
 def _captures(

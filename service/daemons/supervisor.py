@@ -37,10 +37,12 @@ _LOOK_MAX_S = 1.0
 
 
 def process_table(workers: int, common: Sequence[str], hub: Sequence[str],
-                  captures: Sequence[Sequence[str]]) -> list[ProcessSpec]:
+                  captures: Sequence[Sequence[str]],
+                  kiosk: Sequence[str] | None = None) -> list[ProcessSpec]:
     """Give all processes of the service, in the order of starting; the hub is stopped last.
 
-    `common`, `hub` and `captures` are the flags of all, of the hub and of each capture process.
+    `common`, `hub`, `captures` and `kiosk` are the flags of all, of the hub, of each capture
+    process and of the page for visitors, which there is none of where that is None.
     """
     return [
         ProcessSpec("hub", ("hub", *hub, *common)),
@@ -50,6 +52,9 @@ def process_table(workers: int, common: Sequence[str], hub: Sequence[str],
           for number, flags in enumerate(captures, 1)),
         *(ProcessSpec(f"worker-{number}", ("worker", *common), ONE_THREAD)
           for number in range(1, workers + 1)),
+        # Presses go on without it.
+        *([ProcessSpec("kiosk", ("kiosk", *kiosk, *common), vital=False)]
+          if kiosk is not None else []),
     ]
 
 

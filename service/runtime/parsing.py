@@ -5,7 +5,7 @@ import re
 from datetime import UTC, datetime
 from ipaddress import ip_address
 
-__all__ = ["parse_loopback_address", "parse_retention", "parse_time"]
+__all__ = ["parse_address", "parse_loopback_address", "parse_retention", "parse_time"]
 
 _UNITS = {"": 1, "s": 1, "m": 60, "h": 3600, "d": 86400}
 """Letter -> seconds."""
@@ -47,8 +47,10 @@ def parse_time(text: str) -> datetime:
     return moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
 
 
-def parse_loopback_address(given: object) -> tuple[str, int] | None:
-    """Read `PORT` or `HOST:PORT` of a loopback host; None for `off`. Port 0 is any free one.
+def parse_address(given: object) -> tuple[str, int] | None:
+    """Read `PORT` (of 127.0.0.1) or `HOST:PORT` with an IP address; None for `off`.
+
+    Port 0 is any free one.
 
     Raises
     ------
@@ -61,10 +63,29 @@ def parse_loopback_address(given: object) -> tuple[str, int] | None:
     host, colon, port = text.rpartition(":")
     host = host.removeprefix("[").removesuffix("]") if colon else "127.0.0.1"
     try:
-        loopback = ip_address(host).is_loopback
+        ip_address(host)
+    except ValueError:
+        port = ""
+    if not port.isascii() or not port.isdecimal() or len(port) > 5 or int(port) > 65535:
+        raise ValueError("expected PORT, or an IP address and a port such as 127.0.0.1:8080 or "
+                         "[::1]:8080, or off")
+    return host, int(port)
+
+
+def parse_loopback_address(given: object) -> tuple[str, int] | None:
+    """Read an address as `parse_address`, of a loopback host.
+
+    Raises
+    ------
+    ValueError
+        One line that says what was expected.
+    """
+    try:
+        address = parse_address(given)
+        loopback = address is None or ip_address(address[0]).is_loopback
     except ValueError:
         loopback = False
-    if not loopback or not port.isascii() or not port.isdecimal() or not int(port) <= 65535:
+    if not loopback:
         raise ValueError("expected PORT, 127.0.0.1:PORT or [::1]:PORT, or off: the metrics are for "
                          "this machine alone")
-    return host, int(port)
+    return address

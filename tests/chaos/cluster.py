@@ -215,7 +215,7 @@ class Cluster:
         self._workers = workers
         listen = thief.hub_arguments() if thief else []
         kept = ["--address", self.address, "--data", str(self.data), *listen, *recon]
-        first = ["up", "--source", str(source), "--workers", str(workers), *kept] if (
+        first = ["up", "--no-kiosk", "--source", str(source), "--workers", str(workers), *kept] if (
             supervised) else ["hub", *kept]
         # Of what is supervised, all processes write into that pipe.
         self.hub = Part(nursery, first[0], first, self.hub_log.log, settings,

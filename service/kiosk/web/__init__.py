@@ -1,0 +1,1 @@
+"""The kiosk's HTTP: guarded, limited, with files of known names alone."""
