@@ -1,0 +1,104 @@
+/** GLSL of the surface and of points. */
+
+/** sRGB's transfer curve (IEC 61966-2-1): light is added up linearly, colours are stored so. */
+const TRANSFER = /* glsl */ `
+vec3 toLinear(vec3 c) {
+  return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c));
+}
+vec3 toSrgb(vec3 c) {
+  c = clamp(c, 0.0, 1.0);
+  return mix(c * 12.92, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
+}`;
+
+/** A photograph's light is in its colours already, so that light is added sparingly: a surface that
+ * faces the viewer keeps its colour, what turns away is darkened softly. The lights stand still
+ * before the viewer. */
+const LIGHT = /* glsl */ `
+const vec3 KEY = vec3(-0.42, 0.50, 0.757);
+const vec3 SKY = vec3(0.60, 0.61, 0.63);
+const vec3 GROUND = vec3(0.40, 0.36, 0.34);
+const vec3 LAMP = vec3(0.56, 0.545, 0.52);
+/* Skin lets light in: it goes a little round the edge of the shadow. */
+const float WRAP = 0.30;
+vec3 light(vec3 n) {
+  float key = clamp((dot(n, KEY) + WRAP) / (1.0 + WRAP), 0.0, 1.0);
+  return mix(GROUND, SKY, 0.5 + 0.5 * n.y) + LAMP * key;
+}
+float sheen(vec3 n) {
+  vec3 between = normalize(KEY + vec3(0.0, 0.0, 1.0));
+  return 0.045 * pow(clamp(dot(n, between), 0.0, 1.0), 22.0);
+}`;
+
+const SIGMA = /* glsl */ `
+uniform sampler2D scale;
+uniform vec2 sigmaCodes; /* place on the scale of codes 0 and 255 */
+uniform float confidence;
+vec3 ofSigma(float code) {
+  float at = clamp(mix(sigmaCodes.x, sigmaCodes.y, code), 0.002, 0.998);
+  return texture2D(scale, vec2(at, 0.5)).rgb;
+}`;
+
+/** `position`: mm; `bearing`: normal and distance to the rim; `tint`: sRGB and code of sigma. */
+const SURFACE_ATTRIBUTES = /* glsl */ `
+attribute vec4 bearing;
+attribute vec4 tint;
+varying vec3 normalSeen;
+varying vec4 painted;`;
+
+export const surfaceVertex = /* glsl */ `${SURFACE_ATTRIBUTES}
+uniform float behind; /* mm */
+varying float rim;
+void main() {
+  normalSeen = mat3(modelViewMatrix) * bearing.xyz;
+  painted = tint;
+  rim = bearing.w;
+  gl_Position = projectionMatrix * (modelViewMatrix * vec4(position, 1.0) - vec4(0.0, 0.0, behind, 0.0));
+}`;
+
+export const surfaceFragment = /* glsl */ `
+varying vec3 normalSeen;
+varying vec4 painted;
+varying float rim;
+${TRANSFER}${LIGHT}${SIGMA}
+void main() {
+  float cover = smoothstep(0.1, 0.9, rim);
+  if (cover < 0.02) discard;
+  vec3 n = normalize(normalSeen);
+  if (!gl_FrontFacing) n = -n;
+  vec3 lit = light(n);
+  vec3 skin = toLinear(painted.rgb) * lit + sheen(n);
+  /* The colours of the scale are to be found in its legend: half of the shading only. */
+  vec3 shown = toLinear(ofSigma(painted.a)) * mix(vec3(1.0), vec3(lit.g), 0.55);
+  vec3 color = mix(skin, shown, confidence);
+  if (!gl_FrontFacing) color *= 0.35;
+  gl_FragColor = vec4(toSrgb(color) * cover, cover);
+}`;
+
+/** Round dots; `dot` is their diameter in mm, `focal` turns mm at a distance of 1 mm into pixels. */
+export const dotVertex = /* glsl */ `${SURFACE_ATTRIBUTES}
+uniform float diameter;
+uniform float focal;
+varying float size;
+void main() {
+  normalSeen = mat3(modelViewMatrix) * bearing.xyz;
+  painted = tint;
+  vec4 seen = modelViewMatrix * vec4(position, 1.0);
+  gl_Position = projectionMatrix * seen;
+  size = max(1.0, diameter * focal / -seen.z);
+  gl_PointSize = size;
+}`;
+
+export const dotFragment = /* glsl */ `
+varying vec3 normalSeen;
+varying vec4 painted;
+varying float size;
+uniform float shaded;
+${TRANSFER}${LIGHT}${SIGMA}
+void main() {
+  vec2 off = gl_PointCoord - 0.5;
+  float cover = size < 2.5 ? 1.0 : clamp((0.5 - length(off)) * size, 0.0, 1.0);
+  if (cover < 0.3) discard;
+  vec3 lit = mix(vec3(1.0), light(normalize(normalSeen)), shaded);
+  vec3 color = mix(toLinear(painted.rgb) * lit, toLinear(ofSigma(painted.a)), confidence);
+  gl_FragColor = vec4(toSrgb(color) * cover, cover);
+}`;

@@ -1,0 +1,279 @@
+/** A face in WebGL: surface, dots and initial cloud, drawn from a view. */
+
+import {
+  BufferAttribute, BufferGeometry, DataTexture, DoubleSide, Group, LinearFilter, Mesh,
+  PerspectiveCamera, Points, Scene, ShaderMaterial, Vector2, WebGLRenderer,
+} from "three";
+
+import type { FaceGrid } from "../face_grid.ts";
+import type { Mode } from "./flat.ts";
+import type { View } from "./pose.ts";
+import { dotFragment, dotVertex, surfaceFragment, surfaceVertex } from "./shaders.ts";
+import { sigmaColor, sigmaPosition } from "./sigma_scale.ts";
+import { thinned, toSurface, triangulate, type Surface } from "./surface.ts";
+
+/** What is drawn of a face. */
+export interface Shown {
+  readonly view: View;
+  readonly mode: Mode;
+  /** Between true colours, 0, and those of sigma, 1. */
+  readonly confidence: number;
+  /** Part of the face's width, from the left, that is dense; the rest is the initial cloud. */
+  readonly blend: number;
+  /** Of the surface: 1 for every point, 2 for every second row and column. */
+  readonly stride: number;
+}
+
+/** Of the camera's picture, top to bottom, degrees: a face is seen as from two thirds of a metre. */
+const FIELD_OF_VIEW = 26;
+/** Part of the canvas's height or width that a face takes. */
+const SHARE = 0.88;
+const NEAR_MM = 10;
+const FAR_MM = 5000;
+/** Least distance of the dots of the points view, pixels: fewer are no points but moire. */
+const DOT_DISTANCE_PX = 5;
+/** Diameter of a dot, as a part of the dots' distance. */
+const DOT_SIZE = 0.8;
+const SEED_SIZE = 1.05;
+/** What hides the dots of the far side lies so far behind the surface, mm. */
+const BEHIND_MM = 2;
+const HANDLE_PX = 3;
+const SCALE_COLORS = 256;
+
+/** All that WebGL holds of one face, and how it is drawn. */
+export class Stage {
+  readonly renderer: WebGLRenderer;
+  readonly #scene = new Scene();
+  readonly #camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, NEAR_MM, FAR_MM);
+  readonly #turned = new Group();
+  readonly #scale = scaleTexture();
+  readonly #sigma = {
+    scale: { value: this.#scale },
+    sigmaCodes: { value: new Vector2(0, 1) },
+    confidence: { value: 0 },
+  };
+  readonly #focal = { value: 1 };
+  readonly #surfaceMaterial = new ShaderMaterial({
+    vertexShader: surfaceVertex, fragmentShader: surfaceFragment, side: DoubleSide,
+    transparent: true, premultipliedAlpha: true,
+    uniforms: { ...this.#sigma, behind: { value: 0 } },
+  });
+  readonly #screenMaterial = new ShaderMaterial({
+    vertexShader: surfaceVertex, fragmentShader: "void main() {}", side: DoubleSide,
+    colorWrite: false, uniforms: { behind: { value: BEHIND_MM } },
+  });
+  readonly #dotMaterial = dotMaterial(this.#sigma, this.#focal, 0.8);
+  readonly #seedMaterial = dotMaterial(
+    { ...this.#sigma, confidence: { value: 0 } }, this.#focal, 0);
+  #loaded: Loaded | null = null;
+  #aspect = 1;
+
+  constructor(canvas: HTMLCanvasElement, context: WebGL2RenderingContext) {
+    this.renderer = new WebGLRenderer({ canvas, context });
+    this.renderer.autoClear = false;
+    this.#scene.add(this.#turned);
+  }
+
+  /** The whole canvas's size in CSS pixels and pixels for each of them. */
+  resize(width: number, height: number, ratio: number): void {
+    this.renderer.setPixelRatio(ratio);
+    this.renderer.setSize(width, height, false);
+    this.#aspect = width / height;
+  }
+
+  /** Takes another face, or none. */
+  load(face: FaceGrid | null): void {
+    this.#loaded?.dispose();
+    this.#turned.clear();
+    this.#loaded = null;
+    if (!face) return;
+    this.#loaded = new Loaded(face);
+    const [low, high] = face.sigmaMm;
+    this.#sigma.sigmaCodes.value.set(sigmaPosition(low), sigmaPosition(high));
+  }
+
+  /**
+   * Draws.
+   *
+   * @returns where the initial cloud begins, as a part of the canvas's width; null where one of both
+   * is shown alone.
+   */
+  draw(shown: Shown): number | null {
+    const { renderer } = this;
+    renderer.setScissorTest(false);
+    renderer.setClearColor(0, 0);
+    renderer.clear();
+    if (!this.#loaded) return null;
+    this.#look(shown.view, this.#loaded.surface);
+    this.#sigma.confidence.value = shown.confidence;
+    const at = this.#split(shown, this.#loaded.surface);
+    const { width, height } = renderer.getSize(new Vector2());
+    if (at > 0) {
+      this.#within(0, at * width, height);
+      this.#drawDense(shown, this.#loaded);
+    }
+    if (at < 1) {
+      this.#within(at * width, (1 - at) * width, height);
+      this.#seedMaterial.uniforms["diameter"]!.value = SEED_SIZE * this.#loaded.face.spacingMm;
+      this.#draw(new Points(this.#loaded.seeds, this.#seedMaterial));
+    }
+    if (at <= 0 || at >= 1) return null;
+    this.#within(at * width - HANDLE_PX / 2, HANDLE_PX, height);
+    renderer.setClearColor(0xffffff, 0.9);
+    renderer.clear();
+    return at;
+  }
+
+  /** Gives everything back; the canvas is of no use any more. */
+  dispose(): void {
+    this.load(null);
+    this.#scale.dispose();
+    for (const material of [this.#surfaceMaterial, this.#screenMaterial, this.#dotMaterial,
+      this.#seedMaterial]) {
+      material.dispose();
+    }
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
+  }
+
+  #drawDense({ mode, stride }: Shown, loaded: Loaded): void {
+    if (mode !== "points") {
+      this.#draw(new Mesh(loaded.mesh(stride), this.#surfaceMaterial));
+      return;
+    }
+    const { face, surface } = loaded;
+    const distance = this.#camera.position.z - surface.halfSize[2];
+    const pixels = face.stepMm * this.#focal.value / distance;
+    const every = Math.max(1, Math.round(DOT_DISTANCE_PX / pixels));
+    this.#dotMaterial.uniforms["diameter"]!.value = DOT_SIZE * every * face.stepMm;
+    this.#draw(new Mesh(loaded.mesh(Math.max(2, stride)), this.#screenMaterial));
+    this.#draw(new Points(loaded.dots(every), this.#dotMaterial));
+  }
+
+  #draw(object: Mesh | Points): void {
+    object.frustumCulled = false;
+    this.#turned.add(object);
+    this.renderer.render(this.#scene, this.#camera);
+    this.#turned.remove(object);
+  }
+
+  #look(view: View, { halfSize: [halfWidth, halfHeight, halfDepth] }: Surface): void {
+    const camera = this.#camera;
+    const tangent = Math.tan(FIELD_OF_VIEW / 2 * Math.PI / 180);
+    // Turned to the side a face is as wide as it is deep and wide together.
+    const radius = Math.hypot(halfWidth, halfDepth);
+    const fit = Math.max(halfHeight, radius / this.#aspect, 1) / tangent / SHARE;
+    camera.aspect = this.#aspect;
+    camera.zoom = view.zoom;
+    camera.position.set(-view.panX * halfWidth, view.panY * halfHeight, fit + halfDepth);
+    camera.updateProjectionMatrix();
+    this.#turned.rotation.set(view.pitch * Math.PI / 180, view.yaw * Math.PI / 180, 0);
+    const { height } = this.renderer.getDrawingBufferSize(new Vector2());
+    this.#focal.value = camera.projectionMatrix.elements[5]! * height / 2;
+  }
+
+  /** Where the initial cloud begins, as a part of the canvas's width: along the face. */
+  #split({ blend, view }: Shown, { halfSize: [halfWidth, , halfDepth] }: Surface): number {
+    if (blend <= 0 || blend >= 1) return blend <= 0 ? 0 : 1;
+    const across = this.#camera.projectionMatrix.elements[0]! / this.#camera.position.z / 2;
+    const reach = 1.08 * Math.hypot(halfWidth, halfDepth) * across;
+    const middle = 0.5 + view.panX * halfWidth * across;
+    return Math.min(0.999, Math.max(0.001, middle + (2 * blend - 1) * reach));
+  }
+
+  #within(left: number, width: number, height: number): void {
+    this.renderer.setScissorTest(true);
+    this.renderer.setScissor(left, 0, width, height);
+  }
+}
+
+/** The buffers of one face; what is coarser shares the vertices. */
+class Loaded {
+  readonly face: FaceGrid;
+  readonly surface: Surface;
+  readonly seeds: BufferGeometry;
+  readonly #attributes: Record<string, BufferAttribute>;
+  readonly #meshes = new Map<number, BufferGeometry>();
+  readonly #dots = new Map<number, BufferGeometry>();
+
+  constructor(face: FaceGrid) {
+    this.face = face;
+    this.surface = toSurface(face);
+    this.#attributes = {
+      position: new BufferAttribute(this.surface.positions, 3),
+      bearing: new BufferAttribute(this.surface.normals, 4, true),
+      tint: new BufferAttribute(face.colors, 4, true),
+    };
+    this.seeds = toSeeds(face, this.surface);
+  }
+
+  /** The triangles of every `stride`-th row and column. */
+  mesh(stride: number): BufferGeometry {
+    return this.#kept(this.#meshes, stride, () => triangulate(this.face, stride));
+  }
+
+  /** The points of every `stride`-th row and column. */
+  dots(stride: number): BufferGeometry {
+    return this.#kept(this.#dots, stride, () => thinned(this.face, stride));
+  }
+
+  dispose(): void {
+    for (const geometry of [...this.#meshes.values(), ...this.#dots.values(), this.seeds]) {
+      geometry.dispose();
+    }
+  }
+
+  #kept(
+    all: Map<number, BufferGeometry>, stride: number, make: () => Uint32Array,
+  ): BufferGeometry {
+    let geometry = all.get(stride);
+    if (!geometry) {
+      geometry = new BufferGeometry();
+      for (const [name, attribute] of Object.entries(this.#attributes)) {
+        geometry.setAttribute(name, attribute);
+      }
+      geometry.setIndex(new BufferAttribute(make(), 1));
+      all.set(stride, geometry);
+    }
+    return geometry;
+  }
+}
+
+function toSeeds({ seeds }: FaceGrid, { origin: [x, y, z] }: Surface): BufferGeometry {
+  const positions = new Float32Array(3 * seeds.points);
+  const tints = new Uint8Array(4 * seeds.points);
+  const bearings = new Int8Array(4 * seeds.points);
+  for (let point = 0; point < seeds.points; point++) {
+    positions[3 * point] = seeds.positions[3 * point]! - x;
+    positions[3 * point + 1] = y - seeds.positions[3 * point + 1]!;
+    positions[3 * point + 2] = z - seeds.positions[3 * point + 2]!;
+    tints.set(seeds.colors.subarray(3 * point, 3 * point + 3), 4 * point);
+    bearings[4 * point + 2] = 127;
+  }
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(positions, 3));
+  geometry.setAttribute("bearing", new BufferAttribute(bearings, 4, true));
+  geometry.setAttribute("tint", new BufferAttribute(tints, 4, true));
+  return geometry;
+}
+
+function dotMaterial(
+  sigma: Record<string, { value: unknown }>, focal: { value: number }, shaded: number,
+): ShaderMaterial {
+  return new ShaderMaterial({
+    vertexShader: dotVertex, fragmentShader: dotFragment, transparent: true,
+    premultipliedAlpha: true,
+    uniforms: { ...sigma, focal, diameter: { value: 1 }, shaded: { value: shaded } },
+  });
+}
+
+function scaleTexture(): DataTexture {
+  const pixels = new Uint8Array(4 * SCALE_COLORS);
+  for (let at = 0; at < SCALE_COLORS; at++) {
+    pixels.set([...sigmaColor(at / (SCALE_COLORS - 1)), 255], 4 * at);
+  }
+  const texture = new DataTexture(pixels, SCALE_COLORS, 1);
+  texture.minFilter = texture.magFilter = LinearFilter;
+  texture.needsUpdate = true;
+  return texture;
+}

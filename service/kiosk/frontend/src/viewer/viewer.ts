@@ -1,0 +1,257 @@
+/** A face to be looked at: turns by itself until touched, is turned, brought nearer and compared. */
+
+import type { FaceGrid } from "../face_grid.ts";
+import { Detail } from "./detail.ts";
+import { drawFlat, type Mode } from "./flat.ts";
+import { listen } from "./gestures.ts";
+import { drawn, openGraphics, type Graphics } from "./graphics.ts";
+import { Pose } from "./pose.ts";
+import { SIGMA_RANGE_MM } from "./sigma_scale.ts";
+import { Stage } from "./stage.ts";
+
+export { drawSigmaScale, sigmaLegend, type LegendMark } from "./sigma_scale.ts";
+export type { Mode } from "./flat.ts";
+
+/** How a viewer is to behave. */
+export interface ViewerOptions {
+  /** Nothing moves by itself, and what is asked for is shown at once. */
+  readonly reducedMotion: boolean;
+  /** Called where there is no WebGL: the face is a picture that cannot be turned. */
+  readonly onFlat?: () => void;
+}
+
+/** Pixels for each CSS pixel, at most. */
+const MAX_RATIO = 2;
+/** In software: while moving, and when still. */
+const SOFTWARE_RATIO = 1;
+const SOFTWARE_STILL_RATIO = 1.5;
+/** After so long without movement the whole face is drawn, ms. */
+const STILL_MS = 160;
+/** Longest time by which a movement goes on at once, s: after a pause nothing jumps. */
+const MAX_STEP_S = 0.1;
+/** Time in which true colours become those of sigma, s. */
+const FADE_S = 0.35;
+/** What a finger that lets go while moving still turns, s of its speed, at most so many degrees. */
+const FLICK_S = 0.18;
+const MAX_FLICK = 40;
+
+/**
+ * Shows faces on a canvas, whose size in CSS pixels is its own.
+ *
+ * Draws on demand alone: nothing runs while nothing moves.
+ */
+export class FaceViewer {
+  /** Called when a visitor touches the canvas. */
+  onTouched: (() => void) | null = null;
+  /** Called after each drawing where the line between dense and initial cloud is, as a part of the
+   * canvas's width; null where there is none. */
+  onSplit: ((at: number | null) => void) | null = null;
+  /** Sigma at the ends of the colours' scale, mm. */
+  readonly sigmaRange = SIGMA_RANGE_MM;
+  readonly #canvas: HTMLCanvasElement;
+  readonly #still: boolean;
+  readonly #graphics: Graphics | null;
+  readonly #stage: Stage | null;
+  readonly #flat: CanvasRenderingContext2D | null = null;
+  readonly #pose: Pose;
+  readonly #detail: Detail;
+  readonly #ended = new AbortController();
+  #face: FaceGrid | null = null;
+  #mode: Mode = "mesh";
+  #blend = 1;
+  #confidence = 0;
+  #frame = 0;
+  #settle: ReturnType<typeof setTimeout> | undefined;
+  #last = 0;
+  #ratio = 0;
+
+  constructor(canvas: HTMLCanvasElement, { reducedMotion, onFlat }: ViewerOptions) {
+    this.#canvas = canvas;
+    this.#still = reducedMotion;
+    this.#pose = new Pose(reducedMotion);
+    this.#graphics = openGraphics(canvas);
+    this.#detail = new Detail(this.#graphics?.software ?? true);
+    this.#stage = this.#graphics && new Stage(canvas, this.#graphics.context);
+    if (!this.#graphics) {
+      this.#flat = canvas.getContext("2d");
+      onFlat?.();
+    }
+    this.#listen();
+    this.resize();
+  }
+
+  /** Whether the face can be turned: false where there is no WebGL. */
+  get rotatable(): boolean {
+    return this.#stage !== null;
+  }
+
+  /** What is shown of the face. */
+  get mode(): Mode {
+    return this.#mode;
+  }
+
+  set mode(mode: Mode) {
+    this.#mode = mode;
+    if (this.#still || mode === "points") this.#confidence = Number(mode === "sigma");
+    this.#request();
+  }
+
+  /** Part of the face, from the left, that is dense: 0 is the initial cloud, 1 the dense face. */
+  get blend(): number {
+    return this.#blend;
+  }
+
+  set blend(blend: number) {
+    this.#blend = Math.min(1, Math.max(0, blend));
+    this.#request();
+  }
+
+  /** Whether the face turns by itself; a touch ends it. */
+  get turning(): boolean {
+    return this.#pose.turning;
+  }
+
+  set turning(on: boolean) {
+    this.#pose.turning = on;
+    this.#request();
+  }
+
+  /**
+   * Shows another face from the front.
+   *
+   * @returns a promise of whether it was drawn: false where another one came first, or the end.
+   */
+  async show(face: FaceGrid): Promise<boolean> {
+    this.#face = face;
+    this.#pose.reset(true);
+    this.#stage?.load(face);
+    // What comes first is as coarse as what moves: the rest follows.
+    this.#draw(this.#detail.stride);
+    this.#request();
+    const done = this.#graphics ? await drawn(this.#graphics.context) : true;
+    return done && this.#face === face;
+  }
+
+  /** Turns by degrees: `dx` to the right, `dy` down. */
+  rotate(dx: number, dy: number): void {
+    this.#pose.rotate(dx, dy);
+    this.#request();
+  }
+
+  /** Comes nearer by a factor above 1, goes away by one below. */
+  zoom(factor: number): void {
+    this.#pose.zoom(factor);
+    this.#request();
+  }
+
+  /** Shows the face from the front again, all of it. */
+  reset(): void {
+    this.#pose.reset();
+    this.#request();
+  }
+
+  /** To be called when the canvas's size in CSS pixels has changed. */
+  resize(): void {
+    this.#ratio = 0;
+    this.#request();
+  }
+
+  /** Frees everything; the canvas cannot be used again. */
+  dispose(): void {
+    this.#ended.abort();
+    cancelAnimationFrame(this.#frame);
+    clearTimeout(this.#settle);
+    this.#face = null;
+    this.#stage?.dispose();
+  }
+
+  #listen(): void {
+    const pose = this.#pose;
+    const { signal } = this.#ended;
+    listen(this.#canvas, {
+      touched: () => {
+        this.turning = false;
+        this.onTouched?.();
+      },
+      turn: (yaw, pitch) => this.#moved(() => pose.rotate(yaw, pitch, true)),
+      flick: (yaw, pitch) => this.#flick(yaw, pitch),
+      zoom: (factor) => this.#moved(() => pose.zoom(factor, true)),
+      pan: (x, y) => this.#moved(() => pose.pan(
+        3 * x / Math.max(1, this.#canvas.clientWidth) / pose.view.zoom,
+        3 * y / Math.max(1, this.#canvas.clientHeight) / pose.view.zoom, true)),
+      reset: () => this.reset(),
+    }, signal);
+    this.#canvas.addEventListener("webglcontextlost", (event) => event.preventDefault(), { signal });
+    this.#canvas.addEventListener("webglcontextrestored", () => this.resize(), { signal });
+  }
+
+  #moved(change: () => void): void {
+    change();
+    this.#request();
+  }
+
+  #flick(yaw: number, pitch: number): void {
+    if (this.#still) return;
+    const part = (speed: number): number =>
+      Math.min(MAX_FLICK, Math.max(-MAX_FLICK, speed * FLICK_S));
+    this.rotate(part(yaw), part(pitch));
+  }
+
+  /** Draws at the browser's next picture. */
+  #request(): void {
+    if (this.#frame || this.#ended.signal.aborted) return;
+    this.#frame = requestAnimationFrame((now) => this.#next(now));
+  }
+
+  #next(now: number): void {
+    this.#frame = 0;
+    clearTimeout(this.#settle);
+    const elapsed = this.#last ? now - this.#last : 0;
+    if (elapsed) this.#detail.took(elapsed);
+    const seconds = Math.min(MAX_STEP_S, (elapsed || 16) / 1000);
+    const moving = this.#pose.step(seconds);
+    const fading = this.#fade(seconds);
+    this.#draw(this.#detail.stride);
+    if (moving || fading) {
+      this.#last = now;
+      this.#request();
+      return;
+    }
+    this.#last = 0;
+    this.#detail.rest();
+    this.#settle = setTimeout(() => this.#draw(1), STILL_MS);
+  }
+
+  /** Goes on from one mode's colours to the other's; returns whether it is not there yet. */
+  #fade(seconds: number): boolean {
+    const wanted = Number(this.#mode === "sigma");
+    const left = wanted - this.#confidence;
+    const step = seconds / FADE_S;
+    this.#confidence = Math.abs(left) <= step ? wanted : this.#confidence + Math.sign(left) * step;
+    return this.#confidence !== wanted;
+  }
+
+  #draw(stride: number): void {
+    const { clientWidth: width, clientHeight: height } = this.#canvas;
+    if (!this.#face || width === 0 || height === 0) return;
+    if (this.#flat) {
+      const ratio = Math.min(MAX_RATIO, devicePixelRatio);
+      this.#canvas.width = Math.round(width * ratio);
+      this.#canvas.height = Math.round(height * ratio);
+      drawFlat(this.#flat, this.#face, this.#mode, this.#blend);
+      return;
+    }
+    if (!this.#stage || this.#graphics?.context.isContextLost()) return;
+    const most = !this.#graphics?.software ? Math.min(MAX_RATIO, devicePixelRatio)
+      : stride > 1 ? SOFTWARE_RATIO : SOFTWARE_STILL_RATIO;
+    if (most !== this.#ratio) {
+      this.#stage.resize(width, height, most);
+      this.#ratio = most;
+    }
+    const smooth = this.#confidence * this.#confidence * (3 - 2 * this.#confidence);
+    const split = this.#stage.draw({
+      view: this.#pose.view, mode: this.#mode, confidence: smooth, blend: this.#blend, stride,
+    });
+    this.onSplit?.(split);
+  }
+}
