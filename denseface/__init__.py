@@ -9,19 +9,21 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from denseface.capture import RgbdFrame, open_source
     from denseface.recon import Face, Settings, reconstruct
+    from denseface.recon.face import Consent
     from denseface.service.client import AsyncClient, Client
     from denseface.service.export import load_face, save_face
 
     __version__: str
 
 __all__ = [
-    "AsyncClient", "Client", "Face", "RgbdFrame", "Settings", "__version__", "load_face",
+    "AsyncClient", "Client", "Consent", "Face", "RgbdFrame", "Settings", "__version__", "load_face",
     "open_source", "reconstruct", "save_face",
 ]
 
 _MODULES = {
     "AsyncClient": "denseface.service.client",
     "Client": "denseface.service.client",
+    "Consent": "denseface.recon.face",
     "Face": "denseface.recon",
     "RgbdFrame": "denseface.capture",
     "Settings": "denseface.recon",

@@ -1,17 +1,20 @@
 """Seeds, and the result: initial cloud, dense cloud, report."""
 
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, FailFast, Field, field_validator
+from pydantic import AwareDatetime, BaseModel, ConfigDict, FailFast, Field, field_validator
 
 from denseface.capture.frame import DepthRounding
 from denseface.recon.arrays import Bytes, Floats, Ints
 from denseface.recon.settings import Settings
 
-__all__ = ["Box", "DenseCloud", "Face", "FaceCandidate", "PointCloud", "Report", "Seeds"]
+__all__ = [
+    "Box", "Consent", "DenseCloud", "Face", "FaceCandidate", "PointCloud", "Report", "Seeds",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +118,30 @@ STAGES = ("overview", "detection", "registration", "segmentation", "neighbors", 
 """The stages of a reconstruction, in order: names in `Report.timings_ms`, beside `total`."""
 
 
+class Consent(BaseModel):
+    """What a person agreed to before the picture, as the press said; the hub keeps it."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    text_version: Annotated[str, Field(min_length=1, max_length=64)]
+    """Of the text that was read."""
+    language: Annotated[str, Field(pattern=r"^[A-Za-z]{2,8}(-[A-Za-z0-9]{1,8}){0,7}$")]
+    """In which it was read: BCP 47."""
+    retention_s: Annotated[float, Field(gt=0, le=1e10)] | None = None
+    """What was promised: nothing is kept longer than so many seconds after the press. None where
+    no time was named."""
+    at: AwareDatetime
+    """When it was given, UTC; in JSON ISO 8601."""
+
+    @field_validator("at")
+    @classmethod
+    def _utc(cls, given: datetime) -> datetime:
+        try:
+            return given.astimezone(UTC)
+        except OverflowError as error:
+            raise ValueError("this time does not exist in UTC") from error
+
+
 class Report(_Model):
     """What was done to the frame, as written by `--report`."""
 
@@ -159,6 +186,8 @@ class Report(_Model):
     """How a depth became a whole number of counts."""
     version: str
     warnings: Annotated[tuple[str, ...], FailFast()] = ()
+    consent: Consent | None = None
+    """Of the person, where the press came with one."""
 
     @field_validator("timings_ms")
     @classmethod

@@ -14,7 +14,7 @@ from typing import Self, TypeVar
 
 import zmq
 
-from denseface.recon.face import Face
+from denseface.recon.face import Consent, Face
 from denseface.service.client._base import BaseClient
 from denseface.service.client.events import (
     Published,
@@ -82,11 +82,12 @@ class AsyncClient(BaseClient):
     async def press(
         self, capture_id: str | None = None, *, timeout: float = 15.0, sensor: str | None = None,
         gate: Gate = "off", gate_timeout: float = DEFAULT_GATE_S, frames: int = 1,
+        consent: Consent | None = None,
     ) -> str:
         """Take a frame now; see `Client.press`."""
         return await self._run(self._exchanges.press(
             capture_id, timeout, sensor=sensor, gate=gate, gate_timeout=gate_timeout,
-            frames=frames))
+            frames=frames, consent=consent))
 
     async def withdraw(self, capture_id: str, *, timeout: float = 30.0) -> int:
         """Remove a capture, wherever it stands; see `Client.withdraw`.

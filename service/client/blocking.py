@@ -11,7 +11,7 @@ from contextlib import closing
 from datetime import datetime
 from typing import TypeVar
 
-from denseface.recon.face import Face
+from denseface.recon.face import Consent, Face
 from denseface.service.client._base import BaseClient
 from denseface.service.client.events import (
     Published,
@@ -67,6 +67,7 @@ class Client(Closing, BaseClient):
     def press(
         self, capture_id: str | None = None, *, timeout: float = 15.0, sensor: str | None = None,
         gate: Gate = "off", gate_timeout: float = DEFAULT_GATE_S, frames: int = 1,
+        consent: Consent | None = None,
     ) -> str:
         """Take a frame now; give the capture's id once the frame is safe at the hub.
 
@@ -79,6 +80,9 @@ class Client(Closing, BaseClient):
             `wait` for a good one
         gate_timeout : longest wait for a good one, seconds, at most 120; `timeout` comes to it
         frames : consecutive frames that are made into one, at most 32
+        consent : what the person agreed to; the hub keeps it with the capture and says it in the
+            face's report. Where it names a time, all of the capture is removed after that, however
+            long the hub keeps others
 
         Raises
         ------
@@ -92,7 +96,7 @@ class Client(Closing, BaseClient):
         """
         return self._run(self._exchanges.press(
             capture_id, timeout, sensor=sensor, gate=gate, gate_timeout=gate_timeout,
-            frames=frames))
+            frames=frames, consent=consent))
 
     def withdraw(self, capture_id: str, *, timeout: float = 30.0) -> int:
         """Remove a capture that was pressed with this key, wherever it stands.

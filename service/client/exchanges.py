@@ -16,7 +16,7 @@ from typing import TypeVar
 
 from pydantic import ValidationError
 
-from denseface.recon.face import Face
+from denseface.recon.face import Consent, Face
 from denseface.service import errors
 from denseface.service.client.events import PublishedFailure, outcome_of
 from denseface.service.protocol import messages
@@ -87,14 +87,14 @@ class Exchanges:
 
     def press(
         self, capture_id: str | None, timeout: float, *, sensor: str | None, gate: Gate,
-        gate_timeout: float, frames: int,
+        gate_timeout: float, frames: int, consent: Consent | None,
     ) -> Exchange[str]:
         """See `Client.press`."""
         chosen = uuid.uuid4().hex if capture_id is None else capture_id
         try:
             message = messages.Press(
                 request=self.next_number(), capture_id=chosen, sensor=sensor, gate=gate,
-                gate_timeout=gate_timeout, frames=frames)
+                gate_timeout=gate_timeout, frames=frames, consent=consent)
         except ValidationError as error:
             field, why = errors.first_error(error, found=True)
             raise errors.LocalProtocolError(

@@ -39,8 +39,6 @@ _WRITES_S = 1.0
 """Longest time for which a removal holds the hub up for files that are being written, seconds."""
 _VERSION = version("denseface")
 """Of this package, as the status says it."""
-_BEING_SAVED = (CaptureState.SAVING_FRAME, CaptureState.SAVING_FACE)
-"""States of captures of which a file may be being written."""
 
 
 class Hub:
@@ -271,7 +269,8 @@ class Hub:
         capture_id = message.capture_id
         owner = self._presses.pressed_by(capture_id)
         owned = owner in (None, key) or Role.OPERATOR in roles
-        if owned and self._captures.state(capture_id) in _BEING_SAVED:
+        state = self._captures.state(capture_id) if owned else None
+        if state in (CaptureState.SAVING_FRAME, CaptureState.SAVING_FACE):
             yield from self._end_writes(now)
         self._presses.withdrawn.add(key, capture_id)
         if owned and owner is not None:

@@ -29,6 +29,8 @@ _PAGE = 50
 """Dead letters in one answer, as `DeadLetters.letters` allows."""
 _SWEEP_S = 600.0
 """Longest time between two sweeps for what is too old, seconds."""
+_PROMISES_S = 1.0
+"""Time between two looks for what a consent promised to be gone, seconds."""
 _MAX_ASKED = 64
 """Removals that may wait for their end; beyond, one is refused."""
 _MAX_ASKED_PER_KEY = 16
@@ -89,7 +91,7 @@ class Maintenance:
         self._jobs = jobs
         self._outcomes = outcomes
         self._counters = counters
-        self._due = self._log_due = 0.0
+        self._due = self._log_due = self._promises_due = 0.0
         self._erasures: deque[_Erasure] = deque()
         """Under way, in the order in which they end."""
         self._unsaid: list[_Asked] = []
@@ -104,6 +106,11 @@ class Maintenance:
         if self._erasures:
             return
         try:
+            if now >= self._promises_due:
+                self._promises_due = now + _PROMISES_S
+                yield from self._keep_promises(now)
+            if self._erasures:
+                return
             if now >= self._due:
                 self._due = now + self._sweep_s
                 self._sweep(now)
@@ -130,6 +137,17 @@ class Maintenance:
             self._due = now
         self._erase(retention.prepare(going, retention_s=self._retention_s),
                     _Erasure("retention", removed))
+
+    def _keep_promises(self, now: float) -> Iterator[Output]:
+        """Begin to erase what a consent promised to be gone by now, also what has no face yet."""
+        found = self._store.retention.promised(_BATCH)
+        going = [one for one in found if self._captures.allows(one, CaptureEvent.PROMISED)]
+        if going:
+            if len(going) == _BATCH:
+                self._promises_due = now
+            yield from self._withdraw(going, CaptureEvent.PROMISED)
+            self._erase(
+                self._store.retention.prepare(going), _Erasure("retention", len(going)))
 
     def erased(self, now: float, results: Sequence[Erased]) -> Iterator[Output]:
         """Take what became of erasures, and answer those who wait for them."""
@@ -259,9 +277,11 @@ class Maintenance:
             _Erasure("operator", len(going), _Asked(
                 peer, message.request, message.capture_id, len(going), left)))
 
-    def _withdraw(self, capture_ids: Sequence[str]) -> Iterator[Output]:
+    def _withdraw(
+        self, capture_ids: Sequence[str], event: CaptureEvent = CaptureEvent.PURGED
+    ) -> Iterator[Output]:
         if capture_ids:
-            with self._captures.transition(CaptureEvent.PURGED, *capture_ids) as state:
+            with self._captures.transition(event, *capture_ids) as state:
                 self._store.retention.remove(capture_ids, state)
             gone = frozenset(capture_ids)
             self._jobs.forget(gone)

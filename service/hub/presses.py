@@ -64,6 +64,8 @@ class _Press:
     """Whether the sensor may wait for a frame that is good enough."""
     key: str
     """Fingerprint of the first presser's key; empty where it needed none."""
+    consent: messages.Consent | None = None
+    """That came with the first press."""
     pressers: dict[bytes, _Presser] = field(default_factory=dict)
     """The clients that pressed this id."""
     frame_sender: bytes | None = None
@@ -148,7 +150,8 @@ class Presses:
         waits = message.gate == "wait"
         patience_s = self._settings.take_timeout_s + (message.gate_timeout if waits else 0.0)
         self._presses[capture_id] = _Press(
-            sensor.peer, now + patience_s, patience_s, waits, key, {peer: presser})
+            sensor.peer, now + patience_s, patience_s, waits, key, message.consent,
+            {peer: presser})
         yield send(sensor.peer, messages.Take(
             capture_id=capture_id, gate=message.gate, gate_timeout=message.gate_timeout,
             frames=message.frames))
@@ -234,7 +237,8 @@ class Presses:
         press.frame_sender, press.deadline = peer, now + self._settings.take_timeout_s
         self._captures.advance(capture_id, CaptureEvent.FRAME_RECEIVED)
         try:
-            pending = self._store.prepare_frame(packet, self._recon, self._recon_hash, press.key)
+            pending = self._store.prepare_frame(
+                packet, self._recon, self._recon_hash, press.key, press.consent)
         except StoreError as error:
             yield from self._not_saved(capture_id, error)
             return

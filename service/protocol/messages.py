@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import FailFast, Field, model_validator
 
+from denseface.recon.face import Consent as Consent
 from denseface.recon.settings import Settings
 from denseface.service.protocol.hint import Hint as Hint
 from denseface.service.protocol.message_base import (
@@ -64,7 +65,7 @@ class _WithFace(BaseMessage):
 class Press(BaseRequest):
     """Take a frame now and make a face of it; the same id again is the same capture."""
 
-    newer: ClassVar = frozenset({"sensor", "gate", "gate_timeout", "frames"})
+    newer: ClassVar = frozenset({"sensor", "gate", "gate_timeout", "frames", "consent"})
 
     kind: Literal["press"] = "press"
     capture_id: CaptureId
@@ -73,6 +74,8 @@ class Press(BaseRequest):
     gate: Gate = "off"
     gate_timeout: GateSeconds = DEFAULT_GATE_S
     frames: BurstFrames = 1
+    consent: Consent | None = None
+    """Kept with the capture, and told with its face; a time that it promises is kept."""
 
 
 class Withdraw(BaseRequest):

@@ -62,6 +62,8 @@ class CaptureEvent(StrEnum):
     """An operator wants all attempts made again."""
     EXPIRED = "expired"
     """The retention has passed since the outcome."""
+    PROMISED = "promised"
+    """So much time has passed since the press as a consent promised."""
     PURGED = "purged"
     """An operator wants it gone, or whoever pressed it."""
 
@@ -95,6 +97,11 @@ TRANSITIONS: dict[tuple[CaptureState | None, CaptureEvent], CaptureState] = {
     (_S.DONE, _E.EXPIRED): _S.REMOVED,
     (_S.FAILED, _E.EXPIRED): _S.REMOVED,
     (_S.DEAD, _E.EXPIRED): _S.REMOVED,
+    (_S.ACCEPTED, _E.PROMISED): _S.REMOVED,
+    (_S.WORKING, _E.PROMISED): _S.REMOVED,
+    (_S.DONE, _E.PROMISED): _S.REMOVED,
+    (_S.FAILED, _E.PROMISED): _S.REMOVED,
+    (_S.DEAD, _E.PROMISED): _S.REMOVED,
     (_S.ACCEPTED, _E.PURGED): _S.REMOVED,
     (_S.WORKING, _E.PURGED): _S.REMOVED,
     # What is being written is settled first; what the disk refused goes.

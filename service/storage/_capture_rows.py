@@ -2,17 +2,56 @@
 
 from dataclasses import dataclass
 from datetime import datetime
-from sqlite3 import Connection
+from sqlite3 import Connection, Row
+from typing import Self
 
-from denseface.service.errors import StoreError
+from pydantic import ValidationError
+
+from denseface.recon.face import Consent
+from denseface.service.errors import DamagedDatabaseError, StoreError, first_error
 from denseface.service.protocol.message_base import DeadLetter
 from denseface.service.protocol.states import CaptureState
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.storage._database import MAX_ERROR, MAX_MESSAGE, Database
 from denseface.service.storage._store_clock import StoreClock, format_timestamp
+from denseface.service.storage.records import FaceMetadata, FrameMetadata
 
 _MAX_MESSAGE = 300
 """Characters of an error in the list of dead letters."""
+
+
+@dataclass(frozen=True)
+class ConsentRow:
+    """What was agreed to with a press."""
+
+    consent: Consent
+    due_age_s: float | None
+    """Age of the store at which the capture goes, seconds; None where no time was promised."""
+
+    @classmethod
+    def of(cls, metadata: FrameMetadata | FaceMetadata) -> Self | None:
+        """Give what a file says; None where the press came without a consent."""
+        return cls(metadata.consent, metadata.due_age_s) if metadata.consent else None
+
+    @classmethod
+    def read(cls, row: Row) -> Self | None:
+        """Read a row that is joined with `consents`; DamagedDatabaseError where it is malformed."""
+        if row["text_version"] is None:
+            return None
+        try:
+            consent = Consent(text_version=row["text_version"], language=row["language"],
+                              retention_s=row["retention_s"], at=row["agreed_at"])
+        except ValidationError as error:
+            raise DamagedDatabaseError(f"consent: {' '.join(first_error(error))}") from error
+        return cls(consent, row["due_age_s"])
+
+    def insert(self, connection: Connection, capture_id: str) -> None:
+        """Add it to a capture that has a row."""
+        said = self.consent
+        connection.execute(
+            "INSERT INTO consents VALUES (?, ?, ?, ?, ?, ?)",
+            (capture_id, said.text_version, said.language, said.retention_s, said.at.isoformat(),
+             self.due_age_s))
 
 
 @dataclass(frozen=True)
@@ -28,6 +67,8 @@ class CaptureRow:
     pressed_by: str = ""
     """Fingerprint of the key that pressed; empty where none was needed."""
     attempts: int = 0
+    consent: ConsentRow | None = None
+    """For `insert`; what is found comes without."""
 
     def insert(self, connection: Connection) -> None:
         """Add this row."""
@@ -35,6 +76,8 @@ class CaptureRow:
             "INSERT INTO captures (capture_id, state, settings_hash, frame_sha256, accepted_at,"
             " pressed_by, attempts) VALUES (:capture_id, :state, :settings_hash, :frame_sha256,"
             " :accepted_at, :pressed_by, :attempts)", vars(self))
+        if self.consent:
+            self.consent.insert(connection, self.capture_id)
 
 
 @dataclass(frozen=True)
@@ -85,6 +128,12 @@ class CaptureRows:
                 capture_id, CaptureState(row["state"]), row["settings_hash"],
                 row["frame_sha256"], row["accepted_at"], row["pressed_by"], row["attempts"])
         return self._last_find[1]
+
+    def consent(self, capture_id: str) -> ConsentRow | None:
+        """Give what was agreed to with the press of a capture."""
+        row = self._database.select_one(
+            "SELECT * FROM consents WHERE capture_id = ?", capture_id)
+        return ConsentRow.read(row) if row else None
 
     def unfinished(self) -> list[str]:
         """Give the ids of what was accepted and has no outcome, oldest first."""

@@ -15,7 +15,7 @@ from denseface.service.errors import DamagedDatabaseError, DiskFullError, StoreE
 from denseface.service.runtime.files import sync_folder
 from denseface.service.storage._record_file import wrap_os_errors
 
-_VERSION = 3
+_VERSION = 4
 """Version of the schema, in `PRAGMA user_version`."""
 _MAX_NUMBER = 2**53
 """Sequence numbers, positions and attempts stay below it; a higher one is damage."""
@@ -32,6 +32,17 @@ _LOG_TRIES, _LOG_PAUSE_S = 10, 0.005
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_IOERR_READ,
            sqlite3.SQLITE_IOERR_SHORT_READ, sqlite3.SQLITE_IOERR_CORRUPTFS)
 """Result codes, primary or extended, of a malformed database."""
+_CONSENTS = """
+CREATE TABLE consents (
+    capture_id TEXT PRIMARY KEY REFERENCES captures (capture_id) ON DELETE CASCADE,
+    text_version TEXT NOT NULL CHECK (length(text_version) BETWEEN 1 AND 64),
+    language TEXT NOT NULL CHECK (language != '' AND language NOT GLOB '*[^A-Za-z0-9-]*'),
+    retention_s REAL CHECK (retention_s > 0),
+    agreed_at TEXT NOT NULL CHECK (datetime(agreed_at) IS NOT NULL),
+    due_age_s REAL,
+    CHECK ((retention_s IS NULL) = (due_age_s IS NULL))
+) STRICT;
+"""
 _SCHEMA = f"""
 CREATE TABLE meta (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
 CREATE TABLE captures (
@@ -57,6 +68,7 @@ CREATE TABLE outcomes (
     finished_age_s REAL NOT NULL,
     CHECK ((face_sha256 IS NULL) = (error IS NOT NULL AND message IS NOT NULL))
 ) STRICT;
+{_CONSENTS}
 PRAGMA user_version = {_VERSION};
 """
 """By the CHECK clauses, `integrity_check` finds flipped bits in what the hub acts on."""
@@ -65,6 +77,7 @@ CREATE INDEX IF NOT EXISTS captures_by_state ON captures (state);
 CREATE INDEX IF NOT EXISTS dead_letters ON outcomes (sequence) WHERE dead;
 CREATE INDEX IF NOT EXISTS outcomes_by_time ON outcomes (finished_at);
 CREATE INDEX IF NOT EXISTS outcomes_by_age ON outcomes (finished_age_s);
+CREATE INDEX IF NOT EXISTS promises ON consents (due_age_s) WHERE due_age_s IS NOT NULL;
 """
 """Added to an older database too; they are no part of `_VERSION`, as a rebuild loses outcomes."""
 _TIME = "-".join(["[0-9]" * 4, "[0-9]" * 2, "[0-9]" * 2 + "T*+00:00"])
@@ -80,6 +93,9 @@ _IMPOSSIBLE = {
         SELECT sequence FROM outcomes WHERE finished_at NOT GLOB '{_TIME}'
             OR abs(finished_age_s) >= {_MAX_NUMBER}
             OR length(error) > {MAX_ERROR} OR length(message) > {MAX_MESSAGE}""",  # noqa: S608
+    "a consent of": f"""
+        SELECT capture_id FROM consents WHERE max(retention_s, abs(due_age_s)) >= {_MAX_NUMBER}
+            OR agreed_at NOT GLOB '{_TIME}'""",  # noqa: S608
     "the state of": """
         SELECT capture_id FROM captures LEFT JOIN outcomes USING (capture_id) WHERE state != CASE
             WHEN sequence IS NULL THEN iif(state = 'removed', 'removed', 'accepted')
@@ -157,6 +173,8 @@ class Database:
             self.is_new = True
             connection.executescript(f"BEGIN; {_SCHEMA} COMMIT")
             sync_folder(self.path.parent)  # SQLite syncs the name of its log alone
+        elif connection.execute("PRAGMA user_version").fetchone()[0] == _VERSION - 1:
+            connection.executescript(f"BEGIN; {_CONSENTS} PRAGMA user_version = {_VERSION}; COMMIT")
         if damage := next(self._damage(), None):
             raise DamagedDatabaseError(f"{self.path}: {' '.join(damage.split())}"[:500])
         self._make_indexes()

@@ -16,7 +16,7 @@ import structlog
 
 from denseface.service.errors import CorruptFileError, DamagedDatabaseError, StoreError
 from denseface.service.protocol.states import CaptureEvent, CaptureState, advance
-from denseface.service.storage._capture_rows import CaptureRow, NewOutcome
+from denseface.service.storage._capture_rows import CaptureRow, ConsentRow, NewOutcome
 from denseface.service.storage._database import Database
 from denseface.service.storage._disk_reserve import DiskReserve
 from denseface.service.storage._folder_layout import FolderLayout, Listing
@@ -24,6 +24,7 @@ from denseface.service.storage._quarantine import Quarantine
 from denseface.service.storage._store_clock import Clock, StoreClock
 from denseface.service.storage.records import (
     FaceHead,
+    FaceMetadata,
     FrameHead,
     read_face,
     read_face_head,
@@ -125,7 +126,7 @@ class _Face:
 
     made_of: tuple[str, str]
     """Hash of the settings, checksum of the frame."""
-    accepted_at: str
+    metadata: FaceMetadata
     outcome: NewOutcome
 
 
@@ -160,12 +161,13 @@ class _Files:
             if head := self._read(capture_id, path, read_frame_head, read_frame):
                 self.frames[capture_id] = CaptureRow(
                     capture_id, _ACCEPTED, head.metadata.settings_hash, head.checksum,
-                    head.metadata.accepted_at, head.metadata.pressed_by)
+                    head.metadata.accepted_at, head.metadata.pressed_by,
+                    consent=ConsentRow.of(head.metadata))
         for capture_id, path in more:
             if face := self._read(capture_id, path, read_face_head, read_face):
                 self.faces[path.name] = _Face(
                     (face.message.settings_hash, face.message.frame_sha256),
-                    face.metadata.accepted_at, NewOutcome(
+                    face.metadata, NewOutcome(
                         advance(CaptureState.SAVING_FACE, CaptureEvent.FACE_SAVED),
                         face.metadata.finished_at, StoreClock.age_of(face.metadata.clock),
                         face_sha256=face.checksum))
@@ -266,7 +268,8 @@ class _MissingRows:
         if expected is None:
             if capture_id not in self._captures:
                 self._captures[capture_id] = CaptureRow(
-                    capture_id, _ACCEPTED, *face.made_of, face.accepted_at)
+                    capture_id, _ACCEPTED, *face.made_of, face.metadata.accepted_at,
+                    face.metadata.pressed_by, consent=ConsentRow.of(face.metadata))
             capture = self._captures[capture_id]
             expected = capture.settings_hash, capture.frame_sha256
         if face.made_of == expected:

@@ -63,6 +63,20 @@ class Retention:
             " ORDER BY finished_age_s, sequence LIMIT ?",
             self._clock.now() - retention_s, now, retention_s / 86400, now, limit)
 
+    def promised(self, limit: int) -> list[str]:
+        """Give ids of what a consent promised to be gone by now, oldest first; whatever its state.
+
+        The time counts from the press. Both clocks say so, as for `expired`.
+        """
+        now = self._clock.timestamp()
+        return [row["capture_id"] for row in self._database.select(
+            "SELECT capture_id, retention_s FROM consents JOIN captures USING (capture_id)"
+            " WHERE due_age_s <= ? AND state != ?"
+            " AND (julianday(?) - julianday(accepted_at) >= retention_s / 86400"
+            " OR accepted_at > ?) ORDER BY due_age_s LIMIT ?",
+            self._clock.now(), CaptureState.REMOVED, now, now, limit)
+            if self._clock.trusted(row["retention_s"])]
+
     def accepted_before(self, moment: datetime | None, limit: int) -> list[str]:
         """Give ids of what was accepted before a time, oldest first; all where it is None."""
         until = format_timestamp(moment) if moment else "a"  # sorts after any timestamp

@@ -12,16 +12,23 @@ from pathlib import Path
 
 import structlog
 
+from denseface.recon.face import Consent
 from denseface.recon.settings import Settings
 from denseface.service.errors import CorruptFileError, DamagedFaceError, StoreError
 from denseface.service.protocol.messages import CaptureFailed, FaceDone, Frame, Result
+from denseface.service.protocol.payload import FaceHeader
 from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.closing import Closing
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.files import private_folder
-from denseface.service.storage._capture_rows import CaptureRow, CaptureRows, NewOutcome
+from denseface.service.storage._capture_rows import (
+    CaptureRow,
+    CaptureRows,
+    ConsentRow,
+    NewOutcome,
+)
 from denseface.service.storage._folder_layout import FolderLayout
 from denseface.service.storage._folder_lock import check_folder, lock
 from denseface.service.storage._frame_cache import FrameCache
@@ -105,9 +112,10 @@ class FolderStore(CaptureRows, Closing):
             return shutil.disk_usage(self._layout.frames).free
 
     def prepare_frame(
-        self, frame: Packet, settings: Settings, settings_hash: str, pressed_by: str = ""
+        self, frame: Packet, settings: Settings, settings_hash: str, pressed_by: str = "",
+        consent: Consent | None = None,
     ) -> PendingWrite:
-        """Give what is to be written of a `Frame`."""
+        """Give what is to be written of a `Frame`, and of what came with its press."""
         message = frame.message
         if not isinstance(message, Frame):
             raise TypeError(f"a Frame is accepted, found {message.kind}")
@@ -116,7 +124,9 @@ class FolderStore(CaptureRows, Closing):
         metadata = FrameMetadata(
             accepted_at=self._clock.timestamp(), clock=self._clock.save(),
             settings=settings.model_dump_json(), settings_hash=settings_hash,
-            pressed_by=pressed_by)
+            pressed_by=pressed_by, consent=consent,
+            due_age_s=(self._clock.now() + consent.retention_s
+                       if consent and consent.retention_s else None))
         return PendingWrite(
             capture_id, self._layout.frame(capture_id), self._layout.unnamed_frame(capture_id),
             metadata, frame)
@@ -131,7 +141,8 @@ class FolderStore(CaptureRows, Closing):
             for one in records:
                 CaptureRow(
                     one.message.capture_id, state, one.metadata.settings_hash, one.checksum,
-                    one.metadata.accepted_at, one.metadata.pressed_by).insert(connection)
+                    one.metadata.accepted_at, one.metadata.pressed_by,
+                    consent=ConsentRow.of(one.metadata)).insert(connection)
         failpoint("hub.frame.stored")
         for written in frames:
             try:
@@ -172,9 +183,12 @@ class FolderStore(CaptureRows, Closing):
         row = self.find(capture_id)
         if row is None or row.state is not CaptureState.ACCEPTED:
             raise StoreError(f"capture {capture_id} waits for no face")
+        agreed = self.consent(capture_id)
         metadata = FaceMetadata(
             accepted_at=row.accepted_at, finished_at=self._clock.timestamp(),
-            clock=self._clock.save())
+            clock=self._clock.save(), pressed_by=row.pressed_by,
+            consent=agreed.consent if agreed else None,
+            due_age_s=agreed.due_age_s if agreed else None)
         names = capture_id, message.settings_hash
         return PendingWrite(
             capture_id, self._layout.face(*names), self._layout.unnamed_face(*names), metadata,
@@ -222,7 +236,8 @@ class FolderStore(CaptureRows, Closing):
 
     def _outcome(self, condition: str, *values: str | int) -> Packet | None:
         row = self._database.select_one(
-            f"SELECT outcomes.*, settings_hash FROM outcomes JOIN captures USING (capture_id)"  # noqa: S608
+            f"SELECT outcomes.*, settings_hash, consents.* FROM outcomes"  # noqa: S608
+            f" JOIN captures USING (capture_id) LEFT JOIN consents USING (capture_id)"
             f" WHERE {condition} LIMIT 1", *values)
         if row is None:
             return None
@@ -240,7 +255,18 @@ class FolderStore(CaptureRows, Closing):
         except CorruptFileError as error:
             self._quarantine.add(path, str(error), capture_id)
             raise DamagedFaceError(capture_id, str(error)) from error
-        return Packet(FaceDone(**common, face=record.message.face), record.arrays)
+        agreed = ConsentRow.read(row)
+        return Packet(FaceDone(
+            **common, face=_with_consent(record.message.face, agreed)), record.arrays)
+
+
+def _with_consent(face: FaceHeader, agreed: ConsentRow | None) -> FaceHeader:
+    """Give a face whose report says what the hub knows of a consent, whatever a worker said."""
+    consent = agreed.consent if agreed else None
+    if face.report.consent == consent:
+        return face
+    report = face.report.model_copy(update={"consent": consent})
+    return face.model_copy(update={"report": report})
 
 
 class OpeningStore(Closing):

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Generic, TypeAlias, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
+from denseface.recon.face import Consent
 from denseface.service.errors import CorruptFileError, ProtocolError
 from denseface.service.protocol.message_base import BaseMessage
 from denseface.service.protocol.messages import Frame, Result
@@ -44,6 +45,12 @@ class _Metadata(BaseModel):
     accepted_at: _Time
     clock: str
     """What `StoreClock.save` gave when this was written."""
+    pressed_by: Annotated[str, Field(pattern=r"^[0-9a-f]{0,16}$")] = ""
+    """Fingerprint of the key that pressed; empty where none was needed."""
+    consent: Consent | None = None
+    """That came with the press."""
+    due_age_s: FiniteFloat | None = None
+    """Age of the store at which the capture goes, as the consent promises, seconds."""
 
 
 class FrameMetadata(_Metadata):
@@ -52,8 +59,6 @@ class FrameMetadata(_Metadata):
     settings: str
     """Settings of the reconstruction, JSON."""
     settings_hash: Annotated[str, Field(pattern=r"^[0-9a-f]{1,64}$")]
-    pressed_by: Annotated[str, Field(pattern=r"^[0-9a-f]{0,16}$")] = ""
-    """Fingerprint of the key that pressed; empty where none was needed."""
 
 
 class FaceMetadata(_Metadata):
@@ -120,7 +125,8 @@ class PendingWrite:
     def write(self) -> str:
         """Write and sync the file, not its folder; give its checksum; raises as `write_parts`."""
         return write_parts(
-            self.unnamed, [self.metadata.model_dump_json().encode(), *encode(self.packet)],
+            self.unnamed,
+            [self.metadata.model_dump_json(exclude_none=True).encode(), *encode(self.packet)],
             failpoints=self.failpoints)
 
     def name(self) -> None:

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from denseface.capture import MAX_BURST
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin
+from denseface.recon.face import Consent
 from denseface.recon.settings import Preset, Settings
 from denseface.service.errors import LocalProtocolError, ProtocolError, RemoteProtocolError
 from denseface.service.protocol import messages, wire
@@ -53,6 +54,11 @@ hints = st.builds(
     text=st.text(st.characters(codec="ascii", min_codepoint=32), max_size=50),
     measures=st.dictionaries(codes, st.floats(-1e6, 1e6).map(lambda one: round(one, 3)),
                              max_size=5))
+consents = st.builds(
+    Consent, text_version=st.text(
+        st.characters(exclude_categories=["Cs"]), min_size=1, max_size=64), at=times,
+    language=st.sampled_from(["en", "de-CH", "zh-Hans-CN", "ar"]),
+    retention_s=st.none() | st.floats(1e-3, 1e10))
 GATED = {"gate": st.sampled_from(Gate.__args__), "gate_timeout": st.floats(0, 120),
          "frames": st.integers(1, MAX_BURST)}
 DIGEST = "0f" * 32
@@ -65,6 +71,7 @@ def plain(kind, **fields):
 to_hub = st.one_of(
     plain(messages.Press, request=numbers, capture_id=ids),
     plain(messages.Press, request=numbers, capture_id=ids, sensor=peer_names, **GATED),
+    plain(messages.Press, request=numbers, capture_id=ids, consent=consents),
     plain(messages.GetFace, request=numbers, capture_id=ids, wait_s=st.floats(0, 3600)),
     plain(messages.GetNext, request=numbers, after=numbers),
     plain(messages.FindStart, request=numbers, last=st.integers(1, 2**31 - 1)),

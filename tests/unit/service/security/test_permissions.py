@@ -86,7 +86,8 @@ def test_what_the_hub_says_is_for_nobody_to_say():
 @pytest.mark.parametrize(("role", "own", "may"), [
     (Role.PRESSER, True, True), (Role.PRESSER, False, False), (Role.WORKER, True, False)])
 def test_a_presser_gets_what_it_pressed(role, own, may):
-    lacks = missing_role(frozenset({role}), SAID[1], own=own)
+    asked = messages.GetFace(request=1, capture_id="a")
+    lacks = missing_role(frozenset({role}), asked, own=own)
     assert (lacks is None) is may
     assert may or lacks == "get_face needs the role subscriber"
 
