@@ -1,25 +1,40 @@
-"""The kiosk's process: its servers, the conductor, and the end of all at a signal."""
+"""The kiosk's process: its parts put together, and the end of all at a signal."""
 
 import asyncio
 import os
+import secrets
 import signal
 import ssl
+from contextlib import closing
+from dataclasses import replace
+from datetime import UTC, datetime
+from importlib.metadata import version
 from typing import Any
 
 import structlog
-from starlette.websockets import WebSocket
 
+from denseface.service.client import AsyncClient
+from denseface.service.kiosk.conductor.conductor import Conductor, ConductorOptions
+from denseface.service.kiosk.conductor.hub_watch import watch_hub
+from denseface.service.kiosk.conductor.kept_withdrawals import KeptWithdrawals
+from denseface.service.kiosk.consent_text import load_consent_text
+from denseface.service.kiosk.page_messages import Hello
 from denseface.service.kiosk.settings import KioskSettings
-from denseface.service.kiosk.web.app import kiosk_app
+from denseface.service.kiosk.visit.machine import Kiosk
+from denseface.service.kiosk.visit.options import VisitOptions
+from denseface.service.kiosk.web.app import kiosk_app, kiosk_files
+from denseface.service.kiosk.web.files import Files
 from denseface.service.kiosk.web.guard import origins_of
 from denseface.service.kiosk.web.server import bind, serve, url_of
 from denseface.service.runtime.supervisor_link import SupervisorLink
 from denseface.service.settings import ServiceSettings
 
-__all__ = ["run"]
+__all__ = ["run", "visit_options"]
 
 _BEAT_S = 1.0
 """Time between two signs of life, seconds."""
+_CLOSE_S = 1.5
+"""Longest wait at the end for what is being withdrawn, seconds."""
 _log = structlog.get_logger("kiosk")
 
 
@@ -30,16 +45,77 @@ def run(service: ServiceSettings, settings: KioskSettings,
     Raises
     ------
     SettingsError
-        Where a certificate cannot be used, or an address not be had.
+        Where a file that is named cannot be used, or an address not be had.
     """
     os.umask(0o077)
-    tls = settings.tls()
+    tls, options = settings.tls(), visit_options(settings)
+    kept = KeptWithdrawals(settings.folder, service.address)
     with asyncio.Runner() as runner:
-        return runner.run(_serve(service, settings, supervisor or SupervisorLink(), tls))
+        return runner.run(_run(service, settings, options, kept, tls,
+                               supervisor or SupervisorLink()))
 
 
-async def _serve(service: ServiceSettings, settings: KioskSettings, supervisor: SupervisorLink,
-                 tls: ssl.SSLContext | None) -> int:
+def visit_options(settings: KioskSettings) -> VisitOptions:
+    """Give what the operator has set of a visit; SettingsError where the consent is malformed."""
+    options = VisitOptions(
+        consent=settings.consent, links=settings.lan is not None, auto=settings.auto,
+        countdown=settings.countdown, position_s=settings.idle_s, result_s=settings.result_idle_s)
+    if settings.consent_text is None:
+        return options
+    own = load_consent_text(settings.consent_text, settings.languages)
+    return replace(options, text_version=own.version, text=own.text)
+
+
+async def _run(service: ServiceSettings, settings: KioskSettings, options: VisitOptions,
+               kept: KeptWithdrawals, tls: ssl.SSLContext | None,
+               supervisor: SupervisorLink) -> int:
+    stopped = _stop_signal()
+    files = kiosk_files()
+    hello = Hello(languages=settings.languages, sound=settings.sound, speech=settings.speech,
+                  version=f"{version('denseface')}-{files.digest[:12]}")
+    with closing(AsyncClient(service.address, key=service.key, hub_key=service.hub_key)) as hub:
+        conductor = Conductor(
+            Kiosk(options, new_id=lambda: secrets.token_hex(16), utc=_utc), hub, kept,
+            ConductorOptions(hello, settings.sensor))
+        conductor.start()
+        working: list[asyncio.Future[Any]] = [asyncio.create_task(work) for work in (
+            _beat(supervisor),
+            watch_hub(hub, settings.sensor, service.reserve_mib * 2**20, conductor.service_is),
+            _serve_page(settings, conductor, files, tls))]
+        try:
+            await asyncio.wait([stopped, *working], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in working:
+                task.cancel()
+            results = await asyncio.gather(*working, return_exceptions=True)
+            await conductor.close(_CLOSE_S)
+    for error in results:
+        if isinstance(error, Exception):
+            raise error
+    _log.info("stopped")
+    return 130 if stopped.result() is signal.SIGINT else 0
+
+
+async def _serve_page(
+    settings: KioskSettings, conductor: Conductor, files: Files, tls: ssl.SSLContext | None
+) -> None:
+    """Serve the page until cancelled."""
+    bound = await bind(settings.address, "--kiosk-address")
+    host, port = bound.getsockname()[:2]
+    origins = origins_of(settings.scheme, host, port, settings.proxy)
+    _log.info("the page for visitors",
+              url=" ".join([url_of(settings.scheme, bound), *settings.proxy]))
+    await serve(kiosk_app(conductor.page, origins, files), bound, tls)
+
+
+async def _beat(supervisor: SupervisorLink) -> None:
+    while True:
+        supervisor.beat()
+        await asyncio.sleep(_BEAT_S)
+
+
+def _stop_signal() -> "asyncio.Future[signal.Signals]":
+    """Give what is done when this process is told to stop."""
     loop = asyncio.get_running_loop()
     stopped: asyncio.Future[signal.Signals] = loop.create_future()
 
@@ -49,37 +125,8 @@ async def _serve(service: ServiceSettings, settings: KioskSettings, supervisor: 
 
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, stop, number)
-    serving: list[asyncio.Future[Any]] = [
-        asyncio.create_task(_beat(supervisor)), asyncio.create_task(_page(service, settings, tls))]
-    ended, _ = await asyncio.wait([stopped, *serving], return_when=asyncio.FIRST_COMPLETED)
-    for task in serving:
-        task.cancel()
-    results = await asyncio.gather(*serving, return_exceptions=True)
-    for error in results:
-        if isinstance(error, Exception):
-            raise error
-    _log.info("stopped")
-    return 130 if stopped in ended and stopped.result() is signal.SIGINT else 0
+    return stopped
 
 
-async def _beat(supervisor: SupervisorLink) -> None:
-    while True:
-        supervisor.beat()
-        await asyncio.sleep(_BEAT_S)
-
-
-async def _page(
-    service: ServiceSettings, settings: KioskSettings, tls: ssl.SSLContext | None
-) -> None:
-    """Serve the page until cancelled."""
-    bound = await bind(settings.address, "--kiosk-address")
-    url = url_of(settings.scheme, bound)
-    host, port = bound.getsockname()[:2]
-    origins = origins_of(settings.scheme, host, port, settings.proxy)
-    _log.info("the page for visitors", url=" ".join([url, *settings.proxy]),
-              hub=service.address)
-    await serve(kiosk_app(_nothing_yet, origins), bound, tls)
-
-
-async def _nothing_yet(socket: WebSocket) -> None:
-    await socket.close()
+def _utc() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -15,11 +15,16 @@ from denseface.service.kiosk.web.guard import Guard
 from denseface.service.kiosk.web.headers import SecurityHeaders
 from denseface.service.kiosk.web.limits import Limits
 
-__all__ = ["guarded", "kiosk_app"]
+__all__ = ["guarded", "kiosk_app", "kiosk_files"]
+
+
+def kiosk_files() -> Files:
+    """Read the built page and the languages."""
+    return Files({"static/": STATIC, "languages/": LANGUAGES})
 
 
 def kiosk_app(
-    web_socket: Callable[[WebSocket], Awaitable[None]], origins: Iterable[str],
+    web_socket: Callable[[WebSocket], Awaitable[None]], origins: Iterable[str], files: Files,
     more: Sequence[BaseRoute] = (),
 ) -> App:
     """Give the application of the kiosk's page.
@@ -28,10 +33,9 @@ def kiosk_app(
     ----------
     web_socket : speaks with a page over its WebSocket
     origins : of the page
+    files : of `kiosk_files`
     more : what else is served, such as the operator's page
     """
-    files = Files({"static/": STATIC, "languages/": LANGUAGES})
-
     async def page(request: Request) -> Response:
         return files.answer("static/index.html", request)
 

@@ -41,6 +41,12 @@ class Files:
             for prefix, folder in folders.items() for path in sorted(folder.rglob("*"))
             if path.suffix in _TYPES and path.is_file() and path.stat().st_size <= _MAX_BYTES}
 
+    @property
+    def digest(self) -> str:
+        """Another one where any of the files is another."""
+        tags = "".join(f"{name}{file.tag}" for name, file in sorted(self._files.items()))
+        return hashlib.sha256(tags.encode()).hexdigest()
+
     def __contains__(self, name: str) -> bool:
         return name in self._files
 

@@ -6,7 +6,7 @@ import pytest
 from starlette.requests import Request
 
 from denseface.service.kiosk.web import app as module
-from denseface.service.kiosk.web.app import kiosk_app
+from denseface.service.kiosk.web.app import kiosk_app, kiosk_files
 from denseface.service.kiosk.web.files import Files
 from tests.unit.service.kiosk.web.asking import ask
 
@@ -33,7 +33,7 @@ def app(tmp_path, monkeypatch):
     async def accept(socket):
         await socket.accept()
 
-    return kiosk_app(accept, ORIGINS)
+    return kiosk_app(accept, ORIGINS, kiosk_files())
 
 
 def get(app, path, *headers, method="GET"):

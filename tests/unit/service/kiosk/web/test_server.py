@@ -15,7 +15,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from denseface.service.errors import AddressError
 from denseface.service.kiosk.settings import KioskSettings
 from denseface.service.kiosk.web import connections, server
-from denseface.service.kiosk.web.app import kiosk_app
+from denseface.service.kiosk.web.app import kiosk_app, kiosk_files
 from denseface.service.kiosk.web.guard import origins_of
 from denseface.service.kiosk.web.server import bind, serve, url_of
 from tests.waiting import LIMIT_S
@@ -34,7 +34,8 @@ async def serving(endpoint=echo, tls=None):
     bound = await bind(("127.0.0.1", 0), "--kiosk-address")
     scheme = "https" if tls else "http"
     url = url_of(scheme, bound)
-    app = kiosk_app(endpoint, origins_of(scheme, *bound.getsockname()))
+    app = kiosk_app(endpoint, origins_of(scheme, *bound.getsockname()),
+                    kiosk_files())
     task = asyncio.create_task(serve(app, bound, tls))
     try:
         yield url

@@ -1,0 +1,1 @@
+"""What moves a visit along: pages, the hub and the clock in, and what a visit wants done out."""

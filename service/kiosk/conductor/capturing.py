@@ -1,0 +1,91 @@
+"""A press and its face: asks the hub, and says what came of it as events of a visit."""
+
+import asyncio
+import time
+from collections.abc import Callable
+
+import structlog
+
+from denseface.recon.face import Face
+from denseface.service.errors import (
+    CaptureFailedError,
+    ClientTimeoutError,
+    PressRefusedError,
+    ServiceError,
+    UnknownCaptureError,
+)
+from denseface.service.export.face_grid import encode_face_grid
+from denseface.service.kiosk.conductor.ports import Hub
+from denseface.service.kiosk.visit.effects import TakePicture
+from denseface.service.kiosk.visit.events import (
+    CaptureRefused,
+    Event,
+    FaceFailed,
+    FrameTaken,
+)
+from denseface.service.protocol.hint import Hint
+
+__all__ = ["ShownFace", "take_picture"]
+
+_PRESS_S = 15.0
+"""Longest wait for a frame, seconds; the visit gives up before."""
+_FACE_S = 120.0
+"""Longest wait for a face, seconds."""
+_log = structlog.get_logger("kiosk")
+
+
+class ShownFace:
+    """A face as it is sent to a page.
+
+    Attributes
+    ----------
+    face : as the hub gave it
+    grid : the same for a browser
+    exposed_s : middle of its frame's exposure, monotonic clock, seconds
+    """
+
+    def __init__(self, face: Face, grid: bytes, exposed_s: float) -> None:
+        self.face, self.grid, self.exposed_s = face, grid, exposed_s
+
+
+async def take_picture(
+    hub: Hub, sensor: str | None, effect: TakePicture, happened: Callable[[Event], None],
+    withdraw: Callable[[str], None], clock: Callable[[], float] = time.monotonic,
+) -> ShownFace | None:
+    """Press and wait for the face; what else comes of it is said by `happened`.
+
+    Parameters
+    ----------
+    withdraw : removes a capture of which nobody knows whether there is one
+    """
+    visit, capture_id = effect.visit, effect.capture_id
+    pressed_s = clock()
+    try:
+        await hub.press(capture_id, timeout=_PRESS_S, sensor=sensor)
+    except PressRefusedError as error:
+        hint = Hint(timestamp_us=0, codes=error.codes, text=error.text, measures={})
+        happened(CaptureRefused(visit, capture_id, error.reason, hint))
+        return None
+    except ServiceError as error:
+        _log.warning("no picture", reason=str(error))
+        withdraw(capture_id)
+        happened(CaptureRefused(
+            visit, capture_id, "timeout" if isinstance(error, TimeoutError) else "failed"))
+        return None
+    happened(FrameTaken(visit, capture_id))
+    try:
+        face = await hub.get(capture_id, timeout=_FACE_S)
+        # Its five milliseconds are nobody's: the loop serves the mirror meanwhile.
+        grid = await asyncio.to_thread(encode_face_grid, face)
+    except (ServiceError, ValueError) as error:
+        happened(FaceFailed(visit, capture_id, _name(error)))
+        return None
+    return ShownFace(face, grid, pressed_s + (face.report.exposed_after_press_ms or 0.0) / 1e3)
+
+
+def _name(error: Exception) -> str:
+    if isinstance(error, CaptureFailedError):
+        return error.error
+    if not isinstance(error, UnknownCaptureError | ClientTimeoutError):
+        _log.warning("no face", reason=str(error))
+    return type(error).__name__

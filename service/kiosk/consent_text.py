@@ -1,0 +1,54 @@
+"""The operator's own words of consent."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from denseface.files import read_bounded
+from denseface.service.errors import SettingsError, first_error, reason_of
+from denseface.service.kiosk.page_messages import Language
+
+__all__ = ["ConsentText", "load_consent_text"]
+
+_MAX_BYTES = 256 * 1024
+"""Of the file."""
+_Paragraph = Annotated[str, Field(min_length=1, max_length=2000)]
+
+
+class ConsentText(BaseModel):
+    """What is in the file."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    version: Annotated[str, Field(min_length=1, max_length=64)]
+    """Stored with each capture: change it with the text."""
+    text: Annotated[dict[Language, Annotated[tuple[_Paragraph, ...], Field(
+        min_length=1, max_length=20)]], Field(min_length=1, max_length=64)]
+    """Paragraphs by language."""
+
+
+def load_consent_text(path: Path, languages: tuple[str, ...]) -> ConsentText:
+    """Read the file.
+
+    Parameters
+    ----------
+    languages : those that are offered: each has to have its words
+
+    Raises
+    ------
+    SettingsError
+        One line that names the file and what is wrong with it.
+    """
+    try:
+        found = ConsentText.model_validate(json.loads(read_bounded(path, _MAX_BYTES)))
+    except ValidationError as error:
+        field, message = first_error(error)
+        raise SettingsError(f"--kiosk-consent-text: {path}: {field}: {message}") from error
+    except (OSError, ValueError) as error:
+        raise SettingsError(f"--kiosk-consent-text: {path}: {reason_of(error)}") from error
+    if missing := [language for language in languages if language not in found.text]:
+        raise SettingsError(f"--kiosk-consent-text: {path}: text: has no words in {missing[0]}, "
+                            "which --kiosk-languages offers")
+    return found
