@@ -13,7 +13,7 @@ from denseface.service.errors import FormatError
 if TYPE_CHECKING:
     from denseface.recon.face import Face
 
-__all__ = ["FORMATS", "check_ending", "load_face", "save_face"]
+__all__ = ["FORMATS", "check_ending", "face_bytes", "load_face", "save_face"]
 
 
 def save_face(face: "Face", path: str | Path, *, mode: int | None = None) -> None:
@@ -31,9 +31,14 @@ def save_face(face: "Face", path: str | Path, *, mode: int | None = None) -> Non
     from denseface.service.runtime.files import write_atomically
 
     path = Path(path)
-    module, name = FORMATS[check_ending(path)].split(":")
-    to_bytes = getattr(import_module(f"denseface.service.export.{module}"), name)
-    write_atomically(path, [to_bytes(face)], sync_name=False, mode=mode)
+    write_atomically(path, [face_bytes(face, check_ending(path))], sync_name=False, mode=mode)
+
+
+def face_bytes(face: "Face", ending: str) -> bytes:
+    """Give the bytes of a face's file with an ending of `FORMATS`."""
+    module, name = FORMATS[ending].split(":")
+    data: bytes = getattr(import_module(f"denseface.service.export.{module}"), name)(face)
+    return data
 
 
 def load_face(path: str | Path) -> "Face":

@@ -13,7 +13,7 @@ from denseface.recon.face import DenseCloud, Face
 from denseface.service.export._lighting import shade
 from denseface.service.export.mesh import triangulate
 
-__all__ = ["render"]
+__all__ = ["portrait", "render"]
 
 _TURN_DEG = 35.0
 """Angle of the turned view about the vertical, degrees."""
@@ -62,10 +62,21 @@ def render(face: Face) -> bytes:
             left = _MARGIN + column * (_PANEL + _MARGIN)
             canvas[top:top + _PANEL, left:left + _PANEL] = _panel(pixels, shown[rows])
     _captions(canvas, titles, scale)
-    encoded, png = cv2.imencode(".png", cv2.cvtColor(canvas, cv2.COLOR_RGB2BGR))
-    if not encoded:
-        raise RuntimeError("OpenCV could not write the PNG")
-    return png.tobytes()
+    return _png(canvas)
+
+
+def portrait(face: Face, side: int) -> bytes:
+    """Draw the dense face from the front as a PNG file, square, without words.
+
+    Parameters
+    ----------
+    side : width and height, pixels
+    """
+    dense = face.dense
+    points, colors, _ = _subdivided(dense)
+    points = points - (dense.points.min(axis=0) + dense.points.max(axis=0)) / 2
+    pixels, rows = _visible(points, _scale(points, side), 0.0, dense.grid_step_mm, side)
+    return _png(_panel(pixels, colors[rows], side))
 
 
 def _subdivided(
@@ -98,17 +109,17 @@ def _rotated(points: NDArray[np.float32], angle_deg: float) -> NDArray[np.float3
     return np.asarray(points @ rotation.T, np.float32)
 
 
-def _scale(points: NDArray[np.float32]) -> float:
-    """Give the pixels for each millimetre at which every view fits its panel."""
+def _scale(points: NDArray[np.float32], panel: int = _PANEL) -> float:
+    """Give the pixels for each millimetre at which every view fits a panel."""
     extent = max(float(np.abs(_rotated(points, angle)[:, :2]).max()) for _, angle in _VIEWS)
-    return _FILL * _PANEL / 2 / max(extent, 1.0)
+    return _FILL * panel / 2 / max(extent, 1.0)
 
 
 def _visible(
-    points: NDArray[np.float32], scale: float, angle: float, side_mm: float
+    points: NDArray[np.float32], scale: float, angle: float, side_mm: float, panel: int = _PANEL
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Give the pixels covered by squares of a side, and the row of the point that each shows."""
-    size = _PANEL * _OVERSAMPLING
+    size = panel * _OVERSAMPLING
     fine = scale * _OVERSAMPLING
     points = _rotated(points, angle)
     order = np.argsort(-points[:, 2])  # the nearest is drawn last
@@ -123,12 +134,21 @@ def _visible(
     return pixels, order[rank.ravel()[pixels].astype(np.intp)]
 
 
-def _panel(pixels: NDArray[np.intp], colors: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    size = _PANEL * _OVERSAMPLING
+def _panel(
+    pixels: NDArray[np.intp], colors: NDArray[np.uint8], panel: int = _PANEL
+) -> NDArray[np.uint8]:
+    size = panel * _OVERSAMPLING
     image = np.full((size * size, 3), _PANEL_COLOR, np.uint8)
     image[pixels] = colors
     return np.asarray(cv2.resize(
-        image.reshape(size, size, 3), (_PANEL, _PANEL), interpolation=cv2.INTER_AREA), np.uint8)
+        image.reshape(size, size, 3), (panel, panel), interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _png(image: NDArray[np.uint8]) -> bytes:
+    encoded, png = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+    if not encoded:
+        raise RuntimeError("OpenCV could not write the PNG")
+    return png.tobytes()
 
 
 def _captions(canvas: NDArray[np.uint8], titles: tuple[str, ...], scale: float) -> None:

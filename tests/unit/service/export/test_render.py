@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from denseface.service.export._lighting import shade
-from denseface.service.export.render import render
+from denseface.service.export.render import portrait, render
 from tests.unit.service.faces import small_face
 
 
@@ -31,3 +31,12 @@ def test_light_comes_from_the_upper_left():
         [[-0.8, 0, -0.6], [0.8, 0, -0.6], [0, -0.8, -0.6], [0, 0.8, -0.6]]))[:, 0].astype(int)
     assert left > right
     assert up > down
+
+
+def test_a_portrait_is_square_without_words_and_as_wide_as_asked():
+    face = small_face()
+    png = cv2.imdecode(np.frombuffer(portrait(face, 240), np.uint8), cv2.IMREAD_COLOR)
+    assert png.shape == (240, 240, 3)
+    middle = face.dense.colors[np.argmin(np.abs(face.dense.points[:, :2]).sum(axis=1))]
+    np.testing.assert_allclose(png[120, 120, ::-1], middle, atol=25)
+    assert (png[0, 0] == [37, 34, 31]).all()
