@@ -1,6 +1,5 @@
 """Settings of the kiosk: where the page is, what a visit is like, what may be fetched."""
 
-import os
 import ssl
 from collections.abc import Mapping
 from ipaddress import ip_address
@@ -11,7 +10,8 @@ from urllib.parse import urlsplit
 import platformdirs
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from denseface.service.errors import SettingsError, first_error, reason_of
+from denseface.service.errors import SettingsError, first_error
+from denseface.service.kiosk.certificates import tls_context
 from denseface.service.kiosk.page_messages import Language
 from denseface.service.protocol.message_base import PeerName
 from denseface.service.runtime.parsing import parse_address
@@ -91,8 +91,11 @@ class KioskSettings(BaseModel):
     """The TLS certificate of these links, a PEM file."""
     lan_key: Path | None = None
     """The secret key of that."""
+    lan_url: Annotated[str, BeforeValidator(_origin)] | None = None
+    """Origin by which visitors' telephones reach these links, `https://face.example:8443`; None for
+    the address of the network that is up."""
     link_uses: Annotated[int, Field(ge=1, le=1000)] = 5
-    """Times that each file is fetched by a link."""
+    """Files that are fetched by one link."""
     link_minutes: Annotated[float, Field(gt=0, le=10080, allow_inf_nan=False)] = 30.0
     """Time after which a link ends, minutes."""
     countdown: Annotated[int, Field(ge=0, le=10)] = 3
@@ -179,13 +182,4 @@ class KioskSettings(BaseModel):
 def _tls(certificate: Path | None, key: Path | None, flag: str) -> ssl.SSLContext | None:
     if certificate is None or key is None:
         return None
-    for path in (certificate, key):
-        if not os.access(path, os.R_OK):
-            raise SettingsError(f"{_FLAG}{flag}: {path} cannot be read")
-    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
-    try:
-        context.load_cert_chain(certificate, key, password="")  # nobody is there to be asked
-    except (OSError, ssl.SSLError) as error:
-        raise SettingsError(
-            f"{_FLAG}{flag}: {certificate} and {key}: {reason_of(error)}") from error
-    return context
+    return tls_context(certificate, key, _FLAG + flag)

@@ -6,11 +6,10 @@ from pathlib import Path
 
 from denseface.files import read_bounded
 from denseface.service.errors import SettingsError, reason_of
+from denseface.service.kiosk.installed import LANGUAGES
 
-__all__ = ["LANGUAGES", "Texts", "load_texts"]
+__all__ = ["Texts", "load_texts"]
 
-LANGUAGES = Path(__file__).parent / "languages"
-"""Folder of the languages that come along."""
 _MAX_BYTES = 2**20
 """Of a file of one language."""
 

@@ -21,7 +21,9 @@ KIOSK_FLAGS = {
     "lan": ("ADDRESS", "serve links to faces here: IP address and port (default: off)"),
     "lan-certificate": ("FILE.pem", "TLS certificate of these links"),
     "lan-key": ("FILE.pem", "secret key of that"),
-    "link-uses": ("N", "times that each file is fetched by a link (default: 5)"),
+    "lan-url": ("ORIGIN", "origin of these links, https://face.example:8443 (default: by the "
+                          "address of the network that is up)"),
+    "link-uses": ("N", "files that are fetched by one link (default: 5)"),
     "link-minutes": ("N", "minutes after which a link ends (default: 30)"),
     "countdown": ("SECONDS", "counted down before the picture; 0 for none (default: 3)"),
     "sound": ("on|off", "play sounds (default: off)"),

@@ -26,11 +26,13 @@ from denseface.service.kiosk.links.lan_door import lan_door
 from denseface.service.kiosk.links.lan_server import LanConnection, show_what_is_left
 from denseface.service.kiosk.links.link_file import LinkFile
 from denseface.service.kiosk.page_messages import KeepScreen, Link
-from denseface.service.kiosk.texts import Texts
+from denseface.service.kiosk.settings import KioskSettings
+from denseface.service.kiosk.texts import Texts, load_texts
 from denseface.service.kiosk.web.server import bind, serve
 from denseface.service.runtime.bounded_dict import BoundedDict
+from denseface.service.runtime.files import private_folder
 
-__all__ = ["LinkOptions", "Links", "NoAddressError", "qr_rows"]
+__all__ = ["LinkOptions", "Links", "NoAddressError", "links_of", "qr_rows"]
 
 _FILE = "links.json"
 """In the kiosk's folder."""
@@ -168,6 +170,18 @@ class Links:
 
     def _with_port(self, host: str) -> str:
         return host if self.port == _DEFAULT_PORTS[self._scheme] else f"{host}:{self.port}"
+
+
+def links_of(
+    settings: KioskSettings, get: Callable[[str], Awaitable[Face]]
+) -> Links | None:
+    """Give the links that the operator has set; None where they are off. Raises SettingsError."""
+    if settings.lan is None:
+        return None
+    options = LinkOptions(
+        settings.lan, private_folder(settings.folder), uses=settings.link_uses,
+        lifetime_s=settings.link_minutes * 60, tls=settings.lan_tls(), url=settings.lan_url)
+    return Links(options, get, load_texts(settings.languages))
 
 
 def qr_rows(text: str) -> tuple[str, ...]:

@@ -83,14 +83,17 @@ def _bound(address: Address) -> socket.socket:
     return bound
 
 
-async def serve(app: App, bound: socket.socket, tls: ssl.SSLContext | None = None) -> None:
+async def serve(
+    app: App, bound: socket.socket, tls: ssl.SSLContext | None = None,
+    http: type[BoundedHttp] = BoundedHttp,
+) -> None:
     """Serve an application on a bound socket until cancelled.
 
     Then answers under way have two seconds, and pages are told that it ends.
     """
     logging.getLogger("uvicorn.error").setLevel(logging.ERROR)  # not each malformed request
     server = _Server(uvicorn.Config(
-        app, http=BoundedHttp, ws=BoundedWebSocket, loop="asyncio", lifespan="off",
+        app, http=http, ws=BoundedWebSocket, loop="asyncio", lifespan="off",
         interface="asgi3", log_config=None, access_log=False, server_header=False,
         proxy_headers=False, workers=1, backlog=_BACKLOG,
         ssl_context_factory=(lambda *_: tls) if tls else None,

@@ -6,7 +6,7 @@ import subprocess
 import pytest
 
 from denseface.service.errors import SettingsError
-from denseface.service.kiosk.links.certificates import tls_context
+from denseface.service.kiosk.certificates import tls_context
 from tests.unit.service.kiosk.links.certificate_files import make_certificate
 
 pytestmark = pytest.mark.skipif(not shutil.which("openssl"), reason="no openssl to make keys with")
