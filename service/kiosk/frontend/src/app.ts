@@ -174,7 +174,8 @@ export class App {
     root.dataset["trouble"] = this.lost ? "page" : screen.trouble ?? "";
     // The links lie over the result: the same view.
     const name = screen.name === "keep" ? "result" : screen.name;
-    const viewed = `${screen.visit} ${name} ${screen.result?.capture_id} ${this.language}`;
+    const viewed = JSON.stringify([screen.visit, name, this.language, screen.consent, screen.result,
+      screen.failed, screen.thanks]);
     if (viewed === this.viewed) {
       this.view?.update?.(screen);
       return;

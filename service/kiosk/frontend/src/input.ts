@@ -27,6 +27,10 @@ export function listen(page: Document, input: Input): void {
     last = event.timeStamp;
     input.touch();
   };
+  const by = (device: "keys" | "touch"): void => {
+    page.documentElement.dataset["input"] = device;
+  };
+  page.addEventListener("pointerdown", () => by("touch"), { capture: true });
   for (const kind of ["pointerdown", "pointermove", "wheel", "input"]) {
     page.addEventListener(kind, touched, { passive: true, capture: true });
   }
@@ -39,6 +43,7 @@ export function listen(page: Document, input: Input): void {
       return;
     }
     touched(event);
+    by("keys");
     if (event.ctrlKey || event.altKey || event.metaKey) return;
     if (key === "Escape") input.escape();
     else if (key === "Enter" || key === " ") {

@@ -20,8 +20,10 @@ function code(keep: KeepScreen, label: string): HTMLElement {
       svg("path", { d: qrPath(keep.qr) })));
 }
 
-/** The sheet over the result; `back` leads to the face again. */
-export function keepSheet(keep: KeepScreen, texts: Texts, back: () => void): HTMLElement {
+/** The sheet over the result: `back` leads to the face again, `done` to the end. */
+export function keepSheet(
+  keep: KeepScreen, texts: Texts, back: () => void, done: () => void,
+): HTMLElement {
   const { t } = texts;
   const title = html("h2", { id: "keep-title", tabindex: -1 }, t("keep.title"));
   const formats = keep.links.map(({ format }) =>
@@ -35,5 +37,7 @@ export function keepSheet(keep: KeepScreen, texts: Texts, back: () => void): HTM
       html("p", { class: "small" },
         t("keep.limits", { duration: texts.duration(keep.expires_s), uses: keep.uses })),
       html("p", { class: "small address", dir: "ltr" }, keep.page),
-      button({ action: "back", label: t("keep.back"), icon: "face", press: back })));
+      html("div", { class: "answers" },
+        button({ action: "back", label: t("keep.back"), icon: "face", press: back }),
+        button({ action: "keep-done", label: t("result.done"), icon: "check", look: "main", press: done }))));
 }

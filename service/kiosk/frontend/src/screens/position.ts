@@ -32,8 +32,8 @@ export const position: MakeView = (screen, kiosk) => {
   const { texts: { t } } = kiosk;
   const outline = new Outline();
   const text = html("p", { class: "hint-text" });
-  const hint = html("div", { class: "hint" }, text);
   const note = html("p", { class: "press-note" });
+  const hint = html("div", { class: "hint" }, html("div", {}, text, note));
   const press = button({
     action: "press", label: t("position.press"), icon: "camera", look: "main",
     press: () => kiosk.say({ kind: "press" }),
@@ -64,7 +64,7 @@ export const position: MakeView = (screen, kiosk) => {
   title.className = "visually-hidden";
   const element = html("section", { class: "screen position" },
     title, outline.element,
-    html("div", { class: "head" }, hint, speechToggle(kiosk, () => said)),
-    html("div", { class: "bar" }, cancelButton(kiosk), html("div", { class: "press" }, note, press)));
+    html("div", { class: "head" }, hint),
+    html("div", { class: "bar" }, cancelButton(kiosk), press, speechToggle(kiosk, () => said)));
   return { element, focus: press, spoken: "", update };
 };

@@ -52,7 +52,7 @@ export const result: MakeView = (screen, kiosk) => {
   };
   const sheet = (): void => {
     sheeted = now.keep;
-    if (now.keep) show(keepSheet(now.keep, texts, () => show()));
+    if (now.keep) show(keepSheet(now.keep, texts, () => show(), () => kiosk.say({ kind: "done" })));
   };
   const remove = (): void => show(confirmDelete(texts, () => kiosk.say({ kind: "delete" }), () => show()));
   const keep = (): void => now.keep ? sheet() : void kiosk.say({ kind: "keep" });
