@@ -6,6 +6,7 @@ The page itself is the real one: its bundle, its languages, its socket.
 
 import asyncio
 import json
+import socket
 import struct
 import sys
 import threading
@@ -15,25 +16,23 @@ from pathlib import Path
 from typing import Any
 
 import uvicorn
-from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import FileResponse, PlainTextResponse, Response
-from starlette.routing import Mount, Route, WebSocketRoute
-from starlette.staticfiles import StaticFiles
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from denseface.capture.source import open_source
 from denseface.service.daemons.preview_picture import preview_jpeg
+from denseface.service.kiosk.installed import STATIC
 from denseface.service.kiosk.page_messages import FACE, FROM_PAGE, MIRROR, Hello, Screen
-from tests.waiting import LIMIT_S
+from denseface.service.kiosk.web.app import kiosk_app
+from denseface.service.kiosk.web.asgi import App
+from denseface.service.kiosk.web.guard import origins_of
+from tests.waiting import LIMIT_S, until
 
 ROOT = Path(__file__).resolve().parents[1]
-KIOSK = ROOT / "service" / "kiosk"
-STATIC = KIOSK / "static"
+VECTORS = ROOT / "service/kiosk/frontend/test/vectors"
 LANGUAGES = ("en", "de", "fr", "es", "zh", "ar")
-POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
-          "connect-src 'self'; font-src 'self'; base-uri 'none'; form-action 'self'; "
-          "frame-ancestors 'none'")
 
 _ID = "example-1"
 _RESULT = {"capture_id": _ID, "initial_points": 14822, "dense_points": 148222, "can_keep": True}
@@ -133,7 +132,7 @@ class States:
         self._loop: asyncio.AbstractEventLoop | None = None
         self.url = ""
         self.face = next(path for path in (
-            STATIC / "sample.face", KIOSK / "frontend/test/vectors/dome.face") if path.exists())
+            STATIC / "sample.face", VECTORS / "dome.face") if path.exists())
         with open_source(str(ROOT / "fixtures/recorded_oni/frontal_700.oni")) as source:
             self.picture = preview_jpeg(next(iter(source)))
 
@@ -184,34 +183,21 @@ class States:
         finally:
             self._pages.discard(page)
 
-    def app(self) -> Starlette:
-        """Give the routes of the kiosk that the page asks for."""
-
-        async def page(_: Request) -> Response:
-            return FileResponse(STATIC / "index.html",
-                                headers={"Content-Security-Policy": POLICY})
+    def app(self, port: int) -> App:
+        """Give what a kiosk serves, behind its own guards."""
 
         async def show(request: Request) -> Response:
             said = STATES[request.path_params["name"]]
             await self._show(Screen.model_validate({"visit": 1, **said}))
             return PlainTextResponse(json.dumps(said))
 
-        return Starlette(routes=[
-            Route("/", page), Route("/show/{name}", show), WebSocketRoute("/ws", self.talk),
-            Mount("/static", StaticFiles(directory=STATIC)),
-            Mount("/languages", StaticFiles(directory=KIOSK / "languages"))])
+        return kiosk_app(self.talk, origins_of("http", "127.0.0.1", port),
+                         [Route("/show/{name}", show)])
 
-    async def serve(self, server: uvicorn.Server, started: threading.Event) -> None:
+    async def serve(self, server: uvicorn.Server, bound: socket.socket) -> None:
         """Serve until the server is told to exit."""
         self._loop = asyncio.get_running_loop()
-        task = asyncio.create_task(server.serve())
-        while not server.started and not task.done():
-            await asyncio.sleep(0.01)
-        if server.started:
-            port = server.servers[0].sockets[0].getsockname()[1]
-            self.url = f"http://127.0.0.1:{port}/"
-        started.set()
-        await task
+        await server.serve(sockets=[bound])
 
 
 def _binary(kind: int, head: dict[str, Any], payload: bytes) -> bytes:
@@ -222,18 +208,20 @@ def _binary(kind: int, head: dict[str, Any], payload: bytes) -> bytes:
 @contextmanager
 def serving(port: int = 0, **hello: Any) -> Iterator[States]:
     """Serve the page on a free port of the loopback; yield what steers it."""
-    states, started = States(**hello), threading.Event()
+    states, bound = States(**hello), socket.create_server(("127.0.0.1", port))
+    port = bound.getsockname()[1]
+    states.url = f"http://127.0.0.1:{port}/"
     server = uvicorn.Server(uvicorn.Config(
-        states.app(), host="127.0.0.1", port=port, log_level="warning", ws="websockets-sansio"))
-    thread = threading.Thread(target=lambda: asyncio.run(states.serve(server, started)))
+        states.app(port), log_level="warning", ws="websockets-sansio"))
+    thread = threading.Thread(target=lambda: asyncio.run(states.serve(server, bound)))
     thread.start()
     try:
-        assert started.wait(LIMIT_S)
-        assert states.url
+        until(lambda: server.started or not thread.is_alive())
         yield states
     finally:
         server.should_exit = True
         thread.join(LIMIT_S)
+        bound.close()
 
 
 if __name__ == "__main__":
