@@ -25,7 +25,7 @@ from denseface.capture.source import open_source
 from denseface.service.daemons.preview_picture import preview_jpeg
 from denseface.service.kiosk.installed import STATIC
 from denseface.service.kiosk.page_messages import FACE, FROM_PAGE, MIRROR, Hello, Screen
-from denseface.service.kiosk.web.app import kiosk_app
+from denseface.service.kiosk.web.app import kiosk_app, kiosk_files
 from denseface.service.kiosk.web.asgi import App
 from denseface.service.kiosk.web.guard import origins_of
 from tests.waiting import LIMIT_S, until
@@ -191,7 +191,7 @@ class States:
             await self._show(Screen.model_validate({"visit": 1, **said}))
             return PlainTextResponse(json.dumps(said))
 
-        return kiosk_app(self.talk, origins_of("http", "127.0.0.1", port),
+        return kiosk_app(self.talk, origins_of("http", "127.0.0.1", port), kiosk_files(),
                          [Route("/show/{name}", show)])
 
     async def serve(self, server: uvicorn.Server, bound: socket.socket) -> None:

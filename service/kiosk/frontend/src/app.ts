@@ -54,6 +54,7 @@ export class App {
   private lost = false;
   private view: View | undefined;
   private viewed = "";
+  private told: string | undefined;
   private forget: ReturnType<typeof setTimeout> | undefined;
 
   constructor(root: HTMLElement, url: string) {
@@ -63,9 +64,9 @@ export class App {
     root.append(canvas, picture, this.content, this.overlays.element, ...Object.values(this.regions));
     this.mirror = new Mirror(picture, () => this.say({ kind: "next" }));
     this.face = new FaceStage(canvas);
-    this.face.onDrawn = (captureId) => {
-      this.say({ kind: "drawn", capture_id: captureId });
+    this.face.onChange = () => {
       this.draw();
+      this.tellDrawn();
     };
     this.socket = new Socket(url, {
       hello: (hello) => void this.greeted(hello),
@@ -158,6 +159,15 @@ export class App {
       this.choose(this.firstLanguage());
     }
     this.draw();
+    this.tellDrawn();
+  }
+
+  /** Once for each face: that it can be seen. */
+  private tellDrawn(): void {
+    const id = this.screen?.result?.capture_id;
+    if (id === undefined || id === this.told || !this.face.seen(id)) return;
+    this.told = id;
+    this.say({ kind: "drawn", capture_id: id });
   }
 
   private draw(): void {
@@ -169,8 +179,8 @@ export class App {
     if (!screen) return;
     root.dataset["screen"] = screen.name;
     root.dataset["visit"] = String(screen.visit);
-    root.dataset["seen"] = String(this.face.shown !== undefined
-      && (screen.name === "attract" || this.face.shown === screen.result?.capture_id));
+    root.dataset["seen"] = String((screen.name === "attract" || screen.result !== null)
+      && this.face.seen(screen.result?.capture_id));
     root.dataset["trouble"] = this.lost ? "page" : screen.trouble ?? "";
     // The links lie over the result: the same view.
     const name = screen.name === "keep" ? "result" : screen.name;

@@ -1,59 +1,83 @@
 /** The one canvas of faces: the sample of the first screen, then the visitor's own. */
-
-/** Ways to see a face. */
-export type Mode = "mesh" | "points" | "sigma";
-
-/** Draws a face. */
-export interface Viewer {
-  show(face: unknown): Promise<void>;
-  mode: Mode;
-  blend: number;
-  turning: boolean;
-  readonly sigmaRange: readonly [number, number];
-  rotate(dx: number, dy: number): void;
-  zoom(factor: number): void;
-  reset(): void;
-  resize(): void;
-}
+import { decodeFaceGrid, type FaceGrid } from "./face_grid.ts";
+import { FaceViewer } from "./viewer/viewer.ts";
 
 const SAMPLE = "/static/sample.face";
 
-/** Shows one face at a time. */
+/** Shows one face at a time, by one viewer for as long as the page lives. */
 export class FaceStage {
-  /** Whose face is drawn: a capture's id, `SAMPLE`, or none. */
+  /** Whose face is drawn: a capture's id, or none. */
   shown: string | undefined;
-  /** Told when a capture's face is drawn for the first time. */
-  onDrawn: (captureId: string) => void = () => {};
-  viewer: Viewer | undefined;
+  /** Whose face cannot be shown. */
+  failed: string | undefined;
+  /** Told when a face is drawn for the first time, or cannot be. */
+  onChange: (name: string) => void = () => {};
+  readonly viewer: FaceViewer;
   private wanted: string | undefined;
-
-  readonly canvas: HTMLCanvasElement;
+  private readonly samples: Promise<FaceGrid>[] = [];
 
   constructor(canvas: HTMLCanvasElement) {
-    this.canvas = canvas;
+    const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.viewer = new FaceViewer(canvas, { reducedMotion });
+    new ResizeObserver(() => this.viewer.resize()).observe(canvas);
   }
 
+  /** Shows the sample. */
   async sample(): Promise<void> {
-    await this.show(SAMPLE, async () => {
-      const answer = await fetch(SAMPLE);
-      return new Uint8Array(await answer.arrayBuffer());
+    await this.show(SAMPLE, () => {
+      const [loaded = loadSample()] = this.samples;
+      this.samples[0] = loaded;
+      return loaded.catch((error: unknown) => {
+        this.samples.pop();
+        throw error;
+      });
     });
   }
 
+  /** Shows a capture's face. */
   async take(captureId: string, grid: Uint8Array<ArrayBuffer>): Promise<void> {
-    await this.show(captureId, async () => grid.slice());
-    if (this.shown === captureId) this.onDrawn(captureId);
+    await this.show(captureId, () => decodeFaceGrid(grid));
   }
 
-  /** Nothing is to be seen: nothing is drawn. */
+  /** Whether a screen's face is drawn: that of a capture, or the sample. */
+  seen(captureId: string | undefined): boolean {
+    return this.shown === (captureId ?? SAMPLE);
+  }
+
+  /** Nothing is to be seen: nothing moves. */
   rest(): void {
-    if (this.viewer) this.viewer.turning = false;
+    this.viewer.turning = false;
   }
 
-  private async show(name: string, bytes: () => Promise<Uint8Array<ArrayBuffer>>): Promise<void> {
-    if (this.wanted === name) return;
+  private async show(name: string, load: () => Promise<FaceGrid>): Promise<void> {
+    if (this.wanted === name && this.failed !== name) {
+      if (this.shown === name) this.begin();
+      return;
+    }
     this.wanted = name;
-    await bytes();
-    if (this.wanted === name) this.shown = name;
+    this.failed = undefined;
+    try {
+      const face = await load();
+      if (this.wanted !== name) return;
+      this.begin();
+      if (!await this.viewer.show(face) || this.wanted !== name) return;
+      this.shown = name;
+    } catch (error) {
+      console.warn("a face cannot be shown", error);
+      if (this.wanted === name) this.failed = name;
+    }
+    this.onChange(name);
   }
+
+  private begin(): void {
+    this.viewer.mode = "mesh";
+    this.viewer.blend = 1;
+    this.viewer.turning = true;
+  }
+}
+
+async function loadSample(): Promise<FaceGrid> {
+  const answer = await fetch(SAMPLE);
+  if (!answer.ok) throw new TypeError(`${SAMPLE}: status ${answer.status}`);
+  return decodeFaceGrid(new Uint8Array(await answer.arrayBuffer()));
 }

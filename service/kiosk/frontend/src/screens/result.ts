@@ -1,5 +1,5 @@
 /** The face: looked at from all sides, then kept or deleted. */
-import { button, heading, html, set } from "../dom.ts";
+import { button, heading, html, set, write } from "../dom.ts";
 import type { Screen } from "../messages.ts";
 import { confirmDelete } from "./confirm.ts";
 import { keepSheet } from "./keep.ts";
@@ -56,17 +56,21 @@ export const result: MakeView = (screen, kiosk) => {
   };
   const remove = (): void => show(confirmDelete(texts, () => kiosk.say({ kind: "delete" }), () => show()));
   const keep = (): void => now.keep ? sheet() : void kiosk.say({ kind: "keep" });
+  const unseen = html("p");
   const front = html("div", { class: "front" },
-    html("div", { class: "head" }, title, facts(screen, kiosk)),
-    html("div", { class: "unseen" }, waiting(), html("p", {}, t("result.unseen"))),
+    html("div", { class: "unseen" }, waiting(), unseen),
     html("div", { class: "tools" },
-      moves(face, texts), beforeAfter(face, texts), modes(face, texts),
+      html("div", { class: "head" }, title, facts(screen, kiosk)),
+      ...(face.viewer.rotatable ? [moves(face, texts)]
+        : [html("p", { class: "small" }, t("view.flat"))]),
+      beforeAfter(face, texts), modes(face, texts),
       ...(measured ? [measured.toggle] : [])),
     ...(measured ? [measured.panel] : []),
     actions(kiosk, screen.result?.can_keep ?? false, remove, keep));
   const element = html("section", { class: "screen result" }, front);
   const update = (next: Screen): void => {
     now = next;
+    write(unseen, t(face.failed === screen.result?.capture_id ? "result.no_view" : "result.unseen"));
     if (next.name === "keep" && next.keep && next.keep.page !== sheeted?.page) sheet();
   };
   update(screen);

@@ -1,21 +1,22 @@
 /** What can be done with a face: each gesture has its button. */
-import { button, html, set, write } from "../dom.ts";
-import type { FaceStage, Mode } from "../face_stage.ts";
+import { button, html, set } from "../dom.ts";
+import type { FaceStage } from "../face_stage.ts";
 import type { IconName } from "../icons.ts";
 import type { Texts } from "../i18n.ts";
+import { drawSigmaScale, type Mode, sigmaLegend } from "../viewer/viewer.ts";
 
-/** Of one press of a button: a turn in radians, and a factor. */
-const STEP = Math.PI / 12;
+/** Of one press of a button: a turn in degrees, and a factor. */
+const STEP = 15;
 const CLOSER = 1.25;
 
 const MOVES: readonly (readonly [string, IconName, (face: FaceStage) => void])[] = [
-  ["turn_left", "turnLeft", (face) => face.viewer?.rotate(-STEP, 0)],
-  ["turn_right", "turnRight", (face) => face.viewer?.rotate(STEP, 0)],
-  ["turn_up", "turnUp", (face) => face.viewer?.rotate(0, -STEP)],
-  ["turn_down", "turnDown", (face) => face.viewer?.rotate(0, STEP)],
-  ["closer", "plus", (face) => face.viewer?.zoom(CLOSER)],
-  ["farther", "minus", (face) => face.viewer?.zoom(1 / CLOSER)],
-  ["reset", "reset", (face) => face.viewer?.reset()],
+  ["turn_left", "turnLeft", (face) => face.viewer.rotate(-STEP, 0)],
+  ["turn_right", "turnRight", (face) => face.viewer.rotate(STEP, 0)],
+  ["turn_up", "turnUp", (face) => face.viewer.rotate(0, -STEP)],
+  ["turn_down", "turnDown", (face) => face.viewer.rotate(0, STEP)],
+  ["closer", "plus", (face) => face.viewer.zoom(CLOSER)],
+  ["farther", "minus", (face) => face.viewer.zoom(1 / CLOSER)],
+  ["reset", "reset", (face) => face.viewer.reset()],
 ];
 
 const KEYS: Readonly<Record<string, string>> = {
@@ -48,7 +49,7 @@ export function beforeAfter(face: FaceStage, { t }: Texts): HTMLElement {
   const blend = (percent: number): void => {
     slider.value = String(percent);
     set(slider, { "aria-valuetext": `${t("view.after")}: ${percent} %` });
-    if (face.viewer) face.viewer.blend = percent / 100;
+    face.viewer.blend = percent / 100;
   };
   slider.addEventListener("input", () => blend(Number(slider.value)));
   blend(100);
@@ -63,26 +64,29 @@ const MODES: readonly Mode[] = ["mesh", "points", "sigma"];
 /** Mesh, points or confidence, and the legend of the last. */
 export function modes(face: FaceStage, texts: Texts): HTMLElement {
   const { t } = texts;
-  const legend = html("div", { class: "legend", hidden: true });
+  const legend = legendOf(texts);
   const buttons = MODES.map((mode) => button({
     action: mode, label: t(`view.${mode}`), look: "quiet", repeats: true, press: () => choose(mode),
   }));
   const choose = (chosen: Mode): void => {
-    if (face.viewer) face.viewer.mode = chosen;
+    face.viewer.mode = chosen;
     buttons.forEach((each, i) => set(each, { "aria-pressed": String(MODES[i] === chosen) }));
     set(legend, { hidden: chosen !== "sigma" });
-    if (chosen === "sigma") fillLegend(legend, face, texts);
   };
   choose("mesh");
   return html("div", { class: "modes" },
     html("div", { class: "switch", role: "group", "aria-label": t("view.choose") }, ...buttons), legend);
 }
 
-function fillLegend(legend: HTMLElement, face: FaceStage, texts: Texts): void {
-  const [low, high] = face.viewer?.sigmaRange ?? [0, 0];
-  const end = (mm: number): HTMLElement => html("span", { dir: "auto" }, texts.millimetres(mm, 2));
-  const words = html("p", {});
-  write(words, texts.t("view.legend"));
-  legend.replaceChildren(words,
-    html("div", { class: "scale", dir: "ltr" }, end(low), html("i", { class: "ramp" }), end(high)));
+/** How far off a point may be, by colour: the marks stand where they are on the scale. */
+function legendOf(texts: Texts): HTMLElement {
+  const ramp = html("canvas", { class: "ramp", width: 256, height: 1 });
+  drawSigmaScale(ramp);
+  const marks = sigmaLegend().map(({ mm, at }) => {
+    const mark = html("span", { dir: "auto" }, texts.millimetres(mm, mm < 1 ? 1 : 0));
+    mark.style.setProperty("--at", String(at));
+    return mark;
+  });
+  return html("div", { class: "legend" }, html("p", {}, texts.t("view.legend")),
+    html("div", { class: "scale", dir: "ltr" }, ramp, html("div", { class: "marks" }, ...marks)));
 }
