@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import segno
 import uvicorn
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
@@ -40,38 +41,11 @@ _MEASURED = [
     {"name": name, "value_mm": value, "low_mm": value - 1.2, "high_mm": value + 1.2}
     for name, value in (("face_width", 138.4), ("face_length", 118.9), ("nose_width", 36.2),
                         ("nose_length", 49.7), ("eye_distance", 62.8))]
-_QR = [row for row in """
-111111101011010111101111111
-100000101101100010001000001
-101110100011001101101011101
-101110101100110010001011101
-101110100110101011101011101
-100000101011010100101000001
-111111101010101010101111111
-000000001101100110100000000
-101010110010110101001011010
-010101001101001010110100101
-110010111010110011010110011
-001101000101101100101001100
-101011110110010011011010101
-010110001001101100100101010
-110101110110010011011010111
-001010001011101010110101000
-101101111010010101101011101
-010010000101101110010100010
-100101110111010010111110101
-000000001010110110001010011
-111111101101001011101011001
-100000100110110010001101110
-101110101011001101111110100
-101110100101110010010101011
-101110101110010101101010101
-100000100011101010110101010
-111111101001011101011010111
-""".split()]
-_KEPT = {"page": "https://192.168.1.20:8443/d/mKf3vZ0pQx7RwT1uYb9LdA", "qr": _QR, "uses": 5,
+_PAGE = "https://192.168.1.20:8443/d/mKf3vZ0pQx7RwT1uYb9LdA"
+_QR = ["".join(map(str, row)) for row in segno.make(_PAGE, error="m").matrix]
+_KEPT = {"page": _PAGE, "qr": _QR, "uses": 5,
          "expires_s": 1800.0, "links": [
-             {"format": form, "url": f"https://192.168.1.20:8443/d/mKf3/face.{form}"}
+             {"format": form, "url": f"{_PAGE}/face.{form}"}
              for form in ("glb", "ply", "stl", "png")]}
 
 

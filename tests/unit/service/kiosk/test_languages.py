@@ -67,7 +67,7 @@ def test_no_text_is_missing_and_none_unused():
     assert keys >= OF_FAMILIES
     assert not {word for word in words if word.split(".")[0] in FAMILIES.keys() - {"view"}
                 and "." in word and not word.endswith(".") and word not in keys}
-    assert not {key for key in keys - words - OF_FAMILIES}
+    assert not keys - words - OF_FAMILIES
 
 
 def test_every_key_that_the_page_asks_for_exists():

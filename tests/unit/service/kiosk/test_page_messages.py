@@ -1,4 +1,4 @@
-"""Both sides of the page's socket are held to the same examples: here, and in `messages.test.ts`."""
+"""Both sides of the page's socket are held to the same examples, which `messages.test.ts` reads."""
 
 import json
 import types
