@@ -17,6 +17,7 @@ import pytest
 from denseface.recon.face import Face, PointCloud
 from denseface.service.export.face_grid import encode_face_grid
 from tests.face_grid_reader import FaceGrid, read_face_grid
+from tests.simulator.sample_face import SAMPLE
 from tests.unit.service.faces import small_face
 
 VECTOR = Path(__file__).parents[4] / "service/kiosk/frontend/test/vectors/dome.face"
@@ -98,6 +99,14 @@ def test_the_vector_of_the_front_end_is_read_as_it_says() -> None:
 
 def test_the_vector_is_what_is_written_now() -> None:
     check(bumpy_face(), read_face_grid(VECTOR.read_bytes()))
+
+
+def test_the_sample_of_the_first_screen_is_whole_and_small() -> None:
+    data = SAMPLE.read_bytes()
+    read = read_face_grid(data)
+    assert len(data) <= 300_000
+    assert len(read.points) > 100_000
+    assert len(read.seeds) > 10_000
 
 
 def remade(data: bytes, *, head: Callable[[dict[str, Any]], object] = lambda _: None,

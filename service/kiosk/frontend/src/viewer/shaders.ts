@@ -24,9 +24,10 @@ vec3 light(vec3 n) {
   float key = clamp((dot(n, KEY) + WRAP) / (1.0 + WRAP), 0.0, 1.0);
   return mix(GROUND, SKY, 0.5 + 0.5 * n.y) + LAMP * key;
 }
-float sheen(vec3 n) {
+/* Less on dark skin, where it would look like dust. */
+float sheen(vec3 n, vec3 skin) {
   vec3 between = normalize(KEY + vec3(0.0, 0.0, 1.0));
-  return 0.045 * pow(clamp(dot(n, between), 0.0, 1.0), 22.0);
+  return (0.008 + 0.07 * skin.g) * pow(clamp(dot(n, between), 0.0, 1.0), 22.0);
 }`;
 
 const SIGMA = /* glsl */ `
@@ -66,7 +67,8 @@ void main() {
   vec3 n = normalize(normalSeen);
   if (!gl_FrontFacing) n = -n;
   vec3 lit = light(n);
-  vec3 skin = toLinear(painted.rgb) * lit + sheen(n);
+  vec3 skin = toLinear(painted.rgb);
+  skin = skin * lit + sheen(n, skin);
   /* The colours of the scale are to be found in its legend: half of the shading only. */
   vec3 shown = toLinear(ofSigma(painted.a)) * mix(vec3(1.0), vec3(lit.g), 0.55);
   vec3 color = mix(skin, shown, confidence);
@@ -74,7 +76,8 @@ void main() {
   gl_FragColor = vec4(toSrgb(color) * cover, cover);
 }`;
 
-/** Round dots; `dot` is their diameter in mm, `focal` turns mm at a distance of 1 mm into pixels. */
+/** Round dots of a `diameter` in mm; `focal` turns mm at a distance of 1 mm into pixels. A pixel more
+ * is drawn, in which the edge is smoothed. */
 export const dotVertex = /* glsl */ `${SURFACE_ATTRIBUTES}
 uniform float diameter;
 uniform float focal;
@@ -85,7 +88,7 @@ void main() {
   vec4 seen = modelViewMatrix * vec4(position, 1.0);
   gl_Position = projectionMatrix * seen;
   size = max(1.0, diameter * focal / -seen.z);
-  gl_PointSize = size;
+  gl_PointSize = size + 1.0;
 }`;
 
 export const dotFragment = /* glsl */ `
@@ -95,10 +98,11 @@ varying float size;
 uniform float shaded;
 ${TRANSFER}${LIGHT}${SIGMA}
 void main() {
-  vec2 off = gl_PointCoord - 0.5;
-  float cover = size < 2.5 ? 1.0 : clamp((0.5 - length(off)) * size, 0.0, 1.0);
+  float away = length(gl_PointCoord - 0.5) * (size + 1.0);
+  float cover = clamp(size / 2.0 - away + 0.5, 0.0, 1.0);
   if (cover < 0.3) discard;
-  vec3 lit = mix(vec3(1.0), light(normalize(normalSeen)), shaded);
+  /* The gaps between dots are dark: what is shaded is lit more. */
+  vec3 lit = mix(vec3(1.0), 1.2 * light(normalize(normalSeen)), shaded);
   vec3 color = mix(toLinear(painted.rgb) * lit, toLinear(ofSigma(painted.a)), confidence);
   gl_FragColor = vec4(toSrgb(color) * cover, cover);
 }`;

@@ -33,8 +33,8 @@ const FAR_MM = 5000;
 /** Least distance of the dots of the points view, pixels: fewer are no points but moire. */
 const DOT_DISTANCE_PX = 5;
 /** Diameter of a dot, as a part of the dots' distance. */
-const DOT_SIZE = 0.8;
-const SEED_SIZE = 1.05;
+const DOT_SIZE = 0.75;
+const SEED_SIZE = 0.85;
 /** What hides the dots of the far side lies so far behind the surface, mm. */
 const BEHIND_MM = 2;
 const HANDLE_PX = 3;
@@ -62,7 +62,7 @@ export class Stage {
     vertexShader: surfaceVertex, fragmentShader: "void main() {}", side: DoubleSide,
     colorWrite: false, uniforms: { behind: { value: BEHIND_MM } },
   });
-  readonly #dotMaterial = dotMaterial(this.#sigma, this.#focal, 0.8);
+  readonly #dotMaterial = dotMaterial(this.#sigma, this.#focal, 1);
   readonly #seedMaterial = dotMaterial(
     { ...this.#sigma, confidence: { value: 0 } }, this.#focal, 0);
   #loaded: Loaded | null = null;

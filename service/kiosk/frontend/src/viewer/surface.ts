@@ -16,7 +16,7 @@ export interface Surface {
 }
 
 /** Steps of the grid over which the rim is faded, which hides its stairs. */
-export const RIM_STEPS = 4;
+export const RIM_STEPS = 8;
 /** Largest step in depth between neighbours, in grid steps: more is a gap between two surfaces. The
  * files that the service writes have the same limit. */
 const MAX_STEP = 10;
@@ -103,29 +103,35 @@ function toNormals(face: FaceGrid): Int16Array {
     normals[4 * point] = dx * scale;
     normals[4 * point + 1] = -dy * scale;
     normals[4 * point + 2] = stepMm * scale;
-    normals[4 * point + 3] = rim[place]! / RIM_STEPS * UNIT;
+    normals[4 * point + 3] = rim[place]! / (3 * RIM_STEPS) * UNIT;
   }
   return normals;
 }
 
-/** How many steps each place is from one without a point, at most `RIM_STEPS`. */
+/** How far each place is from one without a point, thirds of a step, at most 3 `RIM_STEPS`: a
+ * chamfer distance (G. Borgefors, 1986), 3 to the side and 4 across a corner. */
 function toRim({ rows, columns, index }: FaceGrid): Uint8Array {
-  const steps = new Uint8Array(rows * columns);
-  for (let place = 0; place < steps.length; place++) {
+  const rim = new Uint8Array(rows * columns);
+  const most = 3 * RIM_STEPS;
+  /** The distance by way of neighbours already known: those in the row before, and beside. */
+  const byWayOf = (place: number, column: number, row: number, beside: number): number => {
+    const west = column > 0;
+    const east = column < columns - 1;
+    const known = (beside < 0 ? place >= columns : place + columns < rim.length);
+    return Math.min(
+      (beside < 0 ? west : east) ? rim[place + beside]! + 3 : 3,
+      known ? rim[place + row]! + 3 : 3,
+      known && west ? rim[place + row - 1]! + 4 : 4,
+      known && east ? rim[place + row + 1]! + 4 : 4);
+  };
+  for (let place = 0; place < rim.length; place++) {
+    if (index[place]! >= 0) rim[place] = Math.min(most, byWayOf(place, place % columns, -columns, -1));
+  }
+  for (let place = rim.length - 1; place >= 0; place--) {
     if (index[place]! < 0) continue;
-    const column = place % columns;
-    const above = place >= columns ? steps[place - columns]! : 0;
-    const left = column > 0 ? steps[place - 1]! : 0;
-    steps[place] = Math.min(RIM_STEPS, above + 1, left + 1);
+    rim[place] = Math.min(rim[place]!, byWayOf(place, place % columns, columns, 1));
   }
-  for (let place = steps.length - 1; place >= 0; place--) {
-    if (steps[place] === 0) continue;
-    const column = place % columns;
-    const below = place + columns < steps.length ? steps[place + columns]! : 0;
-    const right = column < columns - 1 ? steps[place + 1]! : 0;
-    steps[place] = Math.min(steps[place]!, below + 1, right + 1);
-  }
-  return steps;
+  return rim;
 }
 
 /**

@@ -95,14 +95,18 @@ test("normals are those of the plane, at the rim and beside a hole too", () => {
   }
 });
 
-test("the rim fades out at the outline and around holes", () => {
-  const face = grid(21, 21, (r, c) => (r === 10 && c === 10 ? null : 700));
+test("the rim fades out at the outline and around holes, evenly in all directions", () => {
+  const face = grid(41, 41, (r, c) => (r === 20 && c === 20 ? null : 700));
   const { normals } = toSurface(face);
-  const rim = (row: number, column: number) => normals[4 * face.index[21 * row + column]! + 3]!;
-  assert.ok(rim(0, 7) < rim(1, 7) && rim(1, 7) < rim(2, 7));
-  assert.ok(rim(10, 9) < rim(10, 8));
-  assert.equal(rim(10, 20), rim(0, 7));
-  assert.equal(rim(5, 5), 32767);
+  const rim = (row: number, column: number) => normals[4 * face.index[41 * row + column]! + 3]!;
+  assert.ok(0 < rim(0, 9) && rim(0, 9) < rim(1, 9) && rim(1, 9) < rim(2, 9));
+  for (const [row, column] of [[9, 0], [9, 40], [40, 9], [0, 0], [40, 40]] as const) {
+    assert.equal(rim(row, column), rim(0, 9));
+  }
+  assert.ok(rim(20, 19) < rim(20, 18));
+  assert.equal(rim(20, 19), rim(21, 20));
+  assert.ok(rim(19, 19) > rim(20, 19) && rim(19, 19) < rim(18, 20));
+  assert.equal(rim(10, 10), 32767);
 });
 
 test("thinned are the points of every so many-th row and column", () => {
