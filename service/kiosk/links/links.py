@@ -5,6 +5,7 @@ import ssl
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from ipaddress import ip_address
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -38,6 +39,8 @@ _FILE = "links.json"
 """In the kiosk's folder."""
 _TIDY_S = 60.0
 """Time between two looks for links that have expired, seconds."""
+_HUB_S = 10.0
+"""Longest wait for the hub's face of a download, seconds."""
 _MAX_SHOWN = 64
 """Captures whose link is given again where it is asked for again."""
 _DEFAULT_PORTS = {"http": 80, "https": 443}
@@ -173,15 +176,20 @@ class Links:
 
 
 def links_of(
-    settings: KioskSettings, get: Callable[[str], Awaitable[Face]]
+    settings: KioskSettings, get: Callable[..., Awaitable[Face]]
 ) -> Links | None:
-    """Give the links that the operator has set; None where they are off. Raises SettingsError."""
+    """Give the links that the operator has set; None where they are off. Raises SettingsError.
+
+    Parameters
+    ----------
+    get : `AsyncClient.get`
+    """
     if settings.lan is None:
         return None
     options = LinkOptions(
         settings.lan, private_folder(settings.folder), uses=settings.link_uses,
         lifetime_s=settings.link_minutes * 60, tls=settings.lan_tls(), url=settings.lan_url)
-    return Links(options, get, load_texts(settings.languages))
+    return Links(options, partial(get, timeout=_HUB_S), load_texts(settings.languages))
 
 
 def qr_rows(text: str) -> tuple[str, ...]:
