@@ -120,9 +120,9 @@ def test_it_turns_by_itself_until_it_is_touched(page: Page) -> None:
     page.evaluate("page.show('dome.face')")
     page.evaluate("page.viewer.turning = true")
     count = page.evaluate("page.drawings")
-    page.evaluate("""async () => {
-      while (page.drawings < %d) await new Promise((done) => setTimeout(done, 20));
-    }""" % (count + 20))
+    page.evaluate("""async (count) => {
+      while (page.drawings < count) await new Promise((done) => setTimeout(done, 20));
+    }""", count + 20)
     page.mouse.click(200, 160)
     assert page.evaluate("page.touches") == 1
     assert page.evaluate("page.viewer.turning") is False
