@@ -87,6 +87,9 @@ class BaseClient:
             raise RequestFailedError(f"{self.address}: {answer.message.message}")
         return answer
 
+    def _nothing_published(self) -> ClientTimeoutError:
+        return ClientTimeoutError("nothing was published in the time allowed")
+
     def _no_answer(self, timeout: float) -> ClientTimeoutError:
         hint = (
             "is it running, or was this key revoked" if self._keys else "is `denseface up` running")

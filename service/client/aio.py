@@ -26,6 +26,7 @@ from denseface.service.client.events import (
 )
 from denseface.service.client.exchanges import Exchange, SendRequest, Step, deadline
 from denseface.service.client.follower import TOPICS, Follower
+from denseface.service.client.statuses import LOOK_S, StatusWatch
 from denseface.service.errors import ClientClosedError, ClientTimeoutError, ProtocolError
 from denseface.service.protocol.message_base import BaseRequest
 from denseface.service.protocol.messages import Status
@@ -103,6 +104,19 @@ class AsyncClient(BaseClient):
     async def status(self, *, timeout: float = 5.0) -> Status:
         """Ask who is there and what was done; see `Client.status`."""
         return await self._run(self._exchanges.status(timeout))
+
+    async def statuses(self, *, timeout: float | None = None) -> AsyncIterator[Status | None]:
+        """Follow how the hub is, None where it is gone; see `Client.statuses`."""
+        with suppress(ClientClosedError), closing(self._subscribe(Topic.STATUS)) as subscription:
+            watch = StatusWatch(subscription, time.monotonic())
+            while True:
+                until = deadline(timeout)
+                self._check_open()
+                while (news := watch.look(time.monotonic())) is None:
+                    if time.monotonic() >= until:
+                        raise self._nothing_published()
+                    await self._readable(subscription.socket, LOOK_S)
+                yield news.status
 
     async def faces(
         self, *, after: int | None = None, last: int | None = None, since: datetime | None = None,
@@ -226,7 +240,7 @@ class AsyncClient(BaseClient):
                 subscription.socket, min(until - time.monotonic(), CHECK_INTERVAL_S)):
             subscription.monitor.check()
             if time.monotonic() >= until:
-                raise ClientTimeoutError("nothing was published in the time allowed")
+                raise self._nothing_published()
 
     async def _readable(self, socket: zmq.Socket[bytes], seconds: float) -> bool:
         """Wait until there is something to receive; False where there is nothing in this time."""

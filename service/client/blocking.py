@@ -23,6 +23,7 @@ from denseface.service.client.events import (
 )
 from denseface.service.client.exchanges import Exchange, SendRequest, Step, deadline
 from denseface.service.client.follower import TOPICS, Follower
+from denseface.service.client.statuses import LOOK_S, StatusWatch
 from denseface.service.errors import ClientTimeoutError, ProtocolError
 from denseface.service.protocol.message_base import BaseRequest
 from denseface.service.protocol.messages import Status
@@ -198,6 +199,27 @@ class Client(Closing, BaseClient):
                     newest = subscription.receive_latest(read)
                 yield newest
 
+    def statuses(self, *, timeout: float | None = None) -> Iterator[Status | None]:
+        """Follow how the hub is: at each of its heartbeats, and at once where it changes.
+
+        None, once, where the hub is gone: within a quarter of a second where its process ended,
+        after three heartbeats where it or the network is silent. It goes on when the hub is back.
+
+        Parameters
+        ----------
+        timeout : longest wait for the next one, seconds; where None, for ever
+        """
+        with closing(self._subscribe(Topic.STATUS)) as subscription:
+            watch = StatusWatch(subscription, time.monotonic())
+            while True:
+                until = deadline(timeout)
+                self._check_open()
+                while (news := watch.look(time.monotonic())) is None:
+                    if time.monotonic() >= until:
+                        raise self._nothing_published()
+                    subscription.socket.poll(int(LOOK_S * 1000))
+                yield news.status
+
     def status(self, *, timeout: float = 5.0) -> Status:
         """Ask who is there and what was done."""
         return self._run(self._exchanges.status(timeout))
@@ -231,7 +253,7 @@ class Client(Closing, BaseClient):
                 max(0, math.ceil(min(until - time.monotonic(), CHECK_INTERVAL_S) * 1000))):
             subscription.monitor.check()
             if time.monotonic() >= until:
-                raise ClientTimeoutError("nothing was published in the time allowed")
+                raise self._nothing_published()
 
     def _send_request(
         self, message: BaseRequest, timeout: float, subscription: Subscription | None = None

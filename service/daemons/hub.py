@@ -108,11 +108,13 @@ class _EventLoop:
         while not stop:
             if (now := time.monotonic()) >= due:
                 due = self._tick(now, due)
-            elif now >= self.hub.previews_due():
-                self._send_all(self.hub.ask_previews(now))
-            wait_s = min(due, self.hub.previews_due()) - now
+            elif now >= self.hub.due():
+                self._send_all(self.hub.act(now))
+            wait_s = min(due, self.hub.due()) - now
             for incoming in self.listeners.receive(max(0, math.ceil(wait_s * 1000))):
                 self._receive(incoming)
+            for peer, local in self.listeners.take_gone():
+                self._send_all(self.hub.connection_ended(peer, local=local))
             if self.writer.has_results():
                 self._send_all(self.hub.written(time.monotonic()))
             stop.drain()
@@ -131,6 +133,7 @@ class _EventLoop:
             self._drop_revoked()
         self.hub.want_previews(wanted=subscriptions[Topic.PREVIEW] > 0)
         self.hub.want_hints(wanted=subscriptions[Topic.HINTS] > 0)
+        self.hub.status_subscribers(subscriptions[Topic.STATUS])
         outputs = self.hub.tick(now)
         self.observer.record_tick(now, outputs, subscriptions, self.listeners.unreachable())
         self._send_all(outputs)

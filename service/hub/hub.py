@@ -7,14 +7,11 @@ in `service.protocol.states`.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.metadata import version
 
 import structlog
-from pydantic import ValidationError
 
 from denseface.recon.settings import Settings
 from denseface.service import errors, storage
-from denseface.service.hub import sensors
 from denseface.service.hub._common import LOCAL, Common
 from denseface.service.hub.captures import Captures
 from denseface.service.hub.jobs import Jobs
@@ -24,21 +21,18 @@ from denseface.service.hub.peers import Peers, WorkerPeer
 from denseface.service.hub.presses import Presses
 from denseface.service.hub.previews import Hints, Previews
 from denseface.service.hub.sensors import SensorPeer
+from denseface.service.hub.status_report import StatusReport
 from denseface.service.monitoring import Figures, Rejections
 from denseface.service.protocol import messages
-from denseface.service.protocol.outgoing import Output, Publish, send
+from denseface.service.protocol.outgoing import Output, send
 from denseface.service.protocol.roles import Role
 from denseface.service.protocol.states import CaptureState
-from denseface.service.protocol.status import MAX_SENSOR_STATES
-from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from denseface.service.security.permissions import ALL_ROLES
 from denseface.service.settings import ServiceSettings
 
 _WRITES_S = 1.0
 """Longest time for which a removal holds the hub up for files that are being written, seconds."""
-_VERSION = version("denseface")
-"""Of this package, as the status says it."""
 
 
 class Hub:
@@ -77,7 +71,8 @@ class Hub:
             common, self._presses, self._jobs, self._outcomes, self._figures.counters)
         self._previews = Previews(self._peers, settings.heartbeat_s, self._rejections)
         self._hints = Hints(self._peers, settings.heartbeat_s)
-        self._status_due = 0.0
+        self._status = StatusReport(
+            common, self._presses, self._jobs, self._figures, self._rejections)
         self._log = structlog.get_logger("hub")
 
     def receive(
@@ -99,6 +94,7 @@ class Hub:
         try:
             outputs.extend(self._receive(now, peer, packet, key, roles))
             outputs.extend(self._process_writes(now))
+            outputs.extend(self._status.tell_changes(now))
         except errors.DamagedDatabaseError:
             raise
         except errors.ServiceError as error:
@@ -162,10 +158,8 @@ class Hub:
             outputs.extend(self._maintenance.tick(now))
             outputs.extend(self._process_writes(now))
             outputs.extend(self._hints.ask(now))
-            outputs.extend(self.ask_previews(now))
-            if now >= self._status_due:
-                self._status_due = now + self._settings.heartbeat_s
-                outputs.append(Publish(Topic.STATUS, Packet(self._status())))
+            outputs.extend(self._previews.ask(now, self._presses.asked_sensors()))
+            outputs.extend(self._status.tick(now))
         except errors.DamagedDatabaseError:
             raise
         except errors.ServiceError as error:
@@ -186,6 +180,19 @@ class Hub:
         """Remove a peer that cannot be reached any more."""
         return list(self._disconnected(peer, reason))
 
+    def connection_ended(self, peer: bytes, *, local: bool) -> list[Output]:
+        """Take note that a peer's connection has ended, after all that it said by it.
+
+        A process of this machine has ended. A worker elsewhere may connect again, with the face
+        that it makes: it gets no more jobs, and those that it has are its own until it is silent.
+        """
+        worker = self._peers.workers.get(peer)
+        if local or worker is None:
+            return list(self._disconnected(peer, "disconnected"))
+        worker.away, worker.free = True, False
+        self._status.note_change()
+        return []
+
     def pressed_by(self, capture_id: str) -> str | None:
         """Give the fingerprint of the key that pressed a capture; None where there is none."""
         try:
@@ -203,13 +210,24 @@ class Hub:
         """Say whether anybody subscribes to hints."""
         self._hints.wanted = wanted
 
-    def ask_previews(self, now: float) -> list[Output]:
-        """Ask for the previews that are due; to be called when `previews_due`, and in each tick."""
-        return list(self._previews.ask(now, self._presses.asked_sensors()))
+    def status_subscribers(self, number: int) -> None:
+        """Say how many subscribe to the status."""
+        self._status.note_subscribers(number)
 
-    def previews_due(self) -> float:
-        """Return when the next preview is to be asked for, seconds; infinite where none is."""
-        return self._previews.next_due(self._presses.asked_sensors())
+    def act(self, now: float) -> list[Output]:
+        """Do what cannot wait for the next tick; to be called when `due`. Raises as `receive`."""
+        outputs = list(self._previews.ask(now, self._presses.asked_sensors()))
+        try:
+            outputs.extend(self._status.tell_changes(now))
+        except errors.DamagedDatabaseError:
+            raise
+        except errors.ServiceError as error:
+            self._log.error("status not told", reason=str(error))
+        return outputs
+
+    def due(self) -> float:
+        """Return when to `act`, seconds; infinite where nothing is to be done before a tick."""
+        return min(self._previews.next_due(self._presses.asked_sensors()), self._status.due())
 
     def peers(self) -> list[bytes]:
         """Return the routing ids of all sensors and workers."""
@@ -235,7 +253,7 @@ class Hub:
             case messages.Withdraw() as message:
                 yield from self._withdraw(now, peer, message, key, roles)
             case messages.GetStatus(request=request):
-                yield send(peer, self._status(request))
+                yield send(peer, self._status.make(request))
             case messages.SensorReady() | messages.SensorState() as message:
                 yield from self._sensor_ready(now, peer, message, key)
             case messages.WorkerReady() as message:
@@ -298,9 +316,11 @@ class Hub:
             yield refused
         elif isinstance(message, messages.SensorReady):
             if self._peers.sensor_ready(peer, message.name, now, key):
+                self._status.note_change()
                 self._log.info("sensor ready", name=message.name, source=message.source,
                                key=key or LOCAL)
         elif self._peers.sensor_state(peer, message, now, key):
+            self._status.note_change()
             self._log.info("sensor state", name=message.name, state=message.state,
                            reason=message.reason, identity=message.identity, key=key or LOCAL)
 
@@ -314,6 +334,7 @@ class Hub:
             return
         known, asked = self._peers.workers.get(peer), self._peers.was_asked(peer)
         if known is None:
+            self._status.note_change()
             self._log.info("worker ready", name=name, key=key or LOCAL)
         elif credit <= known.credit and not asked:
             self._rejections.note(
@@ -336,42 +357,9 @@ class Hub:
         say = self._log.info if reason == "goodbye" else self._log.warning
         if sensor := self._peers.sensors.pop(peer, None):
             say("sensor gone", name=sensor.name, reason=reason, key=sensor.key or LOCAL)
+            self._status.note_change()
             yield from self._presses.sensor_gone(peer, reason)
         if worker := self._peers.workers.pop(peer, None):
             say("worker gone", name=worker.name, reason=reason, key=worker.key or LOCAL)
+            self._status.note_change()
             self._jobs.worker_lost(worker)
-
-    def _status(self, request: int = 0) -> messages.Status:
-        try:
-            return self._make_status(request)
-        except ValidationError as error:  # a name or count that no status may have
-            field, reason = errors.first_error(error)
-            raise errors.LocalProtocolError(f"status: {field}: {reason}") from error
-
-    def _make_status(self, request: int) -> messages.Status:
-        counts, counters = self._store.counts(), self._figures.counters
-        known = sensors.best_first(self._peers.sensors.values())
-        return messages.Status(
-            request=request, epoch=self._store.epoch, sequence=self._store.last_sequence(),
-            hub_version=_VERSION,
-            sensors=tuple(one.name for one in known if one.can_be_asked),
-            sensor_states=tuple(one.status() for one in known[:MAX_SENSOR_STATES]),
-            workers=tuple(worker.name for worker in self._peers.workers.values()),
-            pressed=len(self._presses), queued=self._jobs.queued, working=self._jobs.working,
-            done=counts.get(CaptureState.DONE, 0), failed=counts.get(CaptureState.FAILED, 0),
-            dead=counts.get(CaptureState.DEAD, 0),
-            refused=self._rejections.counts(),
-            presses_refused=counters.by_label("press_refused"),
-            since_start={name: count for name, label, count in counters.items() if not label},
-            latencies={stage: messages.Latency(
-                count=one.count, median_s=one.quantile_s(0.5), p99_s=one.quantile_s(0.99))
-                for stage, one in self._figures.latencies.stages().items()},
-            restarts=self._figures.restarts,
-            free_bytes=self._free_bytes(), kept_bytes=self._figures.kept_bytes,
-            log_lines_lost=self._figures.log_lines_lost)
-
-    def _free_bytes(self) -> int | None:
-        try:
-            return self._store.free_bytes()
-        except errors.StoreError:
-            return None

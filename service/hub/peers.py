@@ -36,6 +36,8 @@ class WorkerPeer:
     """Captures sent and not answered, in order: it works on the first."""
     deadline: float = math.inf
     """When the first is taken back, whatever it says; seconds."""
+    away: bool = False
+    """Its connection has ended: it may come back by another one."""
     alone: bool = False
     """No job is to be sent beside the last one."""
 

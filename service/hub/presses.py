@@ -140,7 +140,7 @@ class Presses:
         if sensor is None and missing is None and now < self._sensors_due:
             return  # the client repeats it in a moment
         presser = _Presser(request, key)
-        obstacle = self._obstacle(queued, key)
+        obstacle = self.obstacle(queued, key)
         if sensor is None or obstacle:
             reason, why = obstacle or ("no_sensor", missing or self._not_there(message.sensor))
             yield from self._refuse_all(capture_id, {peer: presser}, reason, why)
@@ -184,7 +184,8 @@ class Presses:
         if press.late:
             yield self._not_known(peer, presser)
 
-    def _obstacle(self, queued: int, key: str) -> tuple[messages.PressReason, str] | None:
+    def obstacle(self, queued: int, key: str = "") -> tuple[messages.PressReason, str] | None:
+        """Give why a press is refused now whatever the sensor, in a word and in words, or None."""
         if queued + len(self) >= self._settings.queue:
             return "queue", f"{self._settings.queue} frames wait for a worker already"
         own = sum(press.key == key for press in self._presses.values()) if key else 0

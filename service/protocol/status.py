@@ -99,10 +99,20 @@ class Status(BaseAnswer):
                              FailFast()] = ()
     """All sensors, the first of them where there are more."""
 
+    obstacle: Name = ""
+    """Why a press is refused now whatever the sensor, a `PressReason`: `queue`, or `disk` that is
+    full or fails. Empty where it is not."""
+    retention_s: Annotated[float, Field(gt=0)] | None = None
+    """How long a capture is kept after its outcome; None where nothing is removed by itself, or an
+    older hub does not say."""
+    heartbeat_s: Annotated[float, Field(gt=0)] = 1.0
+    """Longest time between two statuses that are published."""
+
     @property
     def ready(self) -> bool:
         """A press now would become a face."""
-        return self.state == "serving" and self.has_frames and bool(self.workers)
+        return (self.state == "serving" and not self.obstacle and self.has_frames
+                and bool(self.workers))
 
     @property
     def has_frames(self) -> bool:

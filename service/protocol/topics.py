@@ -9,7 +9,7 @@ class Topic(StrEnum):
     FACES = "faces"
     """`FaceDone` and `CaptureFailed`, numbered without gaps."""
     STATUS = "status"
-    """`Status`, at every heartbeat."""
+    """`Status`, at every heartbeat and where it changes."""
     PREVIEW = "preview"
     """`Preview`, up to thirty a second of each sensor while somebody subscribes."""
     HINTS = "hints"

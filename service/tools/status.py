@@ -29,7 +29,8 @@ def ready_status(client: Client, timeout: float) -> Status:
         left = deadline - time.monotonic()
         if left <= 0:
             missing = ("no hub" if status.state != "serving" else
-                       _no_sensor(status) if not status.has_frames else "no worker")
+                       _no_sensor(status) if not status.has_frames else
+                       "no worker" if not status.workers else f"no room ({status.obstacle})")
             raise ClientTimeoutError(f"{missing} is ready after {timeout:g} s")
         time.sleep(min(_POLL_S, left))
         status = client.status()
@@ -74,6 +75,8 @@ def as_text(address: str, status: Status) -> str:
         rows["disk"] = f"{status.free_bytes / 1e9:.1f} GB free"
         if status.kept_bytes is not None:
             rows["disk"] += f", {status.kept_bytes / 1e6:.1f} MB kept"
+    if status.obstacle:
+        rows["now"] += f"; presses are refused: {status.obstacle}"
     if times := status.latencies.get("press_to_published"):
         rows["time"] = (f"{times.median_s:.2f} s from press to outcome, 99 % within "
                         f"{times.p99_s:.2f} s (of {times.count} since the start)")

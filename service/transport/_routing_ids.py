@@ -6,7 +6,7 @@ connection has closed: libzmq closes its descriptor before it frees the id.
 """
 
 import os
-from collections import Counter
+from collections import Counter, deque
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -14,6 +14,8 @@ from denseface.service.runtime.bounded_dict import BoundedDict
 
 _MAX_GONE = 65_536
 """Ids of closed connections whose key is remembered: 8 MB, 25 MB of the longest."""
+_MAX_CLOSED = 1024
+"""Closed connections that wait to be taken; of others it is known when their peers are silent."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ class RoutingIds:
         """Number of `_connections` by their key."""
         self._gone: BoundedDict[bytes, str] = BoundedDict(_MAX_GONE)
         """Id -> key of connections that closed."""
+        self._closed: deque[bytes] = deque(maxlen=_MAX_CLOSED)
+        """Token and id of those that closed and were not taken."""
 
     def opened(self, descriptor: int) -> None:
         """Note a new connection."""
@@ -47,12 +51,26 @@ class RoutingIds:
 
     def closed(self, descriptor: int) -> None:
         """Note that a connection closed."""
-        self._forget(self._ids.pop(descriptor, None))
+        routing_id = self._ids.pop(descriptor, None)
+        if routing_id is not None:
+            self._closed.append(self._connections[routing_id].token + routing_id)
+        self._forget(routing_id)
 
     def all_closed(self) -> None:
         """Note that all connections were closed."""
         for descriptor in list(self._ids):
-            self.closed(descriptor)
+            self._forget(self._ids.pop(descriptor))  # who was cut off comes back
+
+    @property
+    def has_closed(self) -> bool:
+        """Whether `take_closed` would give anything."""
+        return bool(self._closed)
+
+    def take_closed(self) -> list[bytes]:
+        """Give token and id of the peers whose connection closed since the last call."""
+        closed = [*self._closed]
+        self._closed.clear()
+        return closed
 
     def has_spoken(self, descriptor: int) -> bool:
         """Say whether a message came by an open connection."""

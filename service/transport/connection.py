@@ -20,8 +20,8 @@ _MIN_BROKEN_OFF = 3
 _RECONNECT_S = 2.0
 """Time until a refused daemon connects again, seconds: its key may be allowed meanwhile."""
 _E = zmq.Event
-_EVENTS = (_E.HANDSHAKE_SUCCEEDED | _E.HANDSHAKE_FAILED_AUTH | _E.HANDSHAKE_FAILED_PROTOCOL
-           | _E.HANDSHAKE_FAILED_NO_DETAIL)
+_EVENTS = (_E.DISCONNECTED | _E.HANDSHAKE_SUCCEEDED | _E.HANDSHAKE_FAILED_AUTH
+           | _E.HANDSHAKE_FAILED_PROTOCOL | _E.HANDSHAKE_FAILED_NO_DETAIL)
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,8 @@ class ConnectionMonitor:
         self._monitor = open_monitor(socket, int(_EVENTS))
         self._broken_off = 0
         self._reconnect_at: float | None = None
+        self.lost = False
+        """There was a connection, and there is none now; as of the last `read`."""
         self.refused: KeyRefusedError | None = None
         """Why the hub refuses this connection; None where it does not, or is not there."""
 
@@ -91,8 +93,12 @@ class ConnectionMonitor:
         self._monitor.close(linger=0)
 
     def _note(self, event: zmq.Event, value: int) -> None:
+        if event is _E.DISCONNECTED:
+            self.lost = True
+            return
         if event is _E.HANDSHAKE_SUCCEEDED:
             self.refused, self._broken_off, self._reconnect_at = None, 0, None
+            self.lost = False
             return
         if event is _E.HANDSHAKE_FAILED_AUTH:
             self.refused = KeyRefusedError(

@@ -158,6 +158,12 @@ class Listener:
         self._router.monitor.read()
         self._publisher.monitor.read()
 
+    def take_gone(self) -> list[bytes]:
+        """Give the peers whose connection has ended by itself, when all that they said is read."""
+        if not self._routing_ids.has_closed or self._router.socket.poll(0):
+            return []
+        return self._routing_ids.take_closed()
+
     def subscriptions(self, topic: Topic) -> int:
         """Give the number of connections that are subscribed to a topic."""
         return self._subscribers.count(topic)

@@ -150,6 +150,12 @@ class Listeners:
             if any(socket in ready for socket in others):
                 listener.read_events()
 
+    def take_gone(self) -> Iterator[tuple[bytes, bool]]:
+        """Give the peers whose connection has ended, and whether they were on this machine."""
+        for number, listener in enumerate(self._listeners):
+            for peer in listener.take_gone():
+                yield bytes([number]) + peer, not listener.guarded
+
     def send(self, peer: bytes, parts: Sequence[Buffer]) -> bool:
         """Send to a peer; False where it cannot be reached, or its key was revoked."""
         return self._listeners[peer[0]].send(peer[1:], parts)

@@ -4,6 +4,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 import zmq
@@ -87,6 +88,12 @@ class FakeHub:
     def garble(self, topic: Topic) -> None:
         self._calls.append(lambda: self._publisher.send_multipart([topic.encode(), b"?"]))
 
+    def status(self, request: int = 0, **more: Any) -> messages.Status:
+        return messages.Status(
+            request=request, epoch="0f", sequence=len(self.outcomes), hub_version="0",
+            sensors=("s",), workers=(), pressed=0, queued=0, working=0, done=0, failed=0, dead=0,
+            **more)
+
     def _serve(self) -> None:
         poller = zmq.Poller()
         poller.register(self._router, zmq.POLLIN)
@@ -119,10 +126,7 @@ class FakeHub:
                 else:
                     yield Packet(messages.PressAccepted(request=request, capture_id=capture_id))
             case messages.GetStatus():
-                yield Packet(messages.Status(
-                    request=request, epoch="0f", sequence=len(self.outcomes), hub_version="0",
-                    sensors=("s",), workers=(), pressed=0, queued=0, working=0, done=0, failed=0,
-                    dead=0))
+                yield Packet(self.status(request))
             case messages.GetFace(capture_id=capture_id):
                 found = [one for one in self.outcomes if one.message.capture_id == capture_id]
                 yield _again(found[0], request) if found else Packet(messages.CaptureUnknown(

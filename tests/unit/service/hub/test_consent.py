@@ -142,7 +142,7 @@ def test_a_promise_is_kept_though_the_hub_keeps_others_for_longer(bench, clock, 
     assert bench.store.find("a") is None
     assert files(data) == [f"without.{bench.store.find('without').settings_hash}.face",
                            "without.frame"]
-    assert bench.hub._status().queued == 0
+    assert bench.hub._status.make().queued == 0
 
 
 def test_a_promise_outlives_a_later_setting_and_a_shorter_setting_wins(data, clock):

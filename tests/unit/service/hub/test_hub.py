@@ -344,7 +344,7 @@ def test_only_the_sensor_that_was_asked_answers_a_take(bench):
     assert [(peer, message.kind) for peer, message in answers] == [(OTHER, "frame_refused")]
     assert bench.say(OTHER, messages.FrameFailed(capture_id="a", message="none")) == []
     assert bench.store.find("a") is None
-    assert bench.hub.tick(bench.now)[-1].packet.message.refused == {"not asked": 2}
+    assert bench.hub._status.make().refused == {"not asked": 2}
     assert (CLIENT, "press_accepted") in [
         (peer, message.kind) for peer, message in bench.frame()]
 

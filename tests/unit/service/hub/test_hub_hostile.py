@@ -76,7 +76,7 @@ class Hostile:
 
     def snapshot(self) -> Snapshot:
         """What is shown of the hub, as it would be read from a message."""
-        (answer,) = self.hub.receive(self.now, b"looks", Packet(messages.GetStatus(request=1)))
+        answer, *_ = self.hub.receive(self.now, b"looks", Packet(messages.GetStatus(request=1)))
         status = decode_from_hub(encode(answer.packet)).message
         assert isinstance(status, messages.Status), status
         return Snapshot(self.now, status, tuple(self.figures.counters.items()),

@@ -110,16 +110,16 @@ def test_each_sensor_that_streams_is_asked_by_itself(bench):
 
 
 def test_the_loop_knows_when_the_next_preview_is_due(bench):
-    assert bench.hub.previews_due() == math.inf
+    assert bench.hub.due() == math.inf
     bench.hub.want_previews(wanted=True)
-    assert bench.hub.previews_due() <= bench.now
+    assert bench.hub.due() <= bench.now
     bench.wait(0.0)
-    assert bench.hub.previews_due() == bench.now + SETTINGS.heartbeat_s
+    assert bench.hub.due() == bench.now + SETTINGS.heartbeat_s
     bench.now += 0.005
     previews(bench)
-    assert 0.02 < bench.hub.previews_due() - bench.now < 0.034
+    assert 0.02 < bench.hub.due() - bench.now < 0.034
     bench.press()
-    assert bench.hub.previews_due() == math.inf  # the loop does not spin while a press waits
+    assert bench.hub.due() == math.inf  # the loop does not spin while a press waits
 
 
 def test_many_sensors_share_the_rate(bench):
@@ -128,7 +128,7 @@ def test_many_sensors_share_the_rate(bench):
     bench.hub.want_previews(wanted=True)
     bench.wait(0.0)
     previews(bench)
-    assert 0.1 < bench.hub.previews_due() - bench.now < 0.2
+    assert 0.1 < bench.hub._previews.next_due(set()) - bench.now < 0.2
 
 
 def test_a_jpeg_is_passed_on_with_its_hint_and_its_sensor(bench):
@@ -147,7 +147,7 @@ def test_what_is_no_jpeg_is_not_passed_on(bench):
     bench.wait(0.2)
     garbled = {"jpeg": arrays["jpeg"][::-1]}
     assert previews(bench, message=messages.PreviewFrame(preview=header), arrays=garbled) == []
-    assert bench.hub._status().refused == {"malformed": 1}
+    assert bench.hub._status.make().refused == {"malformed": 1}
     assert kinds(bench.wait(0.2)) == []  # and not at once again
     assert kinds(bench.wait(1.0)) == [(SENSOR, "take_preview")]
 

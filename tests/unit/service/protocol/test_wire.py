@@ -120,6 +120,8 @@ from_hub = st.one_of(
     plain(messages.CaptureFailed, request=numbers, epoch=hashes, sequence=numbers, capture_id=ids,
           error=texts, message=texts, dead=st.booleans()),
     plain(messages.Status, request=numbers, epoch=hashes, sequence=numbers, hub_version=texts,
+          obstacle=texts, retention_s=st.none() | st.floats(1e-3, 1e9),
+          heartbeat_s=st.floats(1e-3, 3600),
           sensors=st.lists(texts, max_size=3).map(tuple),
           workers=st.lists(texts, max_size=3).map(tuple), pressed=numbers, queued=numbers,
           working=numbers, done=numbers, failed=numbers, dead=numbers,
