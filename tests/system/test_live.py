@@ -6,12 +6,14 @@ import pty
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 
 import numpy as np
 import pytest
 
 from tests.system.running import RECORDINGS, REPOSITORY, denseface
 from tests.virtual_sensor.clip import write_clip
+from tests.virtual_sensor.control import Control
 from tests.virtual_sensor.process import environment
 from tests.waiting import LIMIT_S
 
@@ -94,10 +96,20 @@ def test_a_live_sensor(clip):
     assert (said["source"], said["frames"]) == ("openni2:", 3)
 
 
-def test_a_sensor_that_goes_away_leaves_its_figures(clip):
-    # After 15 s: long enough to be warm before, on a busy machine too.
-    done = denseface("live", "--json", **environment(clip, disconnect_after=450))
-    assert done.returncode == 1
-    assert json.loads(done.stdout)["frames"] >= 1
-    (line,) = done.stderr.splitlines()
-    assert line.startswith("denseface live: ")
+def test_a_sensor_that_goes_away_leaves_its_figures(clip, tmp_path):
+    with Control(tmp_path / "control", clip) as control:
+        ours, theirs = pty.openpty()
+        running = subprocess.Popen(
+            [sys.executable, "-m", "denseface", "live", "--json"], cwd=REPOSITORY, text=True,
+            stdout=subprocess.PIPE, stderr=theirs, env=environment(controls=[control]))
+        os.close(theirs)
+        shown = os.read(ours, 4096)  # the status line: it is under way
+        control.unplug()
+        with suppress(OSError):  # it has ended
+            while more := os.read(ours, 4096):
+                shown += more
+        out, _ = running.communicate(timeout=LIMIT_S)
+        os.close(ours)
+    assert running.returncode == 1
+    assert json.loads(out)["frames"] >= 1
+    assert shown.splitlines()[-1].rpartition(b"\x1b[K")[2].startswith(b"denseface live: ")

@@ -26,10 +26,21 @@ from denseface.recon.segmentation import segment_face
 from denseface.recon.settings import Neighbors
 from denseface.recon.surface import mean_spacing
 from tests.simulator import Accuracy, Light, Person, Scene, measure, simulate
+from tests.simulator.heads import head_names, load_head
 from tests.unit.frames import resampled
 
 STAGES = ["overview", "detection", "registration", "segmentation", "neighbors", "rbf",
           "propagation", "total"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_shared_folder(tmp_path_factory):
+    """Let only the head be at hand that is the project's own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DENSEFACE_SHARED", str(tmp_path_factory.mktemp("shared")))
+        load_head.cache_clear()
+        assert head_names() == ["procedural"]
+        yield
 
 
 def apart(a, b):
