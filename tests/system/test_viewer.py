@@ -187,6 +187,14 @@ def test_confidence_points_and_the_initial_cloud_look_different(page: Page) -> N
     assert np.abs(picture(page) - mesh).max() <= 2
 
 
+def test_a_face_that_is_forgotten_is_gone(page: Page) -> None:
+    page.evaluate("page.show('sample.face')")
+    page.evaluate("page.viewer.turning = true; page.viewer.clear(); page.viewer.turning = false")
+    assert not covered(picture(page)).any()
+    assert page.evaluate("page.show('dome.face')") is True
+    assert covered(picture(page)).any()
+
+
 def test_a_lost_context_comes_back(page: Page) -> None:
     page.evaluate("page.show('sample.face')")
     before = picture(page)

@@ -152,7 +152,10 @@ export class App {
     this.screen = screen;
     if (MIRRORED.includes(screen.name)) this.mirror.start();
     else if (LAST_PICTURE.includes(screen.name)) this.mirror.stop();
-    else this.mirror.clear();
+    else {
+      this.mirror.clear();
+      this.face.forget();
+    }
     if (screen.name === "attract" && before && before.name !== "attract") {
       // The next visitor begins as the first one did.
       this.speech.turn(false);

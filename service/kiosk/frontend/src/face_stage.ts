@@ -49,6 +49,14 @@ export class FaceStage {
     this.viewer.turning = false;
   }
 
+  /** Lets go of a visitor's face: nothing of it stays in the page. */
+  forget(): void {
+    if (this.wanted === undefined || this.wanted === SAMPLE) return;
+    this.wanted = this.shown = undefined;
+    this.viewer.turning = false;
+    this.viewer.clear();
+  }
+
   private async show(name: string, load: () => Promise<FaceGrid>): Promise<void> {
     if (this.wanted === name && this.failed !== name) {
       if (this.shown === name) this.begin();

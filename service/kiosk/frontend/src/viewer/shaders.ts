@@ -40,51 +40,59 @@ vec3 ofSigma(float code) {
 }`;
 
 /** `position`: mm; `bearing`: normal and distance to the rim; `tint`: sRGB and code of sigma. */
-const SURFACE_ATTRIBUTES = /* glsl */ `
+const ATTRIBUTES = /* glsl */ `
 attribute vec4 bearing;
-attribute vec4 tint;
-varying vec3 normalSeen;
-varying vec4 painted;`;
+attribute vec4 tint;`;
 
-export const surfaceVertex = /* glsl */ `${SURFACE_ATTRIBUTES}
-uniform float behind; /* mm */
-varying float rim;
-void main() {
-  normalSeen = mat3(modelViewMatrix) * bearing.xyz;
-  painted = tint;
-  rim = bearing.w;
-  gl_Position = projectionMatrix * (modelViewMatrix * vec4(position, 1.0) - vec4(0.0, 0.0, behind, 0.0));
-}`;
-
-export const surfaceFragment = /* glsl */ `
-varying vec3 normalSeen;
-varying vec4 painted;
+/** Colours are made for each vertex: triangles are hardly larger than pixels, and a processor that
+ * stands in for a graphics card has the fewest of them. */
+export const surfaceVertex = /* glsl */ `${ATTRIBUTES}
+varying vec3 color;
 varying float rim;
 ${TRANSFER}${LIGHT}${SIGMA}
 void main() {
-  float cover = smoothstep(0.1, 0.9, rim);
-  if (cover < 0.02) discard;
-  vec3 n = normalize(normalSeen);
-  if (!gl_FrontFacing) n = -n;
+  vec3 n = normalize(mat3(modelViewMatrix) * bearing.xyz);
   vec3 lit = light(n);
-  vec3 skin = toLinear(painted.rgb);
+  vec3 skin = toLinear(tint.rgb);
   skin = skin * lit + sheen(n, skin);
   /* The colours of the scale are to be found in its legend: half of the shading only. */
-  vec3 shown = toLinear(ofSigma(painted.a)) * mix(vec3(1.0), vec3(lit.g), 0.55);
-  vec3 color = mix(skin, shown, confidence);
-  if (!gl_FrontFacing) color *= 0.35;
-  gl_FragColor = vec4(toSrgb(color) * cover, cover);
+  vec3 shown = toLinear(ofSigma(tint.a)) * mix(vec3(1.0), vec3(lit.g), 0.55);
+  color = toSrgb(mix(skin, shown, confidence));
+  rim = bearing.w;
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+}`;
+
+export const surfaceFragment = /* glsl */ `
+varying vec3 color;
+varying float rim;
+void main() {
+  float cover = smoothstep(0.1, 0.9, rim);
+  if (cover < 0.02) discard;
+  gl_FragColor = vec4(color * (gl_FrontFacing ? cover : 0.5 * cover), cover);
+}`;
+
+/** What hides the dots behind it. */
+export const screenVertex = /* glsl */ `
+uniform float behind; /* mm */
+void main() {
+  vec4 seen = modelViewMatrix * vec4(position, 1.0);
+  gl_Position = projectionMatrix * (seen - vec4(0.0, 0.0, behind, 0.0));
 }`;
 
 /** Round dots of a `diameter` in mm; `focal` turns mm at a distance of 1 mm into pixels. A pixel more
  * is drawn, in which the edge is smoothed. */
-export const dotVertex = /* glsl */ `${SURFACE_ATTRIBUTES}
+export const dotVertex = /* glsl */ `${ATTRIBUTES}
 uniform float diameter;
 uniform float focal;
+uniform float shaded;
+varying vec3 color;
 varying float size;
+${TRANSFER}${LIGHT}${SIGMA}
 void main() {
-  normalSeen = mat3(modelViewMatrix) * bearing.xyz;
-  painted = tint;
+  /* The gaps between dots are dark: what is shaded is lit more. */
+  vec3 n = normalize(mat3(modelViewMatrix) * bearing.xyz);
+  vec3 lit = mix(vec3(1.0), 1.2 * light(n), shaded);
+  color = toSrgb(mix(toLinear(tint.rgb) * lit, toLinear(ofSigma(tint.a)), confidence));
   vec4 seen = modelViewMatrix * vec4(position, 1.0);
   gl_Position = projectionMatrix * seen;
   size = max(1.0, diameter * focal / -seen.z);
@@ -92,17 +100,11 @@ void main() {
 }`;
 
 export const dotFragment = /* glsl */ `
-varying vec3 normalSeen;
-varying vec4 painted;
+varying vec3 color;
 varying float size;
-uniform float shaded;
-${TRANSFER}${LIGHT}${SIGMA}
 void main() {
   float away = length(gl_PointCoord - 0.5) * (size + 1.0);
   float cover = clamp(size / 2.0 - away + 0.5, 0.0, 1.0);
   if (cover < 0.3) discard;
-  /* The gaps between dots are dark: what is shaded is lit more. */
-  vec3 lit = mix(vec3(1.0), 1.2 * light(normalize(normalSeen)), shaded);
-  vec3 color = mix(toLinear(painted.rgb) * lit, toLinear(ofSigma(painted.a)), confidence);
-  gl_FragColor = vec4(toSrgb(color) * cover, cover);
+  gl_FragColor = vec4(color * cover, cover);
 }`;

@@ -8,7 +8,7 @@ import {
 import type { FaceGrid } from "../face_grid.ts";
 import type { Mode } from "./flat.ts";
 import type { View } from "./pose.ts";
-import { dotFragment, dotVertex, surfaceFragment, surfaceVertex } from "./shaders.ts";
+import { dotFragment, dotVertex, screenVertex, surfaceFragment, surfaceVertex } from "./shaders.ts";
 import { sigmaColor, sigmaPosition } from "./sigma_scale.ts";
 import { thinned, toSurface, triangulate, type Surface } from "./surface.ts";
 
@@ -56,10 +56,10 @@ export class Stage {
   readonly #surfaceMaterial = new ShaderMaterial({
     vertexShader: surfaceVertex, fragmentShader: surfaceFragment, side: DoubleSide,
     transparent: true, premultipliedAlpha: true,
-    uniforms: { ...this.#sigma, behind: { value: 0 } },
+    uniforms: this.#sigma,
   });
   readonly #screenMaterial = new ShaderMaterial({
-    vertexShader: surfaceVertex, fragmentShader: "void main() {}", side: DoubleSide,
+    vertexShader: screenVertex, fragmentShader: "void main() {}", side: DoubleSide,
     colorWrite: false, uniforms: { behind: { value: BEHIND_MM } },
   });
   readonly #dotMaterial = dotMaterial(this.#sigma, this.#focal, 1);
@@ -92,6 +92,13 @@ export class Stage {
     this.#sigma.sigmaCodes.value.set(sigmaPosition(low), sigmaPosition(high));
   }
 
+  /** Leaves nothing on the canvas. */
+  wipe(): void {
+    this.renderer.setScissorTest(false);
+    this.renderer.setClearColor(0, 0);
+    this.renderer.clear();
+  }
+
   /**
    * Draws.
    *
@@ -100,9 +107,7 @@ export class Stage {
    */
   draw(shown: Shown): number | null {
     const { renderer } = this;
-    renderer.setScissorTest(false);
-    renderer.setClearColor(0, 0);
-    renderer.clear();
+    this.wipe();
     if (!this.#loaded) return null;
     this.#look(shown.view, this.#loaded.surface);
     this.#sigma.confidence.value = shown.confidence;

@@ -25,6 +25,9 @@ const MAX_RATIO = 2;
 /** In software: while moving, and when still. */
 const SOFTWARE_RATIO = 1;
 const SOFTWARE_STILL_RATIO = 1.5;
+/** Least time from picture to picture of what turns by itself in software, ms: the processor has other
+ * work. */
+const SOFTWARE_FRAME_MS = 45;
 /** After so long without movement the whole face is drawn, ms. */
 const STILL_MS = 160;
 /** Longest time by which a movement goes on at once, s: after a pause nothing jumps. */
@@ -132,6 +135,14 @@ export class FaceViewer {
     return done && this.#face === face;
   }
 
+  /** Shows nothing, and forgets the face. */
+  clear(): void {
+    this.#face = null;
+    this.#stage?.load(null);
+    this.#stage?.wipe();
+    this.#flat?.clearRect(0, 0, this.#canvas.width, this.#canvas.height);
+  }
+
   /** Turns by degrees: `dx` to the right, `dy` down. */
   rotate(dx: number, dy: number): void {
     this.#pose.rotate(dx, dy);
@@ -205,8 +216,12 @@ export class FaceViewer {
 
   #next(now: number): void {
     this.#frame = 0;
-    clearTimeout(this.#settle);
     const elapsed = this.#last ? now - this.#last : 0;
+    if (elapsed && elapsed < SOFTWARE_FRAME_MS && this.turning && this.#graphics?.software) {
+      this.#request();
+      return;
+    }
+    clearTimeout(this.#settle);
     if (elapsed) this.#detail.took(elapsed);
     const seconds = Math.min(MAX_STEP_S, (elapsed || 16) / 1000);
     const moving = this.#pose.step(seconds);
