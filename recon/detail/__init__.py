@@ -1,5 +1,7 @@
 """Detail that the broad fit smooths away: local averages, rim, holes, symmetry, shading."""
 
 from denseface.recon.detail._detail import add_detail
+from denseface.recon.detail._mirror_kernels import HeightField
+from denseface.recon.detail._mirror_plane import MirrorPlane, find_plane
 
-__all__ = ["add_detail"]
+__all__ = ["HeightField", "MirrorPlane", "add_detail", "find_plane"]

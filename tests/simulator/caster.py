@@ -25,7 +25,7 @@ class Caster:
     def cast(
         self, origin: NDArray[np.floating], directions: NDArray[np.floating]
     ) -> tuple[Floats, NDArray[np.int32], NDArray[np.int64], Floats]:
-        """Cast rays from one point, (3,) mm, along (n, 3) directions.
+        """Cast rays from one point, (3,) mm, or one for each, (n, 3), along (n, 3) directions.
 
         Returns
         -------

@@ -14,6 +14,7 @@ from tests.simulator.clip import clip_below
 from tests.simulator.deformed import Deformed, displacement
 from tests.simulator.landmarks import SCANS, Landmarks
 from tests.simulator.surface import Surface
+from tests.simulator.varied import MODEL, identity, stretch
 
 __all__ = ["Head", "head_names", "load_head", "shared_folder"]
 
@@ -49,7 +50,10 @@ def head_names() -> list[str]:
 
 @lru_cache(maxsize=16)
 def load_head(name: str) -> Head:
-    """Load a head by its name, `NAME+KIND` for one of whose sides is deformed (`Deformed`).
+    """Load a head by its name.
+
+    `NAME+KIND` for one of whose sides is deformed (`Deformed`), `NAME~SEED` for one of other
+    proportions (`varied`).
 
     Raises
     ------
@@ -61,12 +65,10 @@ def load_head(name: str) -> Head:
         head = load_head(name)
         moved = displacement(Deformed(kind), head.vertices, head.normals, head.landmarks)
         return replace(head, vertices=head.vertices + moved, name=f"{name}+{kind}")
+    name, _, seed = name.partition("~")
     if name not in head_names():
         raise ValueError(f"head {name!r} is not at hand, expected one of {head_names()}")
-    if name == "procedural":
-        surface, landmarks = procedural.build(), procedural.LANDMARKS
-    else:
-        surface, landmarks = _scan(name), SCANS[name]
+    surface, landmarks = _built(name, int(seed) if seed else None)
     origin = np.array(landmarks.origin, np.float32)
     return Head(
         vertices=surface.vertices - origin, faces=surface.faces, colors=surface.colors,
@@ -75,24 +77,39 @@ def load_head(name: str) -> Head:
     )
 
 
-def _scan(name: str) -> Surface:
-    folder = (shared_folder() or Path()) / "faces"
+def _built(name: str, seed: int | None) -> tuple[Surface, Landmarks]:
+    """Build a head in its mesh's own frame, of other proportions where there is a seed."""
+    if name != "procedural":
+        return _scan(name, seed)
+    surface, marks = procedural.build(), procedural.LANDMARKS
+    if seed is None:
+        return surface, marks
+    vertices, marks = stretch(surface.vertices, marks, seed)
+    return replace(surface, vertices=vertices), marks
+
+
+def _scan(name: str, seed: int | None) -> tuple[Surface, Landmarks]:
+    folder, marks = (shared_folder() or Path()) / "faces", SCANS[name]
     with np.load(folder / f"{name}.npz", allow_pickle=False) as data:
         vertices, faces = data["V"], data["F"]
         colors = (np.ascontiguousarray(data["C"][:, ::-1]) if "C" in data
                   else np.zeros(vertices.shape, np.uint8))
         uv = data["T"][data["FT"]]
+    if seed is not None and name == "ict_neutral" and (folder / MODEL).is_file():
+        vertices, marks = identity(vertices, marks, seed, folder)
+    elif seed is not None:
+        vertices, marks = stretch(vertices, marks, seed)
     picture = folder / f"{name}.jpg"
     if not picture.is_file():
         uv, texture = None, None
-        colors = _made_up(vertices, colors, SCANS[name])
+        colors = _made_up(vertices, colors, marks)
     else:
         uv = np.stack([uv[..., 0], 1 - uv[..., 1]], axis=-1)
         texture = _picture(picture)
     plain = colors[faces].any(axis=2).all(axis=1)
     surface = Surface(vertices=vertices, faces=faces, colors=colors, uv=uv, texture=texture,
                       plain=plain)
-    return clip_below(surface, SCANS[name].neck[1])
+    return clip_below(surface, marks.neck[1]), marks
 
 
 def _picture(path: Path) -> NDArray[np.uint8]:
