@@ -17,6 +17,7 @@ from denseface.service.client import AsyncClient
 from denseface.service.kiosk.conductor.conductor import Conductor, ConductorOptions
 from denseface.service.kiosk.conductor.hub_watch import watch_hub
 from denseface.service.kiosk.conductor.kept_withdrawals import KeptWithdrawals
+from denseface.service.kiosk.conductor.measuring import prepare
 from denseface.service.kiosk.consent_text import load_consent_text
 from denseface.service.kiosk.page_messages import Hello
 from denseface.service.kiosk.settings import KioskSettings
@@ -76,8 +77,10 @@ async def _run(service: ServiceSettings, settings: KioskSettings, options: Visit
     with closing(AsyncClient(service.address, key=service.key, hub_key=service.hub_key)) as hub:
         conductor = Conductor(
             Kiosk(options, new_id=lambda: secrets.token_hex(16), utc=_utc), hub, kept,
-            ConductorOptions(hello, settings.sensor))
+            ConductorOptions(hello, settings.sensor, settings.measurements))
         conductor.start()
+        if settings.measurements:
+            await asyncio.to_thread(prepare)
         working: list[asyncio.Future[Any]] = [asyncio.create_task(work) for work in (
             _beat(supervisor),
             watch_hub(hub, settings.sensor, service.reserve_mib * 2**20, conductor.service_is),

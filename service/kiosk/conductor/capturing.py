@@ -15,7 +15,9 @@ from denseface.service.errors import (
     UnknownCaptureError,
 )
 from denseface.service.export.face_grid import encode_face_grid
+from denseface.service.kiosk.conductor.measuring import measurements_of
 from denseface.service.kiosk.conductor.ports import Hub
+from denseface.service.kiosk.page_messages import Measurement
 from denseface.service.kiosk.visit.effects import TakePicture
 from denseface.service.kiosk.visit.events import (
     CaptureRefused,
@@ -41,22 +43,26 @@ class ShownFace:
     ----------
     face : as the hub gave it
     grid : the same for a browser
+    measured : lengths on it; None where they are not asked for
     exposed_s : middle of its frame's exposure, monotonic clock, seconds
     """
 
-    def __init__(self, face: Face, grid: bytes, exposed_s: float) -> None:
-        self.face, self.grid, self.exposed_s = face, grid, exposed_s
+    def __init__(self, face: Face, grid: bytes, exposed_s: float,
+                 measured: tuple[Measurement, ...] | None = None) -> None:
+        self.face, self.grid, self.exposed_s, self.measured = face, grid, exposed_s, measured
 
 
 async def take_picture(
     hub: Hub, sensor: str | None, effect: TakePicture, happened: Callable[[Event], None],
-    withdraw: Callable[[str], None], clock: Callable[[], float] = time.monotonic,
+    withdraw: Callable[[str], None], clock: Callable[[], float] = time.monotonic, *,
+    measured: bool = False,
 ) -> ShownFace | None:
     """Press and wait for the face; what else comes of it is said by `happened`.
 
     Parameters
     ----------
     withdraw : removes a capture of which nobody knows whether there is one
+    measured : whether lengths on the face are wanted
     """
     visit, capture_id = effect.visit, effect.capture_id
     pressed_s = clock()
@@ -77,10 +83,12 @@ async def take_picture(
         face = await hub.get(capture_id, timeout=_FACE_S)
         # Its five milliseconds are nobody's: the loop serves the mirror meanwhile.
         grid = await asyncio.to_thread(encode_face_grid, face)
+        lengths = await asyncio.to_thread(measurements_of, face) if measured else None
     except (ServiceError, ValueError) as error:
         happened(FaceFailed(visit, capture_id, _name(error)))
         return None
-    return ShownFace(face, grid, pressed_s + (face.report.exposed_after_press_ms or 0.0) / 1e3)
+    exposed_s = pressed_s + (face.report.exposed_after_press_ms or 0.0) / 1e3
+    return ShownFace(face, grid, exposed_s, lengths)
 
 
 def _name(error: Exception) -> str:

@@ -72,6 +72,8 @@ class ConductorOptions:
     hello: Hello
     sensor: str | None = None
     """The one above the screen."""
+    measurements: bool = False
+    """Whether lengths on the face are shown."""
 
 
 class Conductor:
@@ -205,7 +207,8 @@ class Conductor:
 
     async def _take(self, effect: TakePicture) -> None:
         shown = await take_picture(
-            self._hub, self._options.sensor, effect, self._happened, self._withdraw, self._clock)
+            self._hub, self._options.sensor, effect, self._happened, self._withdraw, self._clock,
+            measured=self._options.measurements)
         if shown is None:
             return
         now = self._clock()
@@ -221,7 +224,7 @@ class Conductor:
     def _result(self, effect: TakePicture, shown: ShownFace) -> ResultScreen:
         return ResultScreen(
             capture_id=effect.capture_id, initial_points=len(shown.face.initial),
-            dense_points=len(shown.face.dense),
+            dense_points=len(shown.face.dense), measurements=shown.measured,
             can_keep=self._links is not None and self._links.reachable)
 
     async def _make_links(self, effect: MakeLinks) -> None:
