@@ -77,9 +77,9 @@ class Client(Closing, BaseClient):
         capture_id : letters, digits, `-`, `_`, at most 64; pressing an id again is the same
             capture; where None, a new one
         sensor : its name, as `status` has it; where None, the one that is best off
-        gate : `off`, or what becomes of a frame that is not good enough: `refuse` the press, or
-            `wait` for a good one
-        gate_timeout : longest wait for a good one, seconds, at most 120; `timeout` comes to it
+        gate : `off`, or what becomes of a frame that is not good enough: `refuse` the press,
+            `wait` for a good one, or take the `best` of some time
+        gate_timeout : that time, or the longest wait, seconds, at most 120; `timeout` comes to it
         frames : consecutive frames that are made into one, at most 32
         consent : what the person agreed to; the hub keeps it with the capture and says it in the
             face's report. Where it names a time, all of the capture is removed after that, however

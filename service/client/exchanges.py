@@ -100,7 +100,7 @@ class Exchanges:
             raise errors.LocalProtocolError(
                 _BAD_ID.format(chosen)
                 if field == "capture_id" else f"{field}: {why}") from error
-        patience = timeout + (gate_timeout if gate == "wait" else 0.0)
+        patience = timeout + (gate_timeout if gate in {"wait", "best"} else 0.0)
         answer = (yield from send_request(message, patience)).message
         if isinstance(answer, messages.PressRefused):
             hint = answer.hint

@@ -15,9 +15,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sensor", metavar="NAME",
                         help="take the frame of this one; `denseface status` names them "
                              "(default: the one that is best off)")
-    parser.add_argument("--gate", choices=("off", "wait", "refuse"), default="off",
-                        help="wait for a frame that is good enough, or refuse one that is not "
-                             "(default: off)")
+    parser.add_argument("--gate", choices=("off", "wait", "refuse", "best"), default="off",
+                        help="wait for a frame that is good enough, refuse one that is not, or "
+                             "take the best of --gate-timeout seconds (default: off)")
     parser.add_argument("--gate-timeout", type=_options.seconds, default=10.0, metavar="S",
                         help="longest wait for a good frame, seconds (default: 10)")
     parser.add_argument("--frames", type=_options.count, default=1, metavar="N",

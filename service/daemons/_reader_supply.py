@@ -45,6 +45,8 @@ class _Press:
     """Of so many one is made, the first of which the gate judges."""
     waited: bool = False
     """Whether a frame was not good enough for it."""
+    kept: RgbdFrame | None = None
+    """The best so far, where it takes the best."""
 
 
 class ReaderSupply(Supply):
@@ -139,9 +141,13 @@ class ReaderSupply(Supply):
                     else press.gate.decide(judged, time.monotonic()))
         if decision is Decision.TAKE:
             yield Taken(press.capture_id, frame)
+        elif decision is Decision.TAKE_KEPT and press.kept is not None:
+            yield Taken(press.capture_id, press.kept)
         elif judged is not None and decision is Decision.REFUSE:
             yield NotTaken(press.capture_id, judged.refusal, judged.hint)
         else:
+            if decision is Decision.KEEP:
+                press.kept = frame
             press.waited = True
             self._presses.append(press)
 

@@ -60,6 +60,8 @@ class _Waiting:
     press: GatedPress
     next_s: float
     """Its next frame is exposed then at the earliest, monotonic clock."""
+    kept: Shot | None = None
+    """The best so far, where it takes the best."""
 
 
 class LiveGate:
@@ -158,12 +160,16 @@ class LiveGate:
             if shot.earliest_s < waiting.next_s:
                 continue  # judged for hints, and older than the press
             decision = waiting.press.decide(judged, now)
-            if decision is Decision.WAIT:
+            if decision is Decision.KEEP:
+                waiting.kept = shot
+            if decision in {Decision.WAIT, Decision.KEEP}:
                 waiting.next_s = math.nextafter(shot.earliest_s, math.inf)
                 continue
             del self._waiting[capture_id]
             if decision is Decision.TAKE:
                 yield Passed(capture_id, shot)
+            elif decision is Decision.TAKE_KEPT and waiting.kept is not None:
+                yield Passed(capture_id, waiting.kept)
             else:
                 yield NotPassed(capture_id, judged)
 

@@ -147,7 +147,7 @@ class Presses:
             return
         self._captures.advance(capture_id, CaptureEvent.PRESSED)
         self._log.info("pressed", capture_id=capture_id, sensor=sensor.name, key=key or LOCAL)
-        waits = message.gate == "wait"
+        waits = message.gate in {"wait", "best"}
         patience_s = self._settings.take_timeout_s + (message.gate_timeout if waits else 0.0)
         self._presses[capture_id] = _Press(
             sensor.peer, now + patience_s, patience_s, waits, key, message.consent,

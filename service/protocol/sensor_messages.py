@@ -18,10 +18,11 @@ from denseface.service.protocol.payload import FrameHeader, PreviewHeader
 
 DEFAULT_GATE_S = 10.0
 """How long a gated press waits for a frame that is good enough, unless it says so, seconds."""
-Gate = Literal["off", "wait", "refuse"]
-"""Whether the frame has to be good enough: no; wait for one that is; refuse the press if not."""
+Gate = Literal["off", "wait", "refuse", "best"]
+"""Whether the frame has to be good enough: no; wait for one that is; refuse the press if not; take
+the best one of a while, whatever is wrong with it."""
 GateSeconds = Annotated[float, Field(ge=0, le=120)]
-"""How long a press with the gate `wait` waits for a good frame."""
+"""How long a press with the gate `wait` or `best` waits for a good frame."""
 BurstFrames = Annotated[int, Field(ge=1, le=MAX_BURST)]
 """How many consecutive frames are made into one."""
 LiveStateName = Literal[

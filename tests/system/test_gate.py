@@ -69,7 +69,8 @@ def test_nobody_is_hinted_at_and_refused(tmp_path):
             hint = next(hints)
         assert (hint.codes, hint.text, hint.ok) == (("nobody",), STEP_IN, False)
         assert hint.measures["faces"] == 0
-        for arguments in ({"gate": "refuse"}, {"gate": "wait", "gate_timeout": 0.5}):
+        for arguments in ({"gate": "refuse"}, {"gate": "wait", "gate_timeout": 0.5},
+                          {"gate": "best", "gate_timeout": 0.3}):
             refused = refusal(client, **arguments)
             assert refused.reason == "quality"
             assert STEP_IN in str(refused)
@@ -95,6 +96,12 @@ def test_of_a_live_sensor_a_good_frame_is_taken_and_pictures_carry_their_hints(c
         for index in range(2):
             # Of two seconds one is good.
             capture = client.press(f"p{index}", timeout=LIMIT_S, gate="wait", gate_timeout=LIMIT_S)
+            report = client.get(capture).report
+            assert report.face_box[2] > 100
+            assert report.exposed_after_press_ms >= 0
+        # Half of the window at least shows somebody; none of it is from before the press.
+        for index in range(2):
+            capture = client.press(f"b{index}", timeout=LIMIT_S, gate="best", gate_timeout=1.5)
             report = client.get(capture).report
             assert report.face_box[2] > 100
             assert report.exposed_after_press_ms >= 0

@@ -11,12 +11,13 @@ from denseface.service.daemons._live_supply import LiveSupply
 from denseface.service.daemons._reader_supply import ReaderSupply
 from denseface.service.daemons._supply import Hinted, NotTaken, Picture, Taken
 from denseface.service.gate.faults import Fault
-from denseface.service.gate.hinting import Judged
+from denseface.service.gate.hinting import Hinting, Judged
 from denseface.service.gate.live import NotPassed, Passed
 from denseface.service.protocol.hint import Hint
 from denseface.service.protocol.messages import Take
 from tests.unit.service.daemons.test_capture import Driver, FakeReader
 from tests.unit.service.daemons.test_live_supply import FakeSensor
+from tests.unit.service.gate.test_judging import seen
 from tests.waiting import until
 
 HINT = Hint(timestamp_us=7, codes=("nobody",), text="step in front of the camera")
@@ -240,6 +241,22 @@ def test_who_waits_for_a_recording_gives_up(recording):
     press(recording, gate_timeout=0)
     outcomes(recording)
     assert ended(recording) == [NotTaken("a", "step in front of the camera", HINT)]
+
+
+def test_of_a_recording_the_best_frame_is_taken(recording, monkeypatch):
+    clock = [100.0]
+    monkeypatch.setattr(_reader_supply.time, "monotonic", lambda: clock[0])
+    says = deque(Hinting().judge(seen(motion_mm=moved), 0.0) for moved in (9.0, 5.0, 8.0, 7.0))
+    judged = []
+    recording._judge.judge = lambda frame: judged.append(frame) or says.popleft()
+    press(recording, gate="best", gate_timeout=1)
+    outcomes(recording)
+    taken = []
+    while not taken:
+        clock[0] += 0.3
+        taken = ended(recording)
+    assert taken[0].frame is judged[1]
+    assert len(judged) == 4
 
 
 def test_a_press_without_a_gate_goes_before_one_that_waits_for_a_recording(recording):

@@ -40,6 +40,8 @@ class Gate:
         self.sensor = Sensor()
         self.measured = []
         self.good_from = good_from
+        self.motion_mm = {}
+        """By the frame's number, where it is not still."""
         monkeypatch.setattr(frame_judge, "measure", self.measure)
         self.spent_s = self.costs_s = 0.0
         self.gate = LiveGate(self.sensor, lambda: None, clock=lambda: self.sensor.now,
@@ -52,7 +54,8 @@ class Gate:
         assert at_us == round(self.sensor.shots[number].earliest_s * 1e6)
         if number < self.good_from:
             return Quality(number, somebody=False)
-        face = replace(GOOD, motion_mm=None if previous is None else 0.4)
+        face = replace(GOOD, motion_mm=self.motion_mm.get(
+            number, None if previous is None else 0.4))
         return Quality(number, somebody=True, faces=1, face=face)
 
     def run(self, seconds):
@@ -185,6 +188,38 @@ def test_a_frame_from_before_the_press_is_not_the_presss(monkeypatch):
     passed, = (one for one in made.run(0.3) if isinstance(one, Passed))
     assert passed.shot.earliest_s >= pressed
     made.gate.close()
+
+
+def best_of(made, seconds, motion_mm):
+    """Press for the best frame after a second of hints; the motion of each frame from then on."""
+    made.gate.send_hints(10.0)
+    made.run(1.0)
+    first = next(shot.number for shot in made.sensor.shots
+                 if shot.earliest_s >= made.sensor.now)
+    made.motion_mm = {first - 1: 0.0} | {
+        first + index: moved for index, moved in enumerate(motion_mm)}
+    made.gate.press(take("best", seconds))
+    passed, = (one for one in made.run(2.0) if isinstance(one, Passed))
+    made.gate.close()
+    return passed.shot.number - first
+
+
+def test_the_best_frame_of_the_time_is_taken_and_none_from_before_the_press(monkeypatch):
+    made = Gate(monkeypatch, good_from=0)
+    assert best_of(made, 0.3, [9.0, 7.0, 5.0, 3.0, 4.0, *[8.0] * 20]) == 3
+
+
+def test_a_frame_that_is_surely_good_ends_the_time(monkeypatch):
+    made = Gate(monkeypatch, good_from=0)
+    assert best_of(made, 1.0, [9.0, 3.0, 0.5, 0.1, *[8.0] * 30]) == 2
+
+
+def test_the_best_frame_of_nobody_is_none(gate):
+    gate.gate.press(take("best", 0.3))
+    assert gate.run(0.45) == []
+    refused, = gate.run(0.2)
+    assert isinstance(refused, NotPassed)
+    assert refused.judged.refusal == "step in front of the camera"
 
 
 def test_a_press_that_is_withdrawn_gets_nothing(gate):
