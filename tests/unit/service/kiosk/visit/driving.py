@@ -30,6 +30,8 @@ class Driven:
                            utc=lambda: "2026-11-29T12:00:00+00:00")
         self.now_s = 100.0
         self.asked = []
+        self.check = lambda _: None
+        """Called with each effect when it is given out."""
         self.service(None, retention_s)
 
     # --- what is shown
@@ -98,7 +100,9 @@ class Driven:
             capture_id=last, can_keep=can_keep), **of)
 
     def _take(self, effects):
-        self.asked += effects
+        for effect in effects:
+            self.asked.append(effect)
+            self.check(effect)
         return effects
 
     # --- to where a test begins
