@@ -9,7 +9,7 @@ from denseface.service.client.events import (
     PublishedHint,
     PublishedPreview,
 )
-from denseface.service.client.operator import Operator
+from denseface.service.client.operator import AsyncOperator, Operator
 
-__all__ = ["AsyncClient", "Client", "Operator", "Published", "PublishedFace", "PublishedFailure",
-           "PublishedHint", "PublishedPreview"]
+__all__ = ["AsyncClient", "AsyncOperator", "Client", "Operator", "Published", "PublishedFace",
+           "PublishedFailure", "PublishedHint", "PublishedPreview"]

@@ -1,29 +1,33 @@
-"""What an operator asks of the hub: dead letters, removal. Needs the role `operator`."""
+"""What an operator asks of the hub: captures, dead letters, removal. Needs the role `operator`."""
 
-import time
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 from datetime import datetime
+from pathlib import Path
 
+from denseface.service.client._operator_exchanges import OperatorExchanges
+from denseface.service.client.aio import AsyncClient
 from denseface.service.client.blocking import Client
-from denseface.service.client.exchanges import expect
-from denseface.service.errors import UnknownCaptureError
-from denseface.service.protocol import messages
-from denseface.service.protocol.message_base import BaseMessage, DeadLetter
+from denseface.service.protocol.message_base import CaptureSummary, DeadLetter
 
 
 class Operator(Client):
-    """A `Client` that may also remove."""
+    """A `Client` that may also list, remove and restart."""
+
+    def __init__(
+        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None
+    ) -> None:
+        super().__init__(address, key=key, hub_key=hub_key)
+        self._asks = OperatorExchanges(self._exchanges)
+
+    def captures(self, last: int = 20, *, timeout: float = 5.0) -> tuple[CaptureSummary, ...]:
+        """List the captures that were accepted last, the newest first; at most 50."""
+        return self._run(self._asks.captures(last, timeout))
 
     def dead(self, *, timeout: float = 5.0) -> Iterator[DeadLetter]:
         """List the captures that were given up and are kept, by sequence number."""
         after = 0
-        while True:
-            answer = self._send_request(messages.ListDead(
-                request=self._exchanges.next_number(), after=after), timeout).message
-            letters = expect(answer, messages.DeadLetters).letters
+        while letters := self._run(self._asks.dead(after, timeout)):
             yield from letters
-            if not letters:
-                return
             after = letters[-1].sequence
 
     def retry(self, capture_id: str, *, timeout: float = 5.0) -> None:
@@ -36,15 +40,11 @@ class Operator(Client):
         RequestFailedError
             It is no dead letter, or its frame is damaged.
         """
-        answer = self._request_known(messages.RetryDead(
-            request=self._exchanges.next_number(), capture_id=capture_id), timeout)
-        expect(answer, messages.CapturePending)
+        self._run(self._asks.retry(capture_id, timeout))
 
     def drop(self, capture_id: str, *, timeout: float = 5.0) -> None:
         """Remove a capture that was given up; raises as `retry`."""
-        answer = self._request_known(messages.DropDead(
-            request=self._exchanges.next_number(), capture_id=capture_id), timeout)
-        expect(answer, messages.Removed)
+        self._run(self._asks.drop(capture_id, timeout))
 
     def purge(
         self, *, capture_id: str | None = None, before: datetime | None = None,
@@ -63,23 +63,60 @@ class Operator(Client):
         RequestFailedError
             The disk refuses, or another program has the hub's database open.
         """
-        removed, until = 0, time.monotonic() + timeout
-        while True:
-            answer = expect(self._send_request(messages.Purge(
-                request=self._exchanges.next_number(), capture_id=capture_id, before=before,
-                everything=everything), timeout).message, messages.Removed)
-            removed += answer.removed
-            if not answer.left:
-                return removed
-            if answer.removed:
-                until = time.monotonic() + timeout
-            elif time.monotonic() > until:  # what was withdrawn before is being erased
-                raise self._no_answer(timeout)
+        return self._run(self._asks.purge(capture_id, before, everything, timeout))
 
-    def _request_known(
-        self, message: messages.RetryDead | messages.DropDead, timeout: float
-    ) -> BaseMessage:
-        answer = self._send_request(message, timeout).message
-        if isinstance(answer, messages.CaptureUnknown):
-            raise UnknownCaptureError(f"capture {message.capture_id}: the hub has no such capture")
-        return answer
+    def restart_sensor(self, name: str, *, timeout: float = 5.0) -> None:
+        """Have the capture process of a sensor begin anew, with its driver.
+
+        Its presses are refused. `denseface up` starts the process again; one that runs alone opens
+        its source again.
+
+        Raises
+        ------
+        RequestFailedError
+            No sensor of this name is connected.
+        """
+        self._run(self._asks.restart_sensor(name, timeout))
+
+
+class AsyncOperator(AsyncClient):
+    """The calls of `Operator` for asyncio."""
+
+    def __init__(
+        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None
+    ) -> None:
+        super().__init__(address, key=key, hub_key=hub_key)
+        self._asks = OperatorExchanges(self._exchanges)
+
+    async def captures(
+        self, last: int = 20, *, timeout: float = 5.0
+    ) -> tuple[CaptureSummary, ...]:
+        """List the captures that were accepted last; see `Operator.captures`."""
+        return await self._run(self._asks.captures(last, timeout))
+
+    async def dead(self, *, timeout: float = 5.0) -> AsyncIterator[DeadLetter]:
+        """List the captures that were given up; see `Operator.dead`."""
+        after = 0
+        while letters := await self._run(self._asks.dead(after, timeout)):
+            for one in letters:
+                yield one
+            after = letters[-1].sequence
+
+    async def retry(self, capture_id: str, *, timeout: float = 5.0) -> None:
+        """Try a capture that was given up again; see `Operator.retry`."""
+        await self._run(self._asks.retry(capture_id, timeout))
+
+    async def drop(self, capture_id: str, *, timeout: float = 5.0) -> None:
+        """Remove a capture that was given up; see `Operator.drop`."""
+        await self._run(self._asks.drop(capture_id, timeout))
+
+    async def purge(
+        self, *, capture_id: str | None = None, before: datetime | None = None,
+        everything: bool = False, timeout: float = 30.0,
+    ) -> int:
+        """Remove captures; see `Operator.purge`."""
+        return await self._run(self._asks.purge(capture_id, before, everything, timeout))
+
+    async def restart_sensor(self, name: str, *, timeout: float = 5.0) -> None:
+        """Have a capture process begin anew; see `Operator.restart_sensor`."""
+        await self._run(self._asks.restart_sensor(name, timeout))

@@ -60,15 +60,19 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None,
     """
     cv2.setNumThreads(1)
     share_heaps()
+    supervisor = supervisor or SupervisorLink()
     with StopSignal() as stop:
-        with _supply(settings, uri, calibration, rotation) as supply:
-            try:
-                with HubConnection(settings, "capture", supervisor) as connection:
-                    _Capture(settings, connection, supply, uri, name).serve(stop)
-            finally:
-                if not supply.close():
-                    _log.error("the driver hangs", source=uri, reason="it does not close")
-                    exit_now(stop.exit_status if stop else 1)
+        while not stop:
+            with _supply(settings, uri, calibration, rotation) as supply:
+                try:
+                    with HubConnection(settings, "capture", supervisor) as connection:
+                        _Capture(settings, connection, supply, uri, name).serve(stop)
+                finally:
+                    if not supply.close():
+                        _log.error("the driver hangs", source=uri, reason="it does not close")
+                        exit_now(stop.exit_status if stop else 1)
+            if supervisor.supervised:  # told to restart, it is started anew with its driver
+                break
         return stop.exit_status
 
 
@@ -106,9 +110,12 @@ class _Capture:
         self.sender = FrameSender(self.connection, self.settings.resend_s)
 
     def serve(self, stop: StopSignal) -> None:
-        """Do so until `stop`."""
+        """Do so until `stop`, or until told to begin anew."""
         for packet in self.connection.packets(stop, self.supply.wake, lambda: None):
             if packet is not None:
+                if isinstance(packet.message, messages.Restart):
+                    _log.warning("told to begin anew", source=self.uri)
+                    return
                 self._receive(packet)
             if reason := self.supply.hangs():
                 _log.error("another process is needed", source=self.uri, reason=reason)

@@ -20,7 +20,7 @@ from denseface.service.hub.outcomes import Outcomes
 from denseface.service.hub.peers import Peers, WorkerPeer
 from denseface.service.hub.presses import Presses
 from denseface.service.hub.previews import Hints, Previews
-from denseface.service.hub.sensors import SensorPeer
+from denseface.service.hub.sensors import SensorPeer, names_of
 from denseface.service.hub.status_report import StatusReport
 from denseface.service.monitoring import Figures, Rejections
 from denseface.service.protocol import messages
@@ -245,6 +245,10 @@ class Hub:
                 yield from self._outcomes.get_next(peer, message)
             case messages.FindStart() as message:
                 yield from self._outcomes.find_start(peer, message)
+            case messages.ListCaptures() as message:
+                yield send(peer, self._list(message))
+            case messages.RestartSensor() as message:
+                yield from self._restart(peer, message)
             case messages.ListDead() | messages.RetryDead() | messages.DropDead() as message:
                 yield from self._maintenance.receive(peer, message)
             case messages.Purge() as message:
@@ -296,6 +300,25 @@ class Hub:
         self._log.info("withdrawn" if owned else "withdrawal of another key's capture ignored",
                        capture_id=capture_id, key=key or LOCAL)
         yield from self._maintenance.withdraw(peer, message, key, owned=owned)
+
+    def _list(self, message: messages.ListCaptures) -> messages.CaptureList:
+        """List captures with the states that they have now, which rows do not say of all."""
+        return messages.CaptureList(request=message.request, captures=tuple(
+            one.model_copy(update={"state": str(self._captures.state(one.capture_id))})
+            for one in self._store.last_accepted(message.last)))
+
+    def _restart(self, peer: bytes, message: messages.RestartSensor) -> Iterator[Output]:
+        """Tell the sensors of a name to begin anew: of two with one, one is mostly dead already."""
+        named = [one.peer for one in self._peers.sensors.values() if one.name == message.sensor]
+        if not named:
+            there = names_of(self._peers.sensors.values())
+            raise errors.ServiceError(
+                f"no sensor {message.sensor} is connected; there: {there}")
+        self._log.info("sensor to be restarted", name=message.sensor)
+        for one in named:
+            yield send(one, messages.Restart())
+        yield send(peer, messages.SensorRestarting(
+            request=message.request, sensor=message.sensor))
 
     def _end_writes(self, now: float) -> Iterator[Output]:
         """Wait for what is being written: no file of what is removed next appears afterwards."""

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, FailFast, Field
 
+from denseface.recon.face import Consent
 from denseface.service.protocol.payload import Payload
 
 CaptureId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
@@ -79,6 +80,27 @@ class BaseAnswer(FromHub):
 
     request: Number = 0
     """The request answered; 0 where nobody asked: a publication."""
+
+
+class CaptureSummary(BaseModel):
+    """What a row says of a capture; its face, or its frame, says the rest."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    capture_id: CaptureId
+    state: Name
+    """A `CaptureState`."""
+    accepted_at: Name
+    """UTC, ISO 8601, as are all times here."""
+    attempts: Number
+    finished_at: Name | None = None
+    """None where it has no outcome; so is what follows."""
+    sequence: Number | None = None
+    error: Name | None = None
+    """None where there is a face."""
+    message: Annotated[str, Field(max_length=300)] | None = None
+    """Its first characters."""
+    consent: Consent | None = None
 
 
 class DeadLetter(BaseModel):

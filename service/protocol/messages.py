@@ -17,6 +17,7 @@ from denseface.service.protocol.message_base import (
     BaseMessage,
     BaseRequest,
     CaptureId,
+    CaptureSummary,
     DeadLetter,
     Digest,
     FromHub,
@@ -43,6 +44,7 @@ from denseface.service.protocol.sensor_messages import FrameFailed as FrameFaile
 from denseface.service.protocol.sensor_messages import FrameRefused as FrameRefused
 from denseface.service.protocol.sensor_messages import PreviewFrame as PreviewFrame
 from denseface.service.protocol.sensor_messages import QualityHint as QualityHint
+from denseface.service.protocol.sensor_messages import Restart as Restart
 from denseface.service.protocol.sensor_messages import SensorReady as SensorReady
 from denseface.service.protocol.sensor_messages import SensorState as SensorState
 from denseface.service.protocol.sensor_messages import Take as Take
@@ -248,6 +250,20 @@ class DropDead(BaseRequest):
     capture_id: CaptureId
 
 
+class ListCaptures(BaseRequest):
+    """Give the captures that were accepted last."""
+
+    kind: Literal["list_captures"] = "list_captures"
+    last: Annotated[int, Field(ge=1, le=50)] = 20
+
+
+class RestartSensor(BaseRequest):
+    """Have a capture process begin anew."""
+
+    kind: Literal["restart_sensor"] = "restart_sensor"
+    sensor: PeerName
+
+
 class Purge(BaseRequest):
     """Remove captures, whatever became of them; repeat while some are left."""
 
@@ -271,6 +287,20 @@ class DeadLetters(BaseAnswer):
     kind: Literal["dead_letters"] = "dead_letters"
     letters: Annotated[tuple[DeadLetter, ...], Field(max_length=50), FailFast()]
     """None where there are no more."""
+
+
+class CaptureList(BaseAnswer):
+    """The answer to `ListCaptures`: the newest first, no frames and no faces."""
+
+    kind: Literal["capture_list"] = "capture_list"
+    captures: Annotated[tuple[CaptureSummary, ...], Field(max_length=50), FailFast()]
+
+
+class SensorRestarting(BaseAnswer):
+    """The answer to `RestartSensor`: the capture process was told to."""
+
+    kind: Literal["sensor_restarting"] = "sensor_restarting"
+    sensor: PeerName
 
 
 class Removed(BaseAnswer):
@@ -367,10 +397,12 @@ TO_HUB: dict[type[ToHub], frozenset[Role]] = {
     GetNext: frozenset({Role.SUBSCRIBER}),
     FindStart: frozenset({Role.SUBSCRIBER}),
     GetStatus: frozenset(Role),
+    ListCaptures: frozenset({Role.OPERATOR}),
     ListDead: frozenset({Role.OPERATOR}),
     RetryDead: frozenset({Role.OPERATOR}),
     DropDead: frozenset({Role.OPERATOR}),
     Purge: frozenset({Role.OPERATOR}),
+    RestartSensor: frozenset({Role.OPERATOR}),
     SensorReady: frozenset({Role.SENSOR}),
     SensorState: frozenset({Role.SENSOR}),
     QualityHint: frozenset({Role.SENSOR}),
@@ -387,6 +419,7 @@ TO_HUB: dict[type[ToHub], frozenset[Role]] = {
 
 FROM_HUB: tuple[type[FromHub], ...] = (
     PressAccepted, PressRefused, CapturePending, CaptureUnknown, RequestFailed, NothingNewer,
-    StartAt, DeadLetters, Removed, FaceDone, CaptureFailed, Status, Preview, Hints, Announce,
-    Denied, Take, TakePreview, TakeHints, FrameAccepted, FrameRefused, Job)
+    StartAt, DeadLetters, CaptureList, SensorRestarting, Removed, FaceDone, CaptureFailed, Status,
+    Preview, Hints, Announce, Denied, Take, TakePreview, TakeHints, FrameAccepted, FrameRefused,
+    Restart, Job)
 """Every message that the hub sends."""

@@ -135,6 +135,12 @@ class TakeHints(FromHub):
     seconds: Annotated[float, Field(gt=0, le=3600)]
 
 
+class Restart(FromHub):
+    """End and begin anew, or open the source again where nobody would start the process."""
+
+    kind: Literal["restart"] = "restart"
+
+
 class FrameAccepted(FromHub):
     """The frame is safe: the sensor may forget it."""
 

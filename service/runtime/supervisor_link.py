@@ -51,6 +51,11 @@ class SupervisorLink(Closing):
         end.setblocking(False)
         return cls(end)
 
+    @property
+    def supervised(self) -> bool:
+        """Whether somebody starts this process again when it ends."""
+        return self._end is not None
+
     def beat(self, beat: Beat = Beat.IDLE) -> None:
         """Say that this process makes progress: to be called from what must not hang."""
         if self._end is not None:

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from denseface.recon.face import Consent
 from denseface.service.errors import DamagedDatabaseError, StoreError, first_error
-from denseface.service.protocol.message_base import DeadLetter
+from denseface.service.protocol.message_base import CaptureSummary, DeadLetter
 from denseface.service.protocol.states import CaptureState
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.storage._database import MAX_ERROR, MAX_MESSAGE, Database
@@ -17,7 +17,7 @@ from denseface.service.storage._store_clock import StoreClock, format_timestamp
 from denseface.service.storage.records import FaceMetadata, FrameMetadata
 
 _MAX_MESSAGE = 300
-"""Characters of an error in the list of dead letters."""
+"""Characters of an error in a list."""
 
 
 @dataclass(frozen=True)
@@ -194,6 +194,20 @@ class CaptureRows:
             "SELECT coalesce(min(+sequence) - 1, ?) AS number FROM outcomes WHERE finished_at >= ?",
             self.last_sequence(), format_timestamp(since))
         return int(row["number"]) if row else 0
+
+    def last_accepted(self, limit: int) -> list[CaptureSummary]:
+        """List the captures that were accepted last, the newest first."""
+        rows = self._database.select(
+            "SELECT captures.*, sequence, finished_at, error, message, text_version, language,"
+            " retention_s, agreed_at, due_age_s FROM captures"
+            " LEFT JOIN outcomes USING (capture_id) LEFT JOIN consents USING (capture_id)"
+            " WHERE state != ? ORDER BY position DESC LIMIT ?", CaptureState.REMOVED, limit)
+        return [CaptureSummary(
+            capture_id=row["capture_id"], state=row["state"], accepted_at=row["accepted_at"],
+            attempts=row["attempts"], finished_at=row["finished_at"], sequence=row["sequence"],
+            error=row["error"], message=row["message"] and row["message"][:_MAX_MESSAGE],
+            consent=agreed.consent if (agreed := ConsentRow.read(row)) else None)
+            for row in rows]
 
     def dead_letters(self, after: int, limit: int) -> list[DeadLetter]:
         """List dead letters after a sequence number, in order."""

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 
 import pytest
 
-from denseface.service.client import Client
-from denseface.service.errors import PressRefusedError
+from denseface.service.client import Client, Operator
+from denseface.service.errors import PressRefusedError, RequestFailedError
 from tests.system.running import REPOSITORY, hub_alone, service
 from tests.virtual_sensor.control import Call, Control, OpenFault
 from tests.virtual_sensor.process import environment, run_python
@@ -122,7 +122,18 @@ def test_a_driver_that_hangs_when_it_is_opened_ends_the_process(hub, control, tm
     assert "the driver hangs (opening for 10." in (tmp_path / "log").read_text()
 
 
-def test_the_service_brings_back_a_sensor_whose_driver_hung(control, tmp_path):
+def test_a_process_alone_that_is_told_to_restart_opens_its_source_again(hub, control, tmp_path):
+    with capture_process(hub, control, tmp_path / "log") as process, Operator(hub) as operator:
+        until(lambda: not pressed(operator))
+        operator.restart_sensor(operator.status().sensors[0], timeout=LIMIT_S)
+        until(lambda: control.opens == 2 and not pressed(operator))
+        assert process.poll() is None
+        with pytest.raises(RequestFailedError, match="no sensor attic is connected; there: "):
+            operator.restart_sensor("attic", timeout=LIMIT_S)
+
+
+def test_the_service_brings_back_a_sensor_whose_driver_hung_or_that_an_operator_restarts(
+        control, tmp_path):
     with service("openni2:", tmp_path / "data",
                  environment=environment(controls=[control])) as up, up.client() as client:
         until(lambda: not pressed(client))
@@ -133,6 +144,12 @@ def test_the_service_brings_back_a_sensor_whose_driver_hung(control, tmp_path):
         until(lambda: control.loads == 2 or pressed(client))
         control.replug()
         until(lambda: not pressed(client))
+        loads = control.loads
+        with Operator(up.address) as operator:
+            operator.restart_sensor(operator.status().sensors[0], timeout=LIMIT_S)
+        until(lambda: control.loads == loads + 1)
+        until(lambda: not pressed(client))
+        assert client.status().restarts["capture"].exited >= 1
 
 
 @pytest.mark.parametrize("call", [Call.CLOSE, Call.SHUTDOWN])

@@ -11,7 +11,7 @@ import zmq
 
 from denseface.service.protocol import messages
 from denseface.service.protocol.hint import Hint
-from denseface.service.protocol.message_base import BaseMessage
+from denseface.service.protocol.message_base import BaseMessage, CaptureSummary, DeadLetter
 from denseface.service.protocol.payload import FaceHeader, PreviewHeader
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, decode_to_hub, encode
@@ -131,6 +131,20 @@ class FakeHub:
                 found = [one for one in self.outcomes if one.message.capture_id == capture_id]
                 yield _again(found[0], request) if found else Packet(messages.CaptureUnknown(
                     request=request, capture_id=capture_id))
+            case messages.ListCaptures(last=last):
+                yield Packet(messages.CaptureList(request=request, captures=[
+                    CaptureSummary(capture_id=one, state="done", accepted_at="then", attempts=1)
+                    for one in "cba"[-last:]]))
+            case messages.ListDead(after=after):
+                letters = [] if after else [DeadLetter(
+                    sequence=1, capture_id="dead", error="E", message="m", attempts=3,
+                    accepted_at="then", finished_at="now")]
+                yield Packet(messages.DeadLetters(request=request, letters=letters))
+            case messages.RetryDead() | messages.DropDead():
+                yield Packet(messages.CaptureUnknown(
+                    request=request, capture_id=message.capture_id))
+            case messages.RestartSensor(sensor=sensor):
+                yield Packet(messages.SensorRestarting(request=request, sensor=sensor))
             case messages.Purge() | messages.Withdraw():
                 removed, left = self.removals.pop(0) if self.removals else (0, True)
                 yield Packet(messages.Removed(request=request, removed=removed, left=left))

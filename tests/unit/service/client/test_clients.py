@@ -11,7 +11,7 @@ import psutil
 import pytest
 
 import denseface
-from denseface.service.client import AsyncClient, Client, Operator
+from denseface.service.client import AsyncClient, AsyncOperator, Client, Operator
 from denseface.service.errors import (
     ClientClosedError,
     ClientTimeoutError,
@@ -365,6 +365,32 @@ def test_a_withdrawal_ends_when_the_hub_says_so_and_its_press_with_it(hub):
         with pytest.raises(PressRefusedError):
             client.press("a")
     assert hub.received.count("press") == 1
+
+
+def test_an_operator_asks_the_same_of_both_clients(hub):
+    async def main():
+        async with AsyncOperator(hub.address) as operator:
+            with pytest.raises(LocalProtocolError, match="last: expected 1 to 50, found 51"):
+                await operator.captures(51)
+            listed = await operator.captures(2, timeout=LIMIT_S)
+            dead = [one async for one in operator.dead(timeout=LIMIT_S)]
+            with pytest.raises(UnknownCaptureError):
+                await operator.drop("never", timeout=LIMIT_S)
+            with pytest.raises(UnknownCaptureError):
+                await operator.retry("never", timeout=LIMIT_S)
+            await operator.restart_sensor("s", timeout=LIMIT_S)
+            hub.removals = [(2, True), (1, False)]
+            assert await operator.purge(everything=True, timeout=LIMIT_S) == 3
+            return listed, dead
+
+    listed, dead = run(main())
+    assert [one.capture_id for one in listed] == ["b", "a"]
+    assert [one.capture_id for one in dead] == ["dead"]
+    with Operator(hub.address) as operator:
+        assert operator.captures(2) == listed
+        assert [*operator.dead()] == dead
+        operator.restart_sensor("s")
+    assert hub.received.count("restart_sensor") == 2
 
 
 def test_a_purge_goes_on_while_some_is_left(hub):

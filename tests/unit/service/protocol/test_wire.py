@@ -18,7 +18,7 @@ from denseface.recon.settings import Preset, Settings
 from denseface.service.errors import LocalProtocolError, ProtocolError, RemoteProtocolError
 from denseface.service.protocol import messages, wire
 from denseface.service.protocol.hint import Hint
-from denseface.service.protocol.message_base import DeadLetter
+from denseface.service.protocol.message_base import CaptureSummary, DeadLetter
 from denseface.service.protocol.payload import (
     MAX_ARRAY_BYTES,
     FaceHeader,
@@ -78,6 +78,8 @@ to_hub = st.one_of(
     plain(messages.FindStart, request=numbers, since=times),
     plain(messages.GetStatus, request=numbers),
     plain(messages.Withdraw, request=numbers, capture_id=ids),
+    plain(messages.ListCaptures, request=numbers, last=st.integers(1, 50)),
+    plain(messages.RestartSensor, request=numbers, sensor=peer_names),
     plain(messages.ListDead, request=numbers, after=numbers),
     plain(messages.RetryDead, request=numbers, capture_id=ids),
     plain(messages.DropDead, request=numbers, capture_id=ids),
@@ -113,6 +115,12 @@ from_hub = st.one_of(
     plain(messages.RequestFailed, request=numbers, message=texts),
     plain(messages.NothingNewer, request=numbers, epoch=hashes, sequence=numbers),
     plain(messages.StartAt, request=numbers, epoch=hashes, sequence=numbers),
+    plain(messages.CaptureList, request=numbers, captures=st.lists(st.builds(
+        CaptureSummary, capture_id=ids, state=texts, accepted_at=texts, attempts=numbers,
+        finished_at=st.none() | texts, sequence=st.none() | numbers, error=st.none() | texts,
+        message=st.none() | texts, consent=st.none() | consents), max_size=5)),
+    plain(messages.SensorRestarting, request=numbers, sensor=peer_names),
+    st.just(Packet(messages.Restart())),
     plain(messages.Removed, request=numbers, removed=numbers, left=st.booleans()),
     plain(messages.DeadLetters, request=numbers, letters=st.lists(st.builds(
         DeadLetter, sequence=numbers, capture_id=ids, error=texts, message=texts,

@@ -31,6 +31,8 @@ SAID = [
     messages.GetStatus(request=1),
     messages.FindStart(request=1, last=1),
     messages.ListDead(request=1, after=0),
+    messages.ListCaptures(request=1),
+    messages.RestartSensor(request=1, sensor="s"),
     messages.RetryDead(request=1, capture_id="a"),
     messages.DropDead(request=1, capture_id="a"),
     messages.Purge(request=1, everything=True),
@@ -47,7 +49,7 @@ MAY = {
     Role.PRESSER: {"get_status", "press", "withdraw"},
     Role.SUBSCRIBER: {"get_status", "get_face", "get_next", "find_start"},
     Role.OPERATOR: {"get_status", "list_dead", "retry_dead", "drop_dead", "purge",
-                    "withdraw"},
+                    "withdraw", "list_captures", "restart_sensor"},
 }
 
 
