@@ -18,9 +18,9 @@ __all__ = ["SAMPLE"]
 
 SAMPLE = (Path(__file__).resolve().parents[2]
           / "service" / "kiosk" / "frontend" / "public" / "sample.face")
-_SCENE = Scene((Person("mh_asian_f", 640),), light=Light((0.3, -0.5, -1.0), 0.66, 0.40), holes=0.0,
-               decor=3)
-_FRAMES, _SEED = 12, 11
+_SCENE = Scene((Person("mh_asian_f", 640, yaw=4, pitch=3),),
+               light=Light((0.3, -0.5, -1.0), 0.66, 0.40), holes=0.1, decor=3)
+_FRAMES, _SEED = 12, 14
 
 
 def sample_face() -> Face:
