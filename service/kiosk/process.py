@@ -14,6 +14,7 @@ from typing import Any
 import structlog
 
 from denseface.service.client import AsyncClient
+from denseface.service.kiosk.button.watch import check_button, watch_button
 from denseface.service.kiosk.conductor.conductor import Conductor, ConductorOptions
 from denseface.service.kiosk.conductor.hub_watch import watch_hub
 from denseface.service.kiosk.conductor.kept_withdrawals import KeptWithdrawals
@@ -50,6 +51,8 @@ def run(service: ServiceSettings, settings: KioskSettings,
     """
     os.umask(0o077)
     tls, options = settings.tls(), visit_options(settings)
+    if settings.button is not None:
+        check_button(settings.button)
     kept = KeptWithdrawals(settings.folder, service.address)
     with asyncio.Runner() as runner:
         return runner.run(_run(service, settings, options, kept, tls,
@@ -81,10 +84,12 @@ async def _run(service: ServiceSettings, settings: KioskSettings, options: Visit
         conductor.start()
         if settings.measurements:
             await asyncio.to_thread(prepare)
+        button = [] if settings.button is None else [
+            watch_button(settings.button, conductor.button, grab=settings.button_grab)]
         working: list[asyncio.Future[Any]] = [asyncio.create_task(work) for work in (
             _beat(supervisor),
             watch_hub(hub, settings.sensor, service.reserve_mib * 2**20, conductor.service_is),
-            _serve_page(settings, conductor, files, tls))]
+            _serve_page(settings, conductor, files, tls), *button)]
         try:
             await asyncio.wait([stopped, *working], return_when=asyncio.FIRST_COMPLETED)
         finally:
