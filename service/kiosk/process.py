@@ -113,7 +113,8 @@ async def _serve_page(
     origins = origins_of(settings.scheme, host, port, settings.proxy)
     _log.info("the page for visitors",
               url=" ".join([url_of(settings.scheme, bound), *settings.proxy]))
-    await serve(kiosk_app(conductor.page, origins, files), bound, tls)
+    await serve(kiosk_app(conductor.page, origins, files, asks_consent=settings.consent),
+                bound, tls)
 
 
 async def _beat(supervisor: SupervisorLink) -> None:

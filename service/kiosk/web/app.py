@@ -25,7 +25,7 @@ def kiosk_files() -> Files:
 
 def kiosk_app(
     web_socket: Callable[[WebSocket], Awaitable[None]], origins: Iterable[str], files: Files,
-    more: Sequence[BaseRoute] = (),
+    more: Sequence[BaseRoute] = (), *, asks_consent: bool = True,
 ) -> App:
     """Give the application of the kiosk's page.
 
@@ -35,6 +35,7 @@ def kiosk_app(
     origins : of the page
     files : of `kiosk_files`
     more : what else is served, such as the operator's page
+    asks_consent : whether visitors are asked first, as `/healthz` tells the doctor
     """
     async def page(request: Request) -> Response:
         return files.answer("static/index.html", request)
@@ -43,7 +44,7 @@ def kiosk_app(
         return files.answer(request.url.path.removeprefix("/"), request)
 
     async def health(_: Request) -> Response:
-        return JSONResponse({"serving": True})
+        return JSONResponse({"serving": True, "consent": asks_consent})
 
     app = Starlette(routes=[
         Route("/", page), Route("/healthz", health), Route("/static/{name:path}", file),

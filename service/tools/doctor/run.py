@@ -1,6 +1,7 @@
 """Everything that the doctor looks at, one after the other."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
 from pathlib import Path
 
 from denseface.capture.identity import USB_DEVICES, Identity, known_as, usb_devices
@@ -36,6 +37,7 @@ _HUB_S = 3.0
 def run(
     source: str | None, connect: Callable[[], Client], *, as_json_object: bool = False,
     usb_root: Path = USB_DEVICES, root: Path = Path("/"), limit_s: float = LIMIT_S,
+    more: Iterable[Finding] = (),
 ) -> int:
     """Look at everything, print what was found and give the exit status: 1 with a problem.
 
@@ -45,9 +47,10 @@ def run(
     connect : makes the client to ask the hub with
     usb_root, root : instead of Linux's list of USB devices and `/`, for tests
     limit_s : longest time that a sensor has
+    more : what is found elsewhere; told last
     """
     findings = []
-    for finding in _look(source, connect, usb_root, root, limit_s):
+    for finding in chain(_look(source, connect, usb_root, root, limit_s), more):
         findings.append(finding)
         if not as_json_object:
             say(*as_lines([finding]), flush=True)

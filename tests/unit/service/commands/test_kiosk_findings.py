@@ -1,0 +1,83 @@
+"""What the doctor says of the kiosk."""
+
+import json
+import threading
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, HTTPServer
+
+import pytest
+
+from denseface.service.commands.sensor import _kiosk_findings
+from denseface.service.commands.sensor._kiosk_findings import look_at_kiosk
+from denseface.service.tools.doctor.findings import Level
+
+
+@pytest.fixture(autouse=True)
+def installed(monkeypatch):
+    monkeypatch.setattr(_kiosk_findings, "why_not", lambda: None)
+
+
+@contextmanager
+def kiosk(answer):
+    """One that answers so at `/healthz`; gives its address."""
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self):
+            assert self.path == "/healthz"
+            self.send_response(200)
+            self.end_headers()
+            self.wfile.write(answer)
+
+        def log_message(self, *_):
+            """Say nothing."""
+
+    server = HTTPServer(("127.0.0.1", 0), Handler)
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+    thread.start()
+    try:
+        yield f"127.0.0.1:{server.server_port}"
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
+def found(address="127.0.0.1:0", **environment):
+    return [(one.level, one.text) for one in look_at_kiosk(
+        {"DENSEFACE_KIOSK_ADDRESS": address} | environment)]
+
+
+def test_what_is_missing_is_no_fault(monkeypatch):
+    monkeypatch.setattr(_kiosk_findings, "why_not", lambda: "no kiosk: x is not installed")
+    assert found() == [(Level.OK, "no kiosk: x is not installed")]
+
+
+def test_a_consent_that_is_switched_off_is_a_warning():
+    assert [level for level, _ in found()] == [Level.OK]
+    (_, first), (level, text) = found(DENSEFACE_KIOSK_CONSENT="off")
+    assert first == "can be served at http://127.0.0.1:0; none answers there now"
+    assert (level, text) == (Level.WARNING, "nobody is asked before a picture is taken")
+
+
+def test_the_kiosk_that_runs_knows_better_than_the_environment(monkeypatch):
+    monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")
+    with kiosk(json.dumps({"serving": True, "consent": False}).encode()) as address:
+        assert found(address) == [
+            (Level.OK, f"serves at http://{address}"),
+            (Level.WARNING, "nobody is asked before a picture is taken")]
+    with kiosk(json.dumps({"serving": True, "consent": True}).encode()) as address:
+        assert found(address, DENSEFACE_KIOSK_CONSENT="off") == [
+            (Level.OK, f"serves at http://{address}")]
+
+
+@pytest.mark.parametrize("answer", [b"", b"<html>", b"[1]", b'{"consent": "maybe"}', b"\xff"])
+def test_another_program_at_that_address_is_not_believed(answer):
+    with kiosk(answer) as address:
+        ((level, text),) = found(address)
+    assert (level, text) == (
+        Level.OK, f"can be served at http://{address}; none answers there now")
+
+
+def test_a_wrong_setting_is_a_problem():
+    ((level, text),) = found(DENSEFACE_KIOSK_CONSENT="perhaps")
+    assert (level, text) == (
+        Level.PROBLEM, "DENSEFACE_KIOSK_CONSENT: expected on or off, found 'perhaps'")
