@@ -7,7 +7,7 @@
 import json
 import struct
 import zlib
-from typing import TypeVar
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,10 @@ def encode_face_grid(face: Face) -> bytes:
     places = _Places(dense.cells, dense.grid_shape)
     low, high = ((float(dense.sigma.min()), float(dense.sigma.max())) if len(dense)
                  else (1.0, 1.0))
-    depths, long_depths = _short(places.residuals(_units(dense.points[:, 2])))
+    depths, long_depths = _short(places.residuals(_units(dense.points[:, 2]), np.int32))
+    painted = np.empty((len(dense), 4), np.uint8)
+    painted[:, :3], painted[:, 3] = dense.colors, _sigma_codes(dense.sigma, low, high)
+    paint = places.residuals(painted.view(np.int32).ravel(), np.uint8)
     steps = np.diff(_units(seeds.points), axis=0, prepend=np.int32(0))
     ways, long_ways = _short(steps.T.ravel())
     header = {
@@ -59,44 +62,49 @@ def encode_face_grid(face: Face) -> bytes:
     text = json.dumps(header, separators=(",", ":")).encode()
     seed_colors = np.diff(seeds.colors, axis=0, prepend=np.uint8(0))
     body = b"".join(np.ascontiguousarray(part).tobytes() for part in (
-        np.packbits(places.on[1:, 1:], axis=1), depths,
-        *(places.residuals(channel) for channel in dense.colors.T),
-        places.residuals(_sigma_codes(dense.sigma, low, high)), long_depths,
-        ways, seed_colors.T, long_ways))
+        np.packbits(places.on, axis=1), depths, paint.view(np.uint8).reshape(-1, 4).T,
+        long_depths, ways, seed_colors.T, long_ways))
     packer = zlib.compressobj(strategy=_STRATEGY, memLevel=_MEMORY)
     return b"".join((MAGIC, struct.pack("<II", VERSION, len(text)), text,
                      packer.compress(body), packer.flush()))
 
 
-_Whole = TypeVar("_Whole", np.uint8, np.int32)
-
-
 class _Places:
-    """Where a grid has points, with an empty row above and an empty column to the left."""
+    """Where a grid has points, and what is to be expected there.
+
+    The arrays have an empty row above and an empty column to the left, and 32 bits for each place:
+    a depth, or four bytes that are computed at once.
+    """
 
     def __init__(self, cells: Ints, shape: tuple[int, int]) -> None:
-        self._columns = shape[1] + 1
-        self._at = (cells[:, 0] + 1) * self._columns + cells[:, 1] + 1
-        self.on: Bools = np.zeros((shape[0] + 1, self._columns), np.bool_)
-        self.on.ravel()[self._at] = True
-        flat = self.on.ravel()
-        self._with_left = flat[self._at - 1]
-        self._with_all = (self._with_left & flat[self._at - self._columns]
-                          & flat[self._at - self._columns - 1])
+        self._shape = shape[0] + 1, shape[1] + 1
+        self._at = (cells[:, 0] + 1) * self._shape[1] + cells[:, 1] + 1
+        known = np.zeros(self._shape, np.bool_)
+        known.ravel()[self._at] = True
+        self.on: Bools = known[1:, 1:]
+        with_left = known[1:, :-1]
+        # All bits set where it is so: they take or leave a difference.
+        self._plane = -(with_left & known[:-1, 1:] & known[:-1, :-1]).astype(np.int32)
+        self._first = -(~with_left).astype(np.int32)
 
-    def residuals(self, values: NDArray[_Whole]) -> NDArray[_Whole]:
+    def residuals(self, values: Ints, lane: type[np.uint8] | type[np.int32]) -> Ints:
         """Subtract from each point's value what its neighbours let expect.
 
         The plane through the left, the upper and the upper left one where there are all three, else
-        the left one, else the upper one, else 0. Bytes wrap around.
+        the left one, else the upper one, else 0. Of a value, each `lane` by itself; bytes wrap
+        around.
         """
-        grid = np.zeros(self.on.size, values.dtype)
-        grid[self._at] = values
-        left, above = grid[self._at - 1], grid[self._at - self._columns]
-        corner = grid[self._at - self._columns - 1]
-        expected = np.where(self._with_all, left + above - corner,
-                            np.where(self._with_left, left, above))
-        return np.asarray(values - expected, values.dtype)
+        grid = np.zeros(self._shape, np.int32)
+        grid.ravel()[self._at] = values
+        # For the type checker all are whole numbers alike.
+        lanes, plane, first = (cast("Ints", array.view(lane))
+                               for array in (grid, self._plane, self._first))
+        step = lanes.shape[1] // self._shape[1]
+        above = lanes[:-1, step:]
+        left = lanes[1:, step:] - lanes[1:, :-step]
+        left -= (above - lanes[:-1, :-step]) & plane
+        left -= above & first
+        return left.view(np.int32)[self.on]
 
 
 def _corner(dense: DenseCloud) -> tuple[float, float]:

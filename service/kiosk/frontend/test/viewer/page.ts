@@ -1,6 +1,10 @@
-/** What `tests/system/test_viewer.py` drives in a browser. */
+/** What `tests/system/test_viewer.py` and `bench/viewer.py` drive in a browser. */
 
 import { decodeFaceGrid, type FaceGrid } from "../../src/face_grid.ts";
+import { drawn, openGraphics } from "../../src/viewer/graphics.ts";
+import { Pose } from "../../src/viewer/pose.ts";
+import { Stage } from "../../src/viewer/stage.ts";
+import { toSurface, triangulate } from "../../src/viewer/surface.ts";
 import { FaceViewer, type Mode } from "../../src/viewer/viewer.ts";
 
 /** How many buffers, textures and programs WebGL holds. */
@@ -76,6 +80,62 @@ class Page {
       this.open(false);
       await this.show(name);
     }
+  }
+
+  /** Median times of making a face ready, ms: from bytes to a grid, to vertices, to triangles. */
+  async readyMs(name: string, runs: number): Promise<[number, number, number]> {
+    const bytes = new Uint8Array(await (await fetch(name)).arrayBuffer());
+    const times: [number[], number[], number[]] = [[], [], []];
+    for (let n = 0; n < runs; n++) {
+      const start = performance.now();
+      const face = await decodeFaceGrid(bytes);
+      const decoded = performance.now();
+      toSurface(face);
+      const made = performance.now();
+      triangulate(face);
+      times[0].push(decoded - start);
+      times[1].push(made - decoded);
+      times[2].push(performance.now() - made);
+    }
+    return times.map((all) => all.sort((a, b) => a - b)[runs >> 1]!) as [number, number, number];
+  }
+
+  /** Draws a face again and again and waits for each; gives the median time, ms. */
+  async drawMs(
+    name: string, stride: number, mode: Mode, ratio: number, count: number,
+  ): Promise<number> {
+    const canvas = document.createElement("canvas");
+    document.body.replaceChildren(canvas);
+    const graphics = openGraphics(canvas)!;
+    const stage = new Stage(canvas, graphics.context);
+    stage.resize(canvas.clientWidth, canvas.clientHeight, ratio);
+    stage.load(await this.face(name));
+    const pose = new Pose(false);
+    const times: number[] = [];
+    for (let n = 0; n <= count; n++) {
+      pose.rotate(1, 0, true);
+      const start = performance.now();
+      stage.draw({ view: pose.view, mode, confidence: 0, blend: 1, stride });
+      await drawn(graphics.context);
+      if (n > 0) times.push(performance.now() - start);
+    }
+    stage.dispose();
+    canvas.remove();
+    return times.sort((a, b) => a - b)[count >> 1]!;
+  }
+
+  /** Lets a face turn for some time; gives the pictures a second. */
+  async turnFor(name: string, seconds: number): Promise<number> {
+    this.open(false);
+    await this.show(name);
+    this.viewer!.turning = true;
+    await frames(5);
+    const before = this.drawings;
+    const start = performance.now();
+    await new Promise((done) => setTimeout(done, 1000 * seconds));
+    const rate = (this.drawings - before) / ((performance.now() - start) / 1000);
+    this.close();
+    return rate;
   }
 
   get held(): number {
