@@ -67,7 +67,8 @@ async def take_picture(
     visit, capture_id = effect.visit, effect.capture_id
     pressed_s = clock()
     try:
-        await hub.press(capture_id, timeout=_PRESS_S, sensor=sensor)
+        await hub.press(capture_id, timeout=_PRESS_S, sensor=sensor, gate="best",
+                        gate_timeout=effect.best_of_s)
     except PressRefusedError as error:
         hint = Hint(timestamp_us=0, codes=error.codes, text=error.text, measures={})
         happened(CaptureRefused(visit, capture_id, error.reason, hint))
