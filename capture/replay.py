@@ -211,6 +211,8 @@ class ReplaySensor(LiveSensor):
                         return
                     self._give(frame, due_s)
                     start_s = due_s + _PERIOD_S
+                # What begins late is left out; where that is all of it, it would be for ever.
+                start_s = max(start_s, time.monotonic())
                 if not self._count:
                     self._end("the recording holds no pair of depth and color")
                     return

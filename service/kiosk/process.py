@@ -20,6 +20,7 @@ from denseface.service.kiosk.conductor.hub_watch import watch_hub
 from denseface.service.kiosk.conductor.kept_withdrawals import KeptWithdrawals
 from denseface.service.kiosk.conductor.measuring import prepare
 from denseface.service.kiosk.consent_text import load_consent_text
+from denseface.service.kiosk.links.links import links_of
 from denseface.service.kiosk.page_messages import Hello
 from denseface.service.kiosk.settings import KioskSettings
 from denseface.service.kiosk.visit.machine import Kiosk
@@ -78,24 +79,25 @@ async def _run(service: ServiceSettings, settings: KioskSettings, options: Visit
     hello = Hello(languages=settings.languages, sound=settings.sound, speech=settings.speech,
                   version=f"{version('denseface')}-{files.digest[:12]}")
     with closing(AsyncClient(service.address, key=service.key, hub_key=service.hub_key)) as hub:
+        links = links_of(settings, hub.get)
         conductor = Conductor(
             Kiosk(options, new_id=lambda: secrets.token_hex(16), utc=_utc), hub, kept,
-            ConductorOptions(hello, settings.sensor, settings.measurements))
+            ConductorOptions(hello, settings.sensor, settings.measurements), links)
         conductor.start()
-        if settings.measurements:
-            await asyncio.to_thread(prepare)
+        also = [asyncio.create_task(asyncio.to_thread(prepare))] if settings.measurements else []
         button = [] if settings.button is None else [
             watch_button(settings.button, conductor.button, grab=settings.button_grab)]
         working: list[asyncio.Future[Any]] = [asyncio.create_task(work) for work in (
             _beat(supervisor),
-            watch_hub(hub, settings.sensor, service.reserve_mib * 2**20, conductor.service_is),
-            _serve_page(settings, conductor, files, tls), *button)]
+            watch_hub(hub, settings.sensor, conductor.service_is),
+            _serve_page(settings, conductor, files, tls),
+            *([links.serve()] if links else []), *button)]
         try:
             await asyncio.wait([stopped, *working], return_when=asyncio.FIRST_COMPLETED)
         finally:
-            for task in working:
+            for task in (*working, *also):
                 task.cancel()
-            results = await asyncio.gather(*working, return_exceptions=True)
+            results = await asyncio.gather(*working, *also, return_exceptions=True)
             await conductor.close(_CLOSE_S)
     for error in results:
         if isinstance(error, Exception):

@@ -3,10 +3,11 @@
 import asyncio
 import time
 from collections.abc import Callable
+from datetime import datetime
 
 import structlog
 
-from denseface.recon.face import Face
+from denseface.recon.face import Consent, Face
 from denseface.service.errors import (
     CaptureFailedError,
     ClientTimeoutError,
@@ -18,7 +19,7 @@ from denseface.service.export.face_grid import encode_face_grid
 from denseface.service.kiosk.conductor.measuring import measurements_of
 from denseface.service.kiosk.conductor.ports import Hub
 from denseface.service.kiosk.page_messages import Measurement
-from denseface.service.kiosk.visit.effects import TakePicture
+from denseface.service.kiosk.visit.effects import Consented, TakePicture
 from denseface.service.kiosk.visit.events import (
     CaptureRefused,
     Event,
@@ -67,8 +68,9 @@ async def take_picture(
     visit, capture_id = effect.visit, effect.capture_id
     pressed_s = clock()
     try:
-        await hub.press(capture_id, timeout=_PRESS_S, sensor=sensor, gate="best",
-                        gate_timeout=effect.best_of_s)
+        await hub.press(
+            capture_id, timeout=_PRESS_S, sensor=sensor, gate="best",
+            gate_timeout=effect.best_of_s, consent=_consent(effect.consent))
     except PressRefusedError as error:
         hint = Hint(timestamp_us=0, codes=error.codes, text=error.text, measures={})
         happened(CaptureRefused(visit, capture_id, error.reason, hint))
@@ -98,3 +100,9 @@ def _name(error: Exception) -> str:
     if not isinstance(error, UnknownCaptureError | ClientTimeoutError):
         _log.warning("no face", reason=str(error))
     return type(error).__name__
+
+
+def _consent(consented: Consented | None) -> Consent | None:
+    return None if consented is None else Consent(
+        text_version=consented.text_version, language=consented.language,
+        retention_s=consented.retention_s, at=datetime.fromisoformat(consented.at))

@@ -3,6 +3,8 @@
 import asyncio
 from collections.abc import Callable
 
+import structlog
+
 from denseface.service.errors import ServiceError
 from denseface.service.kiosk.conductor.ports import Hub
 from denseface.service.kiosk.conductor.trouble import GONE, service_is
@@ -10,19 +12,17 @@ from denseface.service.kiosk.visit.events import ServiceIs
 
 __all__ = ["watch_hub"]
 
-_ASK_S = 0.3
-"""Time between two questions, seconds: what is gone is to be known within a second."""
-_ANSWER_S = 0.6
-"""Longest wait for an answer, seconds."""
+_AGAIN_S = 0.5
+"""Time until it is followed again where that ended, seconds."""
 
 
-async def watch_hub(
-    hub: Hub, sensor: str | None, reserve_bytes: int, tell: Callable[[ServiceIs], None]
-) -> None:
-    """Ask until cancelled; parameters as of `service_is`."""
+async def watch_hub(hub: Hub, sensor: str | None, tell: Callable[[ServiceIs], None]) -> None:
+    """Follow what it publishes until cancelled; `sensor` as of `service_is`."""
     while True:
         try:
-            tell(service_is(await hub.status(timeout=_ANSWER_S), sensor, reserve_bytes))
-        except ServiceError:
+            async for status in hub.statuses():
+                tell(GONE if status is None else service_is(status, sensor))
+        except ServiceError as error:
             tell(GONE)
-        await asyncio.sleep(_ASK_S)
+            structlog.get_logger("kiosk").warning("the hub is not followed", reason=str(error))
+        await asyncio.sleep(_AGAIN_S)

@@ -3,7 +3,7 @@
 from collections.abc import AsyncIterator
 from typing import Protocol
 
-from denseface.recon.face import Face
+from denseface.recon.face import Consent, Face
 from denseface.service.client import PublishedPreview
 from denseface.service.kiosk.page_messages import KeepScreen
 from denseface.service.protocol.messages import Status
@@ -18,6 +18,7 @@ class Hub(Protocol):
     async def press(
         self, capture_id: str | None = None, *, timeout: float = ..., sensor: str | None = ...,
         gate: Gate = ..., gate_timeout: float = ..., frames: int = ...,
+        consent: Consent | None = ...,
     ) -> str:
         """Take a frame."""
 
@@ -32,8 +33,8 @@ class Hub(Protocol):
     ) -> AsyncIterator[PublishedPreview]:
         """Follow what a sensor sees."""
 
-    async def status(self, *, timeout: float = ...) -> Status:
-        """Ask how it is."""
+    def statuses(self, *, timeout: float | None = ...) -> AsyncIterator[Status | None]:
+        """Follow how it is, None where it is gone."""
 
 
 class LinkMaker(Protocol):

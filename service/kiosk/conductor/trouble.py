@@ -12,25 +12,19 @@ _STREAMS = ("streaming", "warming")
 """States of a sensor that has pictures, or is about to."""
 
 
-def service_is(status: Status, sensor: str | None, reserve_bytes: int) -> ServiceIs:
-    """Read the worst of it.
-
-    Parameters
-    ----------
-    sensor : the one above the screen; None for any
-    reserve_bytes : room of the disk below which the hub takes no press
-    """
-    return ServiceIs(_trouble(status, sensor, reserve_bytes),
-                     getattr(status, "retention_s", 86400.0))
+def service_is(status: Status, sensor: str | None) -> ServiceIs:
+    """Read the worst of it; `sensor` is the one above the screen, None for any."""
+    return ServiceIs(_trouble(status, sensor), status.retention_s)
 
 
-def _trouble(status: Status, sensor: str | None, reserve_bytes: int) -> Trouble | None:
+def _trouble(status: Status, sensor: str | None) -> Trouble | None:
     if status.state != "serving":
         return Trouble.HUB
-    if status.free_bytes is not None and status.free_bytes < reserve_bytes:
+    if status.obstacle == "disk":
         return Trouble.DISK
     streams = status.has_frames if sensor is None else any(
         one.name == sensor and one.state in _STREAMS for one in status.sensor_states)
     if not streams:
         return Trouble.SENSOR
-    return None if status.workers else Trouble.WORKER
+    # A queue that is full is a worker that does not keep up.
+    return Trouble.WORKER if status.obstacle or not status.workers else None

@@ -1,5 +1,6 @@
 import math
 import threading
+import time
 from dataclasses import replace
 from itertools import pairwise
 
@@ -11,7 +12,7 @@ from denseface.capture.errors import UnreadableSourceError
 from denseface.capture.live.sensor import open_sensor
 from denseface.capture.live.states import LiveState
 from denseface.capture.npz import save_frame
-from denseface.capture.replay import ReplaySensor, paced
+from denseface.capture.replay import Replay, ReplaySensor, paced
 from denseface.capture.source import ReplayOptions
 from tests.unit import frames
 from tests.waiting import LIMIT_S, until
@@ -163,6 +164,18 @@ def test_a_folder_is_a_live_sensor(folder):
         assert until(lambda: sensor.first_after(seen[-1].earliest_s + 0.1))
     finally:
         assert sensor.close(LIMIT_S)
+
+
+def test_a_live_replay_whose_end_is_slow_goes_on(folder, monkeypatch):
+    """As on a busy machine: a recording of one frame would stand still for ever."""
+    def slowly(replay):
+        yield frame(0)
+        time.sleep(0.08)  # longer than a frame's period and a half
+
+    monkeypatch.setattr(Replay, "chosen", slowly)
+    sensor = ReplaySensor(f"{folder}?rate=real")
+    until(lambda: sensor.figures.frames > 5)
+    assert sensor.close(LIMIT_S)
 
 
 def test_a_live_replay_that_ends(folder):
