@@ -18,8 +18,8 @@ import structlog
 
 from denseface.service.errors import SettingsError
 
-__all__ = ["ACTIONS", "FAILPOINTS_VARIABLE", "FAILPOINT_NAMES", "TOKENS_VARIABLE", "arm",
-           "failpoint"]
+__all__ = ["ACTIONS", "FAILPOINTS_VARIABLE", "FAILPOINT_NAMES", "REMOVAL_FAILPOINTS",
+           "TOKENS_VARIABLE", "arm", "failpoint"]
 
 FAILPOINTS_VARIABLE = "DENSEFACE_FAILPOINTS"
 """Environment variable with the failpoints and their actions."""
@@ -36,6 +36,9 @@ FAILPOINT_NAMES = (
     "hub.face.named", "hub.outcome.stored", "hub.outcome.publishing", "hub.outcome.published",
 )
 """Every step of a capture's life, in order."""
+REMOVAL_FAILPOINTS = (
+    "hub.removal.marked", "hub.removal.begun", "hub.removal.files", "hub.removal.rows")
+"""Every step of a removal, in order."""
 
 ACTIONS = ("kill", "stop", "hang", "raise:ENOSPC", "raise:EIO")
 """SIGKILL or SIGSTOP to this process; the thread waits for ever; an OSError like the disk's."""
@@ -72,9 +75,9 @@ def arm(environment: Mapping[str, str]) -> None:
     for entry in text.split(","):
         name, _, what = entry.partition("=")
         action, at, number = what.partition("@")
-        if name not in FAILPOINT_NAMES:
+        if name not in (known := FAILPOINT_NAMES + REMOVAL_FAILPOINTS):
             raise SettingsError(f"{FAILPOINTS_VARIABLE}: no failpoint {name!r}, expected one of "
-                                f"{', '.join(FAILPOINT_NAMES)}")
+                                f"{', '.join(known)}")
         possible = [one for one in ACTIONS
                     if not one.startswith("raise") or name.endswith(_AT_DISK)]
         if action not in possible:

@@ -11,6 +11,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.files import sync_folder
 from denseface.service.storage._database import Database
 from denseface.service.storage._disk_reserve import DiskReserve
@@ -82,12 +83,15 @@ class Eraser:
         return Erased(erasure, found[-1], emptied)
 
     def _erase(self, erasure: Erasure) -> int:
+        without_row = 0
         if erasure.captures:
             # That they are withdrawn is synced here, not on the hub's loop, and before any file
             # goes: the log is synced up to this commit.
             with closing(self._database.another()) as database:
                 database.set_meta("erasure", str(erasure.number))
-        without_row = self._erase_files(erasure.captures) if erasure.captures else 0
+            failpoint("hub.removal.begun")
+            without_row = self._erase_files(erasure.captures)
+            failpoint("hub.removal.files")
         with wrap_os_errors(self._layout.quarantine):
             if erasure.all_quarantined:
                 self._quarantine.clear()
@@ -101,6 +105,7 @@ class Eraser:
                 connection.executemany(
                     "DELETE FROM captures WHERE capture_id = ? AND state = 'removed'",
                     [(capture_id,) for capture_id in erasure.captures])
+            failpoint("hub.removal.rows")
         return without_row
 
     def _erase_files(self, captures: Mapping[str, str | None]) -> int:

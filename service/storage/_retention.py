@@ -10,6 +10,7 @@ import structlog
 
 from denseface.service.errors import StoreError
 from denseface.service.protocol.states import CaptureState
+from denseface.service.runtime.failpoints import failpoint
 from denseface.service.storage._database import Database
 from denseface.service.storage._disk_reserve import DiskReserve
 from denseface.service.storage._erasure import Erased, Eraser, Erasure, PendingErasure
@@ -94,6 +95,7 @@ class Retention:
         state : REMOVED, which no other method sees
         """
         self._reserve.spend_on(lambda: self._mark(capture_ids, state))
+        failpoint("hub.removal.marked")
 
     def settle(self) -> None:
         """As `Database.settle`, with the reserve's room where the disk is full."""

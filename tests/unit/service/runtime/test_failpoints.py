@@ -15,6 +15,7 @@ from denseface.service.runtime import failpoints
 from denseface.service.runtime.failpoints import (
     FAILPOINT_NAMES,
     FAILPOINTS_VARIABLE,
+    REMOVAL_FAILPOINTS,
     TOKENS_VARIABLE,
     arm,
     failpoint,
@@ -109,4 +110,4 @@ def test_every_failpoint_is_somewhere_and_none_else():
                          and one.value.count(".") == 2)
     of_files = {f"{steps}.{step}" for steps in ("hub.frame", "hub.face")
              for step in ("written", "synced", "renamed", "named")}
-    assert found | of_files == set(FAILPOINT_NAMES)
+    assert found | of_files == set(FAILPOINT_NAMES + REMOVAL_FAILPOINTS)
