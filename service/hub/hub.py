@@ -288,15 +288,18 @@ class Hub:
         roles: frozenset[Role],
     ) -> Iterator[Output]:
         """Remove a capture of this key; of another's nothing is done, and nothing else is said."""
-        capture_id = message.capture_id
+        capture_id, withdrawn = message.capture_id, self._presses.withdrawn
+        operator = Role.OPERATOR in roles
+        if not operator and not withdrawn.take_turn(key, now):
+            raise errors.ServiceError("too many withdrawals with this key: again in a moment")
         owner = self._presses.pressed_by(capture_id)
-        owned = owner in (None, key) or Role.OPERATOR in roles
+        owned = owner in (None, key) or operator
         state = self._captures.state(capture_id) if owned else None
         if state in (CaptureState.SAVING_FRAME, CaptureState.SAVING_FACE):
             yield from self._end_writes(now)
-        self._presses.withdrawn.add(key, capture_id)
+        withdrawn.add(key, capture_id)
         if owned and owner is not None:
-            self._presses.withdrawn.add(owner, capture_id)
+            withdrawn.add(owner, capture_id)
         self._log.info("withdrawn" if owned else "withdrawal of another key's capture ignored",
                        capture_id=capture_id, key=key or LOCAL)
         yield from self._maintenance.withdraw(peer, message, key, owned=owned)

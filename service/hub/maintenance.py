@@ -103,13 +103,13 @@ class Maintenance:
         for asked in [one for one in self._unsaid if now >= one.deadline]:
             self._unsaid.remove(asked)
             yield asked.fail(_LOG_READ)
-        if self._erasures:
+        if self._sweeping():
             return
         try:
             if now >= self._promises_due:
                 self._promises_due = now + _PROMISES_S
                 yield from self._keep_promises(now)
-            if self._erasures:
+            if self._sweeping():
                 return
             if now >= self._due:
                 self._due = now + self._sweep_s
@@ -121,6 +121,10 @@ class Maintenance:
             raise
         except StoreError as error:
             self._log.error("not removed", reason=str(error))
+
+    def _sweeping(self) -> bool:
+        """Whether an erasure is under way that nobody asked for; those asked for hold up none."""
+        return any(one.asked is None for one in self._erasures)
 
     def _sweep(self, now: float) -> None:
         """Begin to erase a batch of what was withdrawn before, or else of what is too old."""

@@ -5,9 +5,12 @@ from collections import defaultdict
 from hashlib import blake2b
 
 from denseface.service.runtime.bounded_dict import BoundedDict
+from denseface.service.runtime.token_bucket import TokenBucket
 
 _MAX_WITHDRAWN = 1000
 """Ids of one key that are remembered."""
+_BURST, _PER_S = 32.0, 2.0
+"""Withdrawals of one key at once, and a second in the long run: each lists a folder and syncs."""
 
 
 class Withdrawn:
@@ -20,6 +23,12 @@ class Withdrawn:
         self._secret = secrets.token_bytes(32)
         self._hashes: defaultdict[str, BoundedDict[bytes, None]] = defaultdict(
             lambda: BoundedDict(_MAX_WITHDRAWN))
+        self._budgets: dict[str, TokenBucket] = {}
+        """By key; those that may withdraw are few."""
+
+    def take_turn(self, key: str, now: float) -> bool:
+        """Count a withdrawal of a key; False where it has made too many lately."""
+        return self._budgets.setdefault(key, TokenBucket(_BURST, _PER_S, now)).take(now)
 
     def add(self, key: str, capture_id: str) -> None:
         """Note that presses of an id with a key, given by its fingerprint, are to be refused."""

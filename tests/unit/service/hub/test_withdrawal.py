@@ -9,6 +9,7 @@ from denseface.service.hub import Hub
 from denseface.service.protocol import messages
 from denseface.service.protocol.roles import Role
 from denseface.service.storage import FolderStore
+from tests.unit.service.clocks import FakeClock
 from tests.unit.service.hub.bench import CLIENT, OTHER, SENSOR, SETTINGS, WORKER, Bench, kinds
 from tests.unit.service.hub.test_erasing import HeldWriter
 
@@ -164,6 +165,33 @@ def test_one_key_does_not_keep_others_from_removing(slow, writer):
     assert kinds(withdraw(slow, "mine-16")) == [(CLIENT, "request_failed")]
     assert kinds(withdraw(slow, key=ANOTHERS)) == []
     assert len(writer.held) == 17
+
+
+def test_one_key_does_not_keep_the_hub_busy(bench):
+    bench.sensor()
+    answers = [kinds(withdraw(bench, f"id-{number}"))[0][1] for number in range(33)]
+    assert answers == 32 * ["removed"] + ["request_failed"]
+    assert kinds(withdraw(bench, key=ANOTHERS)) == [(CLIENT, "removed")]
+    bench.now += 0.5
+    assert kinds(withdraw(bench)) == [(CLIENT, "removed")]
+    assert {kinds(withdraw(bench, f"id-{number}", key="", roles=frozenset(Role)))[0][1]
+            for number in range(40)} == {"removed"}
+
+
+def test_the_retention_goes_on_while_withdrawals_are_under_way(tmp_path, writer):
+    clock = FakeClock()
+    with FolderStore(tmp_path / "data", clock) as store:
+        bench = Bench(Hub(store, SETTINGS, Settings(), writer=writer), store)
+        done(bench)
+        bench.wait(0.0)
+        while writer.held:
+            writer.go_on()
+        bench._sent(bench.hub.written(bench.now))
+        clock.pass_time(2 * 86400)
+        withdraw(bench, "another")
+        bench.wait(601)
+        assert bench.store.find(ID) is None
+        assert len(writer.held) == 2
 
 
 def test_what_is_remembered_of_withdrawals_is_bounded(bench, monkeypatch):
