@@ -5,6 +5,7 @@ import os
 import secrets
 import signal
 import ssl
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -12,8 +13,9 @@ from importlib.metadata import version
 from typing import Any
 
 import structlog
+from starlette.routing import Route
 
-from denseface.service.client import AsyncClient
+from denseface.service.client import AsyncOperator
 from denseface.service.kiosk.button.watch import check_button, watch_button
 from denseface.service.kiosk.conductor.conductor import Conductor, ConductorOptions
 from denseface.service.kiosk.conductor.hub_watch import watch_hub
@@ -21,6 +23,7 @@ from denseface.service.kiosk.conductor.kept_withdrawals import KeptWithdrawals
 from denseface.service.kiosk.conductor.measuring import prepare
 from denseface.service.kiosk.consent_text import load_consent_text
 from denseface.service.kiosk.links.links import links_of
+from denseface.service.kiosk.operator.opening import operator_routes
 from denseface.service.kiosk.page_messages import Hello
 from denseface.service.kiosk.settings import KioskSettings
 from denseface.service.kiosk.visit.machine import Kiosk
@@ -78,11 +81,14 @@ async def _run(service: ServiceSettings, settings: KioskSettings, options: Visit
     files = kiosk_files()
     hello = Hello(languages=settings.languages, sound=settings.sound, speech=settings.speech,
                   version=f"{version('denseface')}-{files.digest[:12]}")
-    with closing(AsyncClient(service.address, key=service.key, hub_key=service.hub_key)) as hub:
+    with closing(AsyncOperator(service.address, key=service.key, hub_key=service.hub_key)) as hub:
+        kiosk = Kiosk(options, new_id=lambda: secrets.token_hex(16), utc=_utc)
         links = links_of(settings, hub.get)
+        routes = operator_routes(hub, service, settings, files, kiosk.hint_statistics.as_dict,
+                                 links.forget if links else _no_links)
         conductor = Conductor(
-            Kiosk(options, new_id=lambda: secrets.token_hex(16), utc=_utc), hub, kept,
-            ConductorOptions(hello, settings.sensor, settings.measurements), links)
+            kiosk, hub, kept, ConductorOptions(hello, settings.sensor, settings.measurements),
+            links)
         conductor.start()
         also = [asyncio.create_task(asyncio.to_thread(prepare))] if settings.measurements else []
         button = [] if settings.button is None else [
@@ -90,7 +96,7 @@ async def _run(service: ServiceSettings, settings: KioskSettings, options: Visit
         working: list[asyncio.Future[Any]] = [asyncio.create_task(work) for work in (
             _beat(supervisor),
             watch_hub(hub, settings.sensor, conductor.service_is),
-            _serve_page(settings, conductor, files, tls),
+            _serve_page(settings, conductor, files, routes, tls),
             *([links.serve()] if links else []), *button)]
         try:
             await asyncio.wait([stopped, *working], return_when=asyncio.FIRST_COMPLETED)
@@ -107,7 +113,8 @@ async def _run(service: ServiceSettings, settings: KioskSettings, options: Visit
 
 
 async def _serve_page(
-    settings: KioskSettings, conductor: Conductor, files: Files, tls: ssl.SSLContext | None
+    settings: KioskSettings, conductor: Conductor, files: Files, routes: Sequence[Route],
+    tls: ssl.SSLContext | None,
 ) -> None:
     """Serve the page until cancelled."""
     bound = await bind(settings.address, "--kiosk-address")
@@ -115,8 +122,12 @@ async def _serve_page(
     origins = origins_of(settings.scheme, host, port, settings.proxy)
     _log.info("the page for visitors",
               url=" ".join([url_of(settings.scheme, bound), *settings.proxy]))
-    await serve(kiosk_app(conductor.page, origins, files, asks_consent=settings.consent),
+    await serve(kiosk_app(conductor.page, origins, files, routes, asks_consent=settings.consent),
                 bound, tls)
+
+
+async def _no_links(_: str) -> None:
+    """There are none to a capture."""
 
 
 async def _beat(supervisor: SupervisorLink) -> None:

@@ -60,6 +60,8 @@ class LogOutput:
         self._torn = False
         self._gathering = self._hurried = False
         self._thread: threading.Thread | None = None
+        self.kept: deque[bytes] = deque(maxlen=0)
+        """The last lines, where `keep` was called: for whoever shows the log."""
         self._recovering: int | None = None
         """Number of the thread while it is in `on_recovery`."""
 
@@ -68,9 +70,14 @@ class LogOutput:
         """Lines lost since the start of this process."""
         return self._lost
 
+    def keep(self, lines: int) -> None:
+        """Keep so many of the last lines from now on."""
+        self.kept = deque(self.kept, maxlen=lines)
+
     def put(self, line: str) -> None:
         """Write a line, without its end, some time later; for any thread."""
         data = (line + "\n").encode(errors="backslashreplace")
+        self.kept.append(data)
         if self._recovering == threading.get_ident():
             self._lost += not self._write(data)
             return

@@ -12,7 +12,7 @@ CONTENT_SECURITY_POLICY = (
     "connect-src 'self'; font-src 'self'; base-uri 'none'; form-action 'self'; "
     "frame-ancestors 'none'")
 """Scripts, styles and all else come from this server, none stands in the page itself."""
-_FEATURES = ("accelerometer", "bluetooth", "camera", "display-capture", "geolocation",
+_FEATURES = ("accelerometer", "camera", "display-capture", "geolocation",
              "gyroscope", "hid", "magnetometer", "microphone", "midi", "payment",
              "publickey-credentials-get", "serial", "usb", "xr-spatial-tracking")
 """Of browsers; the page needs none: the camera is the service's."""

@@ -2,12 +2,15 @@
 
 import json
 import re
+from typing import get_args
 
 import pytest
 
 from denseface.service.gate.faults import Fault
 from denseface.service.kiosk import page_messages
 from denseface.service.kiosk.installed import LANGUAGES
+from denseface.service.kiosk.visit.hint_statistics import VisitEnd
+from denseface.service.protocol.sensor_messages import LiveStateName
 from tests.kiosk_states import LANGUAGES as NAMES
 
 SOURCES = LANGUAGES.parent / "frontend" / "src"
@@ -25,6 +28,17 @@ FAMILIES = {
               for part in ("name", "about")] + [
                   f"{page}.{part}" for page in ("gone", "unknown", "busy")
                   for part in ("title", "text")],
+    "operator": [
+        *(f"hub.{state}" for state in ("serving", "opening", "rebuilding")),
+        *(f"sensor.{state}" for state in get_args(LiveStateName)),
+        *(f"ends.{end}" for end in VisitEnd),
+        *(f"visits.{count}" for count in ("visits", "captures", "faces", "kept")),
+        *(f"captures.{column}" for column in ("picture", "when", "state", "actions")),
+        *(f"state.{state}" for state in (
+            "accepted", "working", "saving", "done", "failed", "dead", "other")),
+        *(f"error.{error}" for error in (
+            "token", "tries", "login", "hub", "refused", "unknown", "no_face", "settings",
+            "offline", "request", "other"))],
 }
 """Keys of which a part is said by the server or stands in a table of the page."""
 OF_FAMILIES = {f"{family}.{name}" for family, names in FAMILIES.items() for name in names}
