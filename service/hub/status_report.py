@@ -68,8 +68,11 @@ class StatusReport:
     def tick(self, now: float) -> Iterator[Output]:
         """Publish it at each heartbeat, or where presses are refused now or no longer."""
         self._changed |= self._why_refused() != self._obstacle
-        if now >= self._heartbeat_due or now >= self.due():
+        if now >= self._heartbeat_due:  # whatever was told between: a snapshot is taken of these
+            self._heartbeat_due = now + self._settings.heartbeat_s
             yield self._publish(now)
+        else:
+            yield from self.tell_changes(now)
 
     def make(self, request: int = 0) -> messages.Status:
         """Give the status; LocalProtocolError where a name or count is none that it may have."""
@@ -82,7 +85,6 @@ class StatusReport:
     def _publish(self, now: float) -> Output:
         # First, so that a status that cannot be made is not tried at each message.
         self._changed, self._published = False, now
-        self._heartbeat_due = now + self._settings.heartbeat_s
         status = self.make()
         self._obstacle = status.obstacle
         return Publish(Topic.STATUS, Packet(status))

@@ -57,6 +57,24 @@ def test_the_wrong_role_is_told_so(hub):
     _run(main())
 
 
+def test_a_hub_that_dies_is_known_to_be_gone(tmp_path):
+    async def main():
+        with guarded_hub(tmp_path) as mortal:
+            async with (_client(mortal, "subscriber") as client,
+                        aclosing(client.statuses(timeout=LIMIT_S)) as statuses):
+                while (status := await anext(statuses)) is None:
+                    pass  # it has not begun
+                assert status.retention_s == 86400.0
+                mortal.process.kill()
+                while await anext(statuses) is not None:
+                    pass  # what it said last
+            async with (_client(mortal, "presser") as client,
+                        aclosing(client.statuses(timeout=LIMIT_S)) as statuses):
+                assert await anext(statuses) is None
+
+    _run(main())
+
+
 def test_a_key_that_is_not_allowed_is_told_so(hub):
     hub.new_key("aio-stranger")
 

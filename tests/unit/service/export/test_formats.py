@@ -7,12 +7,14 @@ import struct
 import subprocess
 import sys
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import numpy as np
 import open3d as o3d
 import pytest
 from scipy.spatial import KDTree
 
+from denseface.recon.face import Consent
 from denseface.service.errors import FormatError
 from denseface.service.export import FORMATS, load_face, save_face
 from denseface.service.export.mesh import triangulate
@@ -105,7 +107,10 @@ def test_triangles_cover_the_grid_once_and_no_step():
 
 
 def test_npz_gives_the_whole_face_back(tmp_path):
+    consent = Consent(text_version="1", language="en", retention_s=60.0,
+                      at=datetime(2026, 1, 31, tzinfo=UTC))
     face = small_face()
+    face = replace(face, report=face.report.model_copy(update={"consent": consent}))
     save_face(face, tmp_path / "face.npz")
     back = load_face(tmp_path / "face.npz")
     for name in ("points", "colors"):
