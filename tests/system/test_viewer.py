@@ -75,15 +75,19 @@ def test_a_face_is_drawn_in_its_colours_and_then_nothing_runs(page: Page) -> Non
     assert page.evaluate("page.drawings") == before
 
 
-def test_it_turns_by_itself_until_it_is_touched(page: Page) -> None:
+@pytest.mark.parametrize("by", ["touch", "button"])
+def test_it_turns_by_itself_until_it_is_touched(page: Page, by: str) -> None:
     page.evaluate("page.show('dome.face')")
     page.evaluate("page.viewer.turning = true")
     count = page.evaluate("page.drawings")
     page.evaluate("""async (count) => {
       while (page.drawings < count) await new Promise((done) => setTimeout(done, 20));
     }""", count + 20)
-    page.mouse.click(200, 160)
-    assert page.evaluate("page.touches") == 1
+    if by == "touch":
+        page.mouse.click(200, 160)
+        assert page.evaluate("page.touches") == 1
+    else:
+        page.evaluate("page.viewer.rotate(15, 0)")
     assert page.evaluate("page.viewer.turning") is False
     page.evaluate("page.still()")
 
@@ -110,21 +114,28 @@ def test_gestures_change_what_is_seen_and_a_double_tap_undoes_it(page: Page, ges
     assert np.abs(picture(page) - before).mean() < 1
 
 
-def test_two_fingers_bring_it_nearer(page: Page) -> None:
+def test_two_fingers_bring_it_nearer_and_move_it(page: Page) -> None:
     page.evaluate("page.show('sample.face')")
     before = covered(picture(page)).mean()
     touches = page.context.new_cdp_session(page)
 
-    def fingers(kind: str, apart: int) -> None:
-        points = [] if kind == "touchEnd" else [{"x": 200 - apart, "y": 160, "id": 1},
-                                                {"x": 200 + apart, "y": 160, "id": 2}]
+    def fingers(kind: str, apart: int, middle: int = 200) -> None:
+        points = [] if kind == "touchEnd" else [{"x": middle - apart, "y": 160, "id": 1},
+                                                {"x": middle + apart, "y": 160, "id": 2}]
         touches.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
     fingers("touchStart", 30)
     for apart in (40, 50, 60):
         fingers("touchMove", apart)
     fingers("touchEnd", 0)
-    assert covered(picture(page)).mean() > 1.5 * before
+    near = covered(picture(page))
+    assert near.mean() > 1.5 * before
+    fingers("touchStart", 60)
+    for middle in (210, 230, 250):
+        fingers("touchMove", 60, middle)
+    fingers("touchEnd", 0)
+    moved = covered(picture(page))
+    assert 40 < moved[160].argmax() - near[160].argmax() < 60, "along with the fingers"
 
 
 def test_confidence_points_and_the_initial_cloud_look_different(page: Page) -> None:

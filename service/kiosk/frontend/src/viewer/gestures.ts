@@ -34,6 +34,8 @@ const KEY_ZOOM = 1.2;
  */
 export function listen(canvas: HTMLCanvasElement, target: GestureTarget, signal: AbortSignal): void {
   const fingers = new Map<number, { x: number; y: number }>();
+  // The browser is to leave fingers on the canvas alone.
+  canvas.style.touchAction = "none";
   let tap = { time: -Infinity, x: 0, y: 0 };
   let moved = 0;
   let last = { time: 0, yaw: 0, pitch: 0 };

@@ -129,6 +129,14 @@ export class Stage {
     return at;
   }
 
+  /** Which part of the face's half width and half height a CSS pixel is. */
+  partsOfPixel(): [number, number] {
+    if (!this.#loaded) return [0, 0];
+    const [halfWidth, halfHeight] = this.#loaded.surface.halfSize;
+    const pixel = this.#camera.position.z * this.renderer.getPixelRatio() / this.#focal.value;
+    return [pixel / Math.max(1, halfWidth), pixel / Math.max(1, halfHeight)];
+  }
+
   /** Gives everything back; the canvas is of no use any more. */
   dispose(): void {
     this.load(null);

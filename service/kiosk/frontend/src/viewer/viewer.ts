@@ -143,22 +143,19 @@ export class FaceViewer {
     this.#flat?.clearRect(0, 0, this.#canvas.width, this.#canvas.height);
   }
 
-  /** Turns by degrees: `dx` to the right, `dy` down. */
+  /** Turns by degrees, `dx` to the right, `dy` down, and no more by itself. */
   rotate(dx: number, dy: number): void {
-    this.#pose.rotate(dx, dy);
-    this.#request();
+    this.#moved(() => this.#pose.rotate(dx, dy));
   }
 
-  /** Comes nearer by a factor above 1, goes away by one below. */
+  /** Comes nearer by a factor above 1, goes away by one below; turns no more by itself. */
   zoom(factor: number): void {
-    this.#pose.zoom(factor);
-    this.#request();
+    this.#moved(() => this.#pose.zoom(factor));
   }
 
-  /** Shows the face from the front again, all of it. */
+  /** Shows the face from the front again, all of it; it turns no more by itself. */
   reset(): void {
-    this.#pose.reset();
-    this.#request();
+    this.#moved(() => this.#pose.reset());
   }
 
   /** To be called when the canvas's size in CSS pixels has changed. */
@@ -184,12 +181,17 @@ export class FaceViewer {
         this.turning = false;
         this.onTouched?.();
       },
-      turn: (yaw, pitch) => this.#moved(() => pose.rotate(yaw, pitch, true)),
+      turn: (yaw, pitch) => {
+        // From near, a finger moves over less of the face.
+        const part = 1 / Math.max(1, Math.sqrt(pose.view.zoom));
+        this.#moved(() => pose.rotate(part * yaw, part * pitch, true));
+      },
       flick: (yaw, pitch) => this.#flick(yaw, pitch),
       zoom: (factor) => this.#moved(() => pose.zoom(factor, true)),
-      pan: (x, y) => this.#moved(() => pose.pan(
-        3 * x / Math.max(1, this.#canvas.clientWidth) / pose.view.zoom,
-        3 * y / Math.max(1, this.#canvas.clientHeight) / pose.view.zoom, true)),
+      pan: (x, y) => {
+        const [across, down] = this.#stage?.partsOfPixel() ?? [0, 0];
+        this.#moved(() => pose.pan(x * across, y * down, true));
+      },
       reset: () => this.reset(),
     }, signal);
     this.#canvas.addEventListener("webglcontextlost", (event) => event.preventDefault(), { signal });
@@ -197,6 +199,7 @@ export class FaceViewer {
   }
 
   #moved(change: () => void): void {
+    this.#pose.turning = false;
     change();
     this.#request();
   }
