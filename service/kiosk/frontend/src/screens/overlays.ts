@@ -40,7 +40,7 @@ export class Overlays {
     const [first, then] = [t(`trouble.${gone}`), t(`trouble.${gone}_next`)];
     this.alert.replaceChildren(html("div", { class: wide ? "veil" : "banner", "data-trouble": gone },
       html("div", { class: wide ? "card" : "line" },
-        html("div", { class: "mark" }, icon("gone")),
+        html("div", { class: "mark" }, icon(gone === "sensor" ? "gone" : "clock")),
         html("div", {}, html("p", { class: "first" }, first), html("p", {}, then)))));
     kiosk.speech.say(`${first} ${then}`);
   }

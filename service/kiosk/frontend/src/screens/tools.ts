@@ -56,7 +56,8 @@ export function beforeAfter(face: FaceStage, { t }: Texts): HTMLElement {
   const end = (action: string, percent: number): HTMLButtonElement => button({
     action, label: t(`view.${action}`), look: "quiet", repeats: true, press: () => blend(percent),
   });
-  return html("div", { class: "blend" }, end("before", 0), slider, end("after", 100));
+  // The line on the face goes with the slider, in every language.
+  return html("div", { class: "blend", dir: "ltr" }, end("before", 0), slider, end("after", 100));
 }
 
 const MODES: readonly Mode[] = ["mesh", "points", "sigma"];
