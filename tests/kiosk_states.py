@@ -100,6 +100,8 @@ class States:
     def __init__(self, **hello: Any) -> None:
         self.said: list[Any] = []
         """What the pages said, checked; oldest first."""
+        self.away = False
+        """Whether pages that come are sent away."""
         self.hello = Hello(**{"languages": LANGUAGES, "version": "1", **hello})
         self._screen = Screen(visit=1, name="attract")  # type: ignore[arg-type]
         self._pages: set[WebSocket] = set()
@@ -140,6 +142,9 @@ class States:
     async def talk(self, page: WebSocket) -> None:
         """Serve one page."""
         await page.accept()
+        if self.away:
+            await page.close(1013)
+            return
         await page.send_text(self.hello.model_dump_json())
         self._pages.add(page)
         await self._send(page)

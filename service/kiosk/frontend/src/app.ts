@@ -174,12 +174,17 @@ export class App {
   }
 
   private draw(): void {
-    const { screen, texts: { size }, root } = this;
+    const { screen } = this;
     const texts = this.texts.get(this.language);
-    if (!texts || size === 0) return;
+    if (!texts) return;
     const kiosk = this.kiosk(texts);
+    if (screen) this.drawScreen(screen, kiosk);
+    // Last, as a question over the screen takes the focus.
     this.overlays.update(screen, this.lost, kiosk);
-    if (!screen) return;
+  }
+
+  private drawScreen(screen: Screen, kiosk: Kiosk): void {
+    const { root } = this;
     root.dataset["screen"] = screen.name;
     root.dataset["visit"] = String(screen.visit);
     root.dataset["seen"] = String((screen.name === "attract" || screen.result !== null)

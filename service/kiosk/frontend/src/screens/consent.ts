@@ -46,7 +46,7 @@ export const consent: MakeView = (screen, kiosk) => {
     html("div", { class: "head" }, speechToggle(kiosk, () => spoken)),
     html("div", { class: "card" },
       title,
-      html("div", { class: "text", tabindex: asked.text === null ? undefined : 0 }, ...said),
+      html("div", { class: "text", tabindex: 0 }, ...said),
       html("div", { class: "answers" }, answer(false), answer(true))),
     html("div", { class: "foot" }, languagePicker(kiosk)));
   return { element, focus: title, spoken };
