@@ -80,6 +80,28 @@ def test_a_listener_on_the_other_loopback(context):
         listener.close()
 
 
+def test_who_has_gone_is_told_after_all_that_it_said(context, wakes):
+    settings = ServiceSettings(address=_address())
+    listeners = Listeners(context, settings, Rejections(Counters()), [wakes])
+    other = zmq.Context()
+    try:
+        dealer = other.socket(zmq.DEALER)
+        dealer.connect(settings.address)
+        for number in range(40):  # more than are read in one go
+            dealer.send(b"%d" % number)
+        other.destroy(linger=LIMIT_MS)
+        said = []
+        while True:
+            said += listeners.receive(LIMIT_MS)
+            if gone := [*listeners.take_gone()]:
+                break
+        assert [one.parts[0] for one in said] == [b"%d" % number for number in range(40)]
+        assert gone == [(said[0].peer, True)]
+        assert [*listeners.take_gone()] == []
+    finally:
+        listeners.close()
+
+
 def test_an_address_in_use_is_named(context):
     address = _address()
     listener = Listener(context, address, None, Rejections(Counters()))

@@ -90,3 +90,26 @@ def test_all_may_be_closed_at_once(ids, descriptors):
     ids.all_closed()
     assert not ids.is_open(b"a", b"token")
     ids.closed(other)
+
+
+def test_whose_connection_closed_is_told_once_and_not_of_those_that_were_cut(ids, descriptors):
+    one, other = descriptors
+    ids.claim(b"a", "key", b"token", one)
+    ids.closed(one)
+    ids.closed(other)  # by it nothing was said
+    assert ids.has_closed
+    assert ids.take_closed() == [b"tokena"]
+    assert not ids.has_closed
+    assert ids.take_closed() == []
+    ids.opened(one)
+    ids.claim(b"a", "key", b"token", one)
+    ids.all_closed()
+    assert ids.take_closed() == []
+
+
+def test_an_id_that_moved_to_another_connection_is_not_gone_with_the_first(ids, descriptors):
+    one, other = descriptors
+    ids.claim(b"a", "key", b"token", one)
+    ids.claim(b"a", "key", b"token", other)
+    ids.closed(one)
+    assert ids.take_closed() == []
