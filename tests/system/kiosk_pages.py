@@ -21,7 +21,7 @@ KIOSK = ("--kiosk-address", "0")
 def kiosk_service(source, folder: Path, *arguments, environment=None):
     """Run the service with a kiosk, and give it and the page's URL."""
     with service(source, folder / "data", *KIOSK, "--kiosk-folder", folder / "kiosk", *arguments,
-                 environment={"DENSEFACE_KIOSK": "on"} | (environment or {})) as running:
+                 environment=(environment or {}) | {"DENSEFACE_KIOSK": "on"}) as running:
         yield running, kiosk_url(running)
 
 
