@@ -10,6 +10,11 @@ from denseface.service.protocol.sensor_messages import Gate
 __all__ = ["Decision", "GatedPress"]
 
 
+_BETTER_WITHIN_S = 0.3
+"""After the first frame with nothing wrong `best` looks for a better one for so long, seconds: ten
+frames, in which a head that swings comes to rest. So its frame is never much older than that."""
+
+
 class Decision(Enum):
     """What becomes of a press with a frame that was judged."""
 
@@ -57,6 +62,8 @@ class GatedPress:
     def _decide_best(self, judged: Judged, now_s: float, *, settled: bool) -> Decision:
         """Take a frame that is surely good at once, the best one at the end, faults and all.
 
+        The end is the deadline, or a moment after the first frame with nothing wrong.
+
         A frame without a face is taken where no other came, one without anybody never.
         """
         if surely_good(judged.quality):
@@ -64,6 +71,9 @@ class GatedPress:
         score = score_of(judged.quality)
         better = score is not None and (self.best is None or score < self.best)
         if better:
+            if score is not None and score.severity == 0 and (
+                    self.best is None or self.best.severity > 0):
+                self.deadline_s = min(self.deadline_s, now_s + _BETTER_WITHIN_S)
             self.best = score
         with_face = self.best is not None and self.best.with_face
         if now_s < self.deadline_s or not (settled or with_face):

@@ -153,9 +153,9 @@ class State:
         visit.capture_id = self._new_id()
         self.statistics.captures += 1
         self.statistics.positioning_s += now_s - visit.searching_since_s
+        best_of_s = self.options.anyhow_best_of_s if visit.anyhow else self.options.best_of_s
         self.effects.append(TakePicture(
-            visit.number, visit.capture_id, self.options.best_of_s, visit.anyhow,
-            visit.consented))
+            visit.number, visit.capture_id, best_of_s, visit.consented))
         self.timers.start(visit.number, Timer.ANSWER, now_s + self.options.answer_s)
 
     def withdraw(self, capture_id: str, now_s: float) -> None:

@@ -151,8 +151,11 @@ def _wait(state: State, due: Timer, now_s: float) -> None:  # noqa: ARG001
 
 def _show(state: State, happened: FaceCame, now_s: float) -> None:
     visit = state.visit
+    result = happened.result
+    if visit.anyhow and not result.warnings:
+        result = result.model_copy(update={"warnings": state.guidance.codes})
     visit.captures.append(happened.capture_id)
-    visit.capture_id, visit.result, visit.keep = None, happened.result, None
+    visit.capture_id, visit.result, visit.keep = None, result, None
     visit.drawn = visit.linking = False
     visit.touched_s = now_s
     state.statistics.faces += 1

@@ -29,13 +29,12 @@ class TakePicture:
     """Press, then wait for the face.
 
     The answers are `FrameTaken` or `CaptureRefused`, then `FaceCame` or `FaceFailed`. The best
-    frame of `best_of_s` seconds is taken, whatever is wrong with it where `anyhow`.
+    frame of `best_of_s` seconds is taken, whatever is wrong with it.
     """
 
     visit: int
     capture_id: str
     best_of_s: float
-    anyhow: bool
     consent: Consented | None
 
 

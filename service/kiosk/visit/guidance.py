@@ -30,8 +30,8 @@ class Guidance:
         self._slow_from_s = now_s + options.slow_s
         self._shown: str | None = None
         self._shown_since_s = now_s
-        self._code: str | None = None
-        """What is wrong with the last sample."""
+        self.codes: tuple[str, ...] = ()
+        """What is wrong with the last sample, the most important first."""
         self._sampled = False
         self._good_since_s: float | None = None
         self._good_s = 0.0
@@ -43,20 +43,22 @@ class Guidance:
         self._sampled = True
         if has_face(hint):
             self._faced_s = now_s
-        self._code = hint.codes[0] if hint.codes else None
-        if self._code is not None:
+        self.codes = hint.codes
+        if self.codes:
             self._good_since_s, self._good_s = None, 0.0
         elif self._good_since_s is None:
             self._good_since_s = now_s
         else:
             self._good_s = now_s - self._good_since_s
-        if self._code != self._shown and (
+        first = self.codes[0] if self.codes else None
+        if first != self._shown and (
                 self._shown is None or now_s - self._shown_since_s >= SHOWN_S):
-            self._shown, self._shown_since_s = self._code, now_s
+            self._shown, self._shown_since_s = first, now_s
 
     def forget(self) -> None:
         """Let what was seen count no more: there are no pictures now, or a countdown ended."""
-        self._shown = self._code = self._good_since_s = None
+        self._shown = self._good_since_s = None
+        self.codes = ()
         self._sampled, self._good_s = False, 0.0
 
     def begin_again(self, now_s: float) -> None:
@@ -81,7 +83,7 @@ class Guidance:
     @property
     def nobody(self) -> bool:
         """Whether the last sample shows nobody at all."""
-        return self._code == Fault.NOBODY
+        return self.codes[:1] == (Fault.NOBODY,)
 
     def warns(self, now_s: float) -> bool:
         """Whether a press would take the best there is, with its warnings."""

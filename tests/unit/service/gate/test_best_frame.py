@@ -84,6 +84,15 @@ def test_the_best_frame_of_the_time_is_taken_with_its_faults():
     assert press(seen(motion_mm=7.0), 1.0) is Decision.TAKE_KEPT
 
 
+def test_after_a_frame_with_nothing_wrong_a_better_one_is_looked_for_a_moment_only():
+    press = Press()
+    assert press(seen(motion_mm=9.0), 0.1) is Decision.KEEP
+    assert press(seen(motion_mm=3.5), 0.2) is Decision.KEEP
+    assert press(seen(motion_mm=2.0), 0.4) is Decision.KEEP
+    assert press(seen(motion_mm=2.5), 0.49) is Decision.WAIT
+    assert press(seen(motion_mm=9.0), 0.52) is Decision.TAKE_KEPT
+
+
 def test_the_last_frame_may_be_the_best():
     press = Press()
     assert press(seen(motion_mm=9.0), 0.1) is Decision.KEEP

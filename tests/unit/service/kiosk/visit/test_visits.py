@@ -34,7 +34,7 @@ def test_a_visit_from_the_first_screen_to_the_last():
         kiosk.wait(1.0)
     assert shown == [3, 2, 1, 0]
     assert kiosk.mirror
-    assert kiosk.of(TakePicture) == [TakePicture(1, "c1", 0.3, anyhow=False, consent=Consented(
+    assert kiosk.of(TakePicture) == [TakePicture(1, "c1", 1.0, consent=Consented(
         "built-in-1", "fr", DAY_S, "2026-11-29T12:00:00+00:00"))]
     kiosk.answer(events.FrameTaken)
     assert kiosk.name == "captured"
@@ -177,7 +177,9 @@ def test_after_long_the_button_takes_the_best_there_is():
     assert kiosk.screen.position.with_warnings
     kiosk.say(page.Press)
     kiosk.hints(*[hint("look_here", face=False)] * 31)
-    assert [one.anyhow for one in kiosk.of(TakePicture)] == [True]
+    assert [one.best_of_s for one in kiosk.of(TakePicture)] == [0.3]
+    kiosk.face()
+    assert kiosk.screen.result.warnings == ("look_here",)
 
 
 def test_a_second_press_a_held_key_and_key_repeat_are_one_picture():
