@@ -175,6 +175,14 @@ def test_a_lost_context_comes_back(page: Page) -> None:
     assert np.abs(picture(page) - before).mean() < 1
 
 
+def test_a_face_that_comes_without_a_context_is_shown_when_that_is_back(page: Page) -> None:
+    page.evaluate("page.loseContext()")
+    page.evaluate("() => { window.shown = page.show('sample.face') }")
+    page.evaluate("page.restoreContext()")
+    assert page.evaluate("shown") is True
+    assert covered(picture(page)).any()
+
+
 def test_without_webgl_there_is_a_picture(page: Page) -> None:
     page.evaluate("""() => {
       const given = HTMLCanvasElement.prototype.getContext;

@@ -131,3 +131,34 @@ test("cut off anywhere it is refused", async () => {
     await assert.rejects(decodeFaceGrid(dome.slice(0, end)), FaceGridError);
   }
 });
+
+/** Numbers that look random and are the same in every run (mulberry32). */
+function* numbers(seed: number): Generator<number> {
+  for (let a = seed; ;) {
+    a = (a + 0x6d2b79f5) | 0;
+    let t = Math.imul(a ^ (a >>> 15), 1 | a);
+    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
+    yield ((t ^ (t >>> 14)) >>> 0) / 2 ** 32;
+  }
+}
+
+test("bytes changed at random are read or refused, and nothing else", async () => {
+  const random = numbers(12);
+  const next = (below: number): number => Math.floor(random.next().value! * below);
+  const spoil = (bytes: Uint8Array): Uint8Array => {
+    for (let n = 0; n <= next(4); n++) bytes[next(bytes.length)] = next(256);
+    return bytes;
+  };
+  let read = 0;
+  for (let round = 0; round < 400; round++) {
+    const given = round % 2 === 0 ? spoil(dome.slice()) : remade({}, spoil);
+    try {
+      const face = await decodeFaceGrid(given);
+      assert.ok(face.z.every(Number.isFinite) && face.seeds.positions.every(Number.isFinite));
+      read += 1;
+    } catch (error) {
+      assert.ok(error instanceof FaceGridError, String(error));
+    }
+  }
+  assert.ok(read > 20 && read < 380, `${read} of 400 were read`);
+});

@@ -128,11 +128,14 @@ export class FaceViewer {
     this.#face = face;
     this.#pose.reset(true);
     this.#stage?.load(face);
-    // What comes first is as coarse as what moves: the rest follows.
-    this.#draw(this.#detail.stride);
-    this.#request();
-    const done = this.#graphics ? await drawn(this.#graphics.context) : true;
-    return done && this.#face === face;
+    for (;;) {
+      // What comes first is as coarse as what moves: the rest follows.
+      this.#draw(this.#detail.stride);
+      this.#request();
+      if (!this.#graphics || await drawn(this.#graphics.context)) return this.#face === face;
+      await this.#restored();
+      if (this.#face !== face) return false;
+    }
   }
 
   /** Shows nothing, and forgets the face. */
@@ -196,6 +199,16 @@ export class FaceViewer {
     }, signal);
     this.#canvas.addEventListener("webglcontextlost", (event) => event.preventDefault(), { signal });
     this.#canvas.addEventListener("webglcontextrestored", () => this.resize(), { signal });
+  }
+
+  /** Waits until the graphics context is there again, or the viewer is disposed of. */
+  #restored(): Promise<void> {
+    return new Promise((done) => {
+      const { signal } = this.#ended;
+      if (signal.aborted) done();
+      signal.addEventListener("abort", () => done(), { once: true });
+      this.#canvas.addEventListener("webglcontextrestored", () => done(), { once: true, signal });
+    });
   }
 
   #moved(change: () => void): void {
