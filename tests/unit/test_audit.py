@@ -58,3 +58,25 @@ def test_another_service_is_asked_where_one_knows_nothing(audit, monkeypatch):
 def test_no_service_is_not_no_vulnerability(audit, monkeypatch):
     _answering(monkeypatch, _NOT_THERE, "")
     assert audit.vulnerabilities() is None
+
+
+_OF_THE_FRONT_END = json.dumps({"vulnerabilities": {
+    "a": {"range": "<2", "via": [{"url": "https://example.org/V-1"}]},
+    "b": {"range": "*", "via": ["a"]}}})
+
+
+@pytest.mark.parametrize(("answer", "known"), [
+    (_OF_THE_FRONT_END, ["a <2: https://example.org/V-1"]),
+    (json.dumps({"vulnerabilities": {}}), []),
+    (json.dumps({"message": "405 Method Not Allowed"}), None),
+    ("", None),
+])
+def test_of_the_front_end_too(audit, monkeypatch, answer, known):
+    _answering(monkeypatch, answer)
+    assert audit.frontend_vulnerabilities() == known
+
+
+def test_the_front_ends_packages_have_licences_that_are_allowed(audit):
+    licences = audit.frontend_licences()
+    assert licences["three"] == "MIT"
+    assert not {name: text for name, text in licences.items() if not audit.is_allowed(text)}
