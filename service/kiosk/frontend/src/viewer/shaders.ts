@@ -24,6 +24,12 @@ vec3 light(vec3 n) {
   float key = clamp((dot(n, KEY) + WRAP) / (1.0 + WRAP), 0.0, 1.0);
   return mix(GROUND, SKY, 0.5 + 0.5 * n.y) + LAMP * key;
 }
+/* For the colours of the scale, which are to be found in its legend: a grazing light, about 1 on
+ * what faces the viewer, so that a face is seen in them. */
+float relief(vec3 n) {
+  const vec3 GRAZING = vec3(-0.62, 0.52, 0.588);
+  return clamp(0.46 + 0.92 * dot(n, GRAZING), 0.45, 1.2);
+}
 /* Less on dark skin, where it would look like dust. */
 float sheen(vec3 n, vec3 skin) {
   vec3 between = normalize(KEY + vec3(0.0, 0.0, 1.0));
@@ -55,8 +61,7 @@ void main() {
   vec3 lit = light(n);
   vec3 skin = toLinear(tint.rgb);
   skin = skin * lit + sheen(n, skin);
-  /* The colours of the scale are to be found in its legend: half of the shading only. */
-  vec3 shown = toLinear(ofSigma(tint.a)) * mix(vec3(1.0), vec3(lit.g), 0.55);
+  vec3 shown = toLinear(ofSigma(tint.a)) * relief(n);
   color = toSrgb(mix(skin, shown, confidence));
   rim = bearing.w;
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
