@@ -28,13 +28,18 @@ def ready_status(client: Client, timeout: float) -> Status:
     while not status.ready:
         left = deadline - time.monotonic()
         if left <= 0:
-            missing = ("no hub" if status.state != "serving" else
-                       _no_sensor(status) if not status.has_frames else
-                       "no worker" if not status.workers else f"no room ({status.obstacle})")
-            raise ClientTimeoutError(f"{missing} is ready after {timeout:g} s")
+            raise ClientTimeoutError(f"{_missing(status)} after {timeout:g} s")
         time.sleep(min(_POLL_S, left))
         status = client.status()
     return status
+
+
+def _missing(status: Status) -> str:
+    if status.obstacle:
+        return f"presses are still refused ({status.obstacle})"
+    missing = ("no hub" if status.state != "serving" else
+               _no_sensor(status) if not status.has_frames else "no worker")
+    return f"{missing} is ready"
 
 
 def _no_sensor(status: Status) -> str:

@@ -40,6 +40,13 @@ def test_what_is_missing_at_the_end_is_named(last, missing):
         ready_status(Client(last), 0.01)
 
 
+def test_what_refuses_every_press_is_said():
+    full = status("s", workers=("w",), obstacle="disk")
+    with pytest.raises(ClientTimeoutError, match=r"presses are still refused \(disk\) after 0.01"):
+        ready_status(Client(full), 0.01)
+    assert "; presses are refused: disk" in as_text("ipc:///x", full)
+
+
 def test_json_and_text_say_the_same():
     shown = status("s")
     said = json.loads(as_json("ipc:///x", shown))
