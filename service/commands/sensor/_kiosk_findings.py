@@ -23,7 +23,8 @@ _NOT_ASKED = ("nobody is asked before a picture is taken",
 def look_at_kiosk(environment: Mapping[str, str] = os.environ) -> Iterator[Finding]:
     """Look at the kiosk's parts and settings, and at the one that runs here, if any."""
     if missing := why_not():
-        yield ok(_WHAT, missing)  # a service without one is whole
+        # A service without one is whole.
+        yield ok(_WHAT, f"cannot be served here: {missing.removeprefix('no kiosk: ')}")
         return
     try:
         settings = KioskSettings.of(environment)

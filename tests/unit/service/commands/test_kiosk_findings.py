@@ -48,7 +48,7 @@ def found(address="127.0.0.1:0", **environment):
 
 def test_what_is_missing_is_no_fault(monkeypatch):
     monkeypatch.setattr(_kiosk_findings, "why_not", lambda: "no kiosk: x is not installed")
-    assert found() == [(Level.OK, "no kiosk: x is not installed")]
+    assert found() == [(Level.OK, "cannot be served here: x is not installed")]
 
 
 def test_a_consent_that_is_switched_off_is_a_warning():

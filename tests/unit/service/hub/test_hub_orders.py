@@ -6,6 +6,7 @@ full disk, a slow one and a hub that is killed between two steps are among the e
 
 import shutil
 import tempfile
+from datetime import UTC, datetime
 from pathlib import Path
 from unittest.mock import patch
 
@@ -13,6 +14,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
+from denseface.recon.face import Consent
 from denseface.recon.settings import Settings
 from denseface.service.hub import Hub, settings_hash
 from denseface.service.hub.captures import Captures
@@ -31,6 +33,8 @@ from tests.unit.service.hub.bench import FACE, FACE_ARRAYS, FRAME, FRAME_ARRAYS
 HASH = settings_hash(Settings())
 SETTINGS = ServiceSettings(
     address="ipc:///unused", attempts=2, queue=4, reserve_mib=0, retention=3600)
+CONSENT = Consent(
+    text_version="1", language="en", retention_s=1000, at=datetime(2026, 1, 31, tzinfo=UTC))
 _MEMORY = Path("/dev/shm")  # noqa: S108
 """Syncing is not what is tested here."""
 ids = st.sampled_from("abcd")
@@ -223,11 +227,12 @@ class AnyOrder(RuleBasedStateMachine):
     def sensor(self):
         self.say(b"s", messages.SensorReady(name="s", source="x"))
 
-    @rule(capture_id=ids, again=st.booleans())
-    def press(self, capture_id, again=False):
+    @rule(capture_id=ids, again=st.booleans(), consent=st.sampled_from([None, CONSENT]))
+    def press(self, capture_id, again=False, consent=None):
         self.pressed.add(capture_id)
         self.request += not again
-        self.say(b"c", messages.Press(request=self.request, capture_id=capture_id))
+        self.say(b"c", messages.Press(
+            request=self.request, capture_id=capture_id, consent=consent))
 
     @rule(capture_id=ids)
     def frame(self, capture_id):
@@ -309,6 +314,10 @@ class AnyOrder(RuleBasedStateMachine):
     def unreachable(self, peer):
         self.handle(self.hub.unreachable(peer))
 
+    @rule(peer=st.sampled_from([b"s", b"w1", b"w2", b"c"]), local=st.booleans())
+    def its_connection_ends(self, peer, local):
+        self.handle(self.hub.connection_ended(peer, local=local))
+
     @rule(days=st.sampled_from([-400, 400]))
     def set_the_wall_clock(self, days):
         self.clock.set_wall(days * 86400.0)
@@ -322,7 +331,10 @@ class AnyOrder(RuleBasedStateMachine):
             for _ in range(3):
                 self.tick()
                 self.now += 600.0
-        self.accepted &= set(self.store.unfinished())
+        left = self.store.unfinished()
+        assert all(self.store.consent(one) is None or
+                   self.states[one] is CaptureState.SAVING_FACE for one in left)
+        self.accepted &= set(left)
         assert not self.store.outcome_after(0)
 
     def operate(self, message):
