@@ -73,9 +73,12 @@ def portrait(face: Face, side: int) -> bytes:
     side : width and height, pixels
     """
     dense = face.dense
-    points, colors, _ = _subdivided(dense)
-    points = points - (dense.points.min(axis=0) + dense.points.max(axis=0)) / 2
-    pixels, rows = _visible(points, _scale(points, side), 0.0, dense.grid_step_mm, side)
+    points, colors = dense.points, dense.colors
+    center = (points.min(axis=0) + points.max(axis=0)) / 2
+    scale = _scale(points - center, side)
+    if scale * _OVERSAMPLING * dense.grid_step_mm > 1:  # else neighbours share a pixel
+        points, colors, _ = _subdivided(dense)
+    pixels, rows = _visible(points - center, scale, 0.0, dense.grid_step_mm, side)
     return _png(_panel(pixels, colors[rows], side))
 
 

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from denseface.service.protocol.hint import Code
-from denseface.service.protocol.message_base import CaptureId, Number, Seconds
+from denseface.service.protocol.message_base import CaptureId, Number
 
 __all__ = [
     "FACE", "FROM_PAGE", "MIRROR", "Again", "Arrow", "Begin", "Cancel", "Consent", "ConsentScreen",
@@ -229,7 +229,7 @@ class KeepScreen(_Said):
     """The QR code of `page`, a string of 0 and 1 for each row, without the quiet zone."""
     links: tuple[Link, ...] = ()
     uses: Number
-    expires_s: Seconds
+    expires_s: Annotated[float, Field(ge=0)]
 
 
 class FailedScreen(_Said):

@@ -3,8 +3,8 @@
 import time
 from collections.abc import Callable, Iterable
 from http import HTTPStatus
-from ipaddress import IPv6Address, ip_address, ip_network
 
+from denseface.service.kiosk.links.lan_server import client_of
 from denseface.service.kiosk.web.asgi import App, Receive, Scope, Send, header_values, refuse
 from denseface.service.runtime.bounded_dict import BoundedDict
 from denseface.service.runtime.token_bucket import TokenBucket
@@ -15,8 +15,6 @@ _METHODS = ("GET", "HEAD")
 _BURST, _RATE = 60.0, 2.0
 """Requests of one client at once, and a second in the long run: a room may share an address."""
 _MAX_CLIENTS = 4096
-_HOST_BITS_V6 = 64
-"""Last bits of an IPv6 address: a telephone chooses them anew whenever it likes."""
 _HOSTS_S = 5.0
 """Time for which the names of this machine are taken to stay as they are, seconds."""
 _RETRY_AFTER_S = 5
@@ -59,7 +57,7 @@ class LanGuard:
 
     def _has_room(self, scope: Scope) -> bool:
         now = self._clock()
-        client = _client(scope["client"][0] if scope["client"] else "")
+        client = client_of(scope["client"][0] if scope["client"] else "")
         bucket = self._clients.get(client)
         if bucket is None:
             bucket = self._clients[client] = TokenBucket(_BURST, _RATE, now)
@@ -71,16 +69,3 @@ class LanGuard:
             self._known = frozenset(self._hosts())
             self._known_until = now + _HOSTS_S
         return len(hosts) == 1 and hosts[0].lower() in self._known
-
-
-def _client(address: str) -> str:
-    """Give what stands for a client: an IPv4 address, or a network of IPv6."""
-    try:
-        found = ip_address(address)
-    except ValueError:
-        return address
-    if isinstance(found, IPv6Address):
-        if found.ipv4_mapped:
-            return str(found.ipv4_mapped)
-        return str(ip_network((int(found), 128 - _HOST_BITS_V6), strict=False))
-    return str(found)

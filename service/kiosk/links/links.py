@@ -24,7 +24,7 @@ from denseface.service.kiosk.links.addresses import (
 from denseface.service.kiosk.links.face_files import FORMATS, FaceFiles
 from denseface.service.kiosk.links.kept_links import KeptLinks
 from denseface.service.kiosk.links.lan_door import lan_door
-from denseface.service.kiosk.links.lan_server import LanConnection, show_what_is_left
+from denseface.service.kiosk.links.lan_server import BoundedListener, LanConnection
 from denseface.service.kiosk.links.link_file import LinkFile
 from denseface.service.kiosk.page_messages import KeepScreen, Link
 from denseface.service.kiosk.settings import KioskSettings
@@ -111,7 +111,7 @@ class Links:
         page = f"{base}/d/{token}"
         return KeepScreen(
             page=page, qr=qr_rows(page), uses=link.uses_left,
-            expires_s=min(3600.0, max(0.0, self._links.left_s(link))),
+            expires_s=max(0.0, self._links.left_s(link)),
             links=tuple(Link(format=one, url=f"{page}/face.{one}") for one in FORMATS))
 
     async def forget(self, capture_id: str) -> None:
@@ -134,8 +134,7 @@ class Links:
         AddressError
             Its address is none of this machine's, or this user may not have the port.
         """
-        bound = await bind(self._options.address, "--kiosk-lan")
-        show_what_is_left(bound)
+        bound = BoundedListener(await bind(self._options.address, "--kiosk-lan"))
         self.port = bound.getsockname()[1]
         self.listening.set()
         structlog.get_logger("links").info("links are served", scheme=self._scheme,

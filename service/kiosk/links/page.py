@@ -36,7 +36,7 @@ def page(texts: Texts, token: str, uses_left: int, until: datetime) -> str:
     return _document(texts, "links.title", (
         f"<p>{escape(texts['links.intro'])}</p><dl>"
         f"<div><dt>{escape(texts['links.until'])}</dt>"
-        f'<dd><time datetime="{until:%Y-%m-%dT%H:%M%z}">{until:%H:%M}</time></dd></div>'
+        f'<dd><time datetime="{until:%Y-%m-%dT%H:%M%z}">{_shown(until)}</time></dd></div>'
         f"<div><dt>{escape(texts['links.uses'])}</dt><dd>{uses_left}</dd></div></dl>"
         f"<ul>{files}</ul><small>{escape(texts['links.private'])}</small>"))
 
@@ -44,6 +44,12 @@ def page(texts: Texts, token: str, uses_left: int, until: datetime) -> str:
 def message_page(texts: Texts, what: str) -> str:
     """Write the page that says why there is nothing: `gone`, `unknown`, `busy`."""
     return _document(texts, f"links.{what}.title", f"<p>{escape(texts[f'links.{what}.text'])}</p>")
+
+
+def _shown(until: datetime) -> str:
+    """Write a time of today as a time alone, of another day with its date (ISO 8601)."""
+    today = datetime.now(until.tzinfo).date() == until.date()
+    return f"{until:%H:%M}" if today else f"{until:%Y-%m-%d} {until:%H:%M}"
 
 
 def _document(texts: Texts, title: str, body: str) -> str:

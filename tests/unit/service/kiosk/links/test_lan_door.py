@@ -279,6 +279,29 @@ def test_one_client_holds_no_more_than_its_share_of_connections(served):
     served(use)
 
 
+def test_who_opens_connections_and_says_nothing_does_not_shut_out_others(served, tmp_path):
+    """By TLS too, where nothing of HTTP is there before the handshake."""
+    make_certificate(tmp_path, "kiosk")
+    tls = tls_context(tmp_path / "kiosk.pem", tmp_path / "kiosk.key", "--lan-certificate")
+
+    async def use(door):
+        path = f"/d/{await door.token()}"
+        writers = [(await asyncio.open_connection("127.0.0.1", door.links.port))[1]
+                   for _ in range(100)]
+        for writer in writers[:12]:
+            writer.transport.abort()
+        door.tls = ssl.create_default_context(cafile=tmp_path / "kiosk.pem")
+        for _ in range(200):  # until it has seen that they are gone
+            with contextlib.suppress(OSError, IndexError):
+                assert (await door.ask(path))[0] == 200
+                break
+        else:
+            pytest.fail("shut out")
+        for writer in writers:
+            writer.transport.abort()
+    served(use, tls=tls)
+
+
 def test_garbage_is_answered_by_400_or_not_at_all(served):
     async def use(door):
         for data in (b"\0" * 100, b"GET\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n",

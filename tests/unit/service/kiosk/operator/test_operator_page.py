@@ -247,7 +247,8 @@ def test_a_hub_that_is_silent_is_said(tmp_path):
 def test_a_token_file_that_cannot_be_used_lets_nobody_in(page):
     async def use(browser):
         page.token.path.chmod(0o644)
-        assert (await browser.get(f"{API}/overview")).status_code == 503
+        answer = await browser.get(f"{API}/overview")
+        assert (answer.status_code, answer.json()["message"]) == (503, "")
         answer = await browser.post(f"{API}/login", json={"token": page.secret})
         assert (answer.status_code, answer.json()["error"]) == (503, "settings")
     page.run(use)
