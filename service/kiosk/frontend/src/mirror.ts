@@ -63,6 +63,7 @@ export class Mirror {
     if (canvas.width !== picture.width || canvas.height !== picture.height) {
       canvas.width = picture.width;
       canvas.height = picture.height;
+      canvas.toggleAttribute("data-upright", picture.height > picture.width);
     }
     const context = canvas.getContext("2d", { alpha: false });
     context?.setTransform(-1, 0, 0, 1, picture.width, 0);

@@ -43,11 +43,10 @@ export const consent: MakeView = (screen, kiosk) => {
     press: () => kiosk.say({ kind: "consent", agreed, language }),
   });
   const element = html("section", { class: "screen consent" },
-    html("div", { class: "head" }, speechToggle(kiosk, () => spoken)),
     html("div", { class: "card" },
       title,
       html("div", { class: "text", tabindex: 0 }, ...said),
       html("div", { class: "answers" }, answer(false), answer(true))),
-    html("div", { class: "foot" }, languagePicker(kiosk)));
+    html("div", { class: "foot" }, languagePicker(kiosk), speechToggle(kiosk, () => spoken)));
   return { element, focus: title, spoken };
 };
