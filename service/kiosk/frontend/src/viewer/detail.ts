@@ -10,6 +10,30 @@ const QUICK_MS = 14;
 /** Frames over which is judged. */
 const FRAMES = 8;
 
+/** Pixels for each CSS pixel, at most. */
+const MAX_RATIO = 2;
+/** Pixels of a canvas, at most: by a graphics card, and by a processor while it moves and when it
+ * stands. */
+const MAX_PIXELS = { card: 6e6, moving: 1.1e6, still: 2.5e6 };
+/** A processor does not smooth edges: what stands still is drawn larger instead. */
+const SOFTWARE_STILL_RATIO = 1.5;
+
+/**
+ * How many pixels are drawn for each CSS pixel.
+ *
+ * @param width of the canvas, CSS pixels, as its height
+ * @param device what the screen has
+ * @param software whether a processor computes pixels
+ * @param still whether nothing moves
+ */
+export function pixelRatio(
+  width: number, height: number, device: number, software: boolean, still: boolean,
+): number {
+  const wanted = !software ? Math.min(MAX_RATIO, device) : still ? SOFTWARE_STILL_RATIO : 1;
+  const most = !software ? MAX_PIXELS.card : still ? MAX_PIXELS.still : MAX_PIXELS.moving;
+  return Math.min(wanted, Math.sqrt(most / (width * height)));
+}
+
 /** Chooses the stride of what is drawn while it moves, by the time that frames take. */
 export class Detail {
   #stride: number;

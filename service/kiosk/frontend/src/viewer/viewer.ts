@@ -1,7 +1,7 @@
 /** A face to be looked at: turns by itself until touched, is turned, brought nearer and compared. */
 
 import type { FaceGrid } from "../face_grid.ts";
-import { Detail } from "./detail.ts";
+import { Detail, pixelRatio } from "./detail.ts";
 import { drawFlat, type Mode } from "./flat.ts";
 import { listen } from "./gestures.ts";
 import { drawn, openGraphics, type Graphics } from "./graphics.ts";
@@ -20,11 +20,6 @@ export interface ViewerOptions {
   readonly onFlat?: () => void;
 }
 
-/** Pixels for each CSS pixel, at most. */
-const MAX_RATIO = 2;
-/** In software: while moving, and when still. */
-const SOFTWARE_RATIO = 1;
-const SOFTWARE_STILL_RATIO = 1.5;
 /** Least time from picture to picture of what turns by itself in software, ms: the processor has other
  * work. */
 const SOFTWARE_FRAME_MS = 45;
@@ -130,7 +125,7 @@ export class FaceViewer {
     this.#stage?.load(face);
     for (;;) {
       // What comes first is as coarse as what moves: the rest follows.
-      this.#draw(this.#detail.stride);
+      this.#draw(false);
       this.#request();
       if (!this.#graphics || await drawn(this.#graphics.context)) return this.#face === face;
       await this.#restored();
@@ -242,7 +237,7 @@ export class FaceViewer {
     const seconds = Math.min(MAX_STEP_S, (elapsed || 16) / 1000);
     const moving = this.#pose.step(seconds);
     const fading = this.#fade(seconds);
-    this.#draw(this.#detail.stride);
+    this.#draw(false);
     if (moving || fading) {
       this.#last = now;
       this.#request();
@@ -250,7 +245,7 @@ export class FaceViewer {
     }
     this.#last = 0;
     this.#detail.rest();
-    this.#settle = setTimeout(() => this.#draw(1), STILL_MS);
+    this.#settle = setTimeout(() => this.#draw(true), STILL_MS);
   }
 
   /** Goes on from one mode's colours to the other's; returns whether it is not there yet. */
@@ -262,26 +257,28 @@ export class FaceViewer {
     return this.#confidence !== wanted;
   }
 
-  #draw(stride: number): void {
+  /** Draws all of what stands still, and what leaves it smooth of what moves. */
+  #draw(still: boolean): void {
     const { clientWidth: width, clientHeight: height } = this.#canvas;
     if (!this.#face || width === 0 || height === 0) return;
+    const software = this.#graphics?.software ?? false;
+    const ratio = pixelRatio(width, height, devicePixelRatio, software, still);
     if (this.#flat) {
-      const ratio = Math.min(MAX_RATIO, devicePixelRatio);
       this.#canvas.width = Math.round(width * ratio);
       this.#canvas.height = Math.round(height * ratio);
       drawFlat(this.#flat, this.#face, this.#mode, this.#blend);
+      this.onSplit?.(null);
       return;
     }
     if (!this.#stage || this.#graphics?.context.isContextLost()) return;
-    const most = !this.#graphics?.software ? Math.min(MAX_RATIO, devicePixelRatio)
-      : stride > 1 ? SOFTWARE_RATIO : SOFTWARE_STILL_RATIO;
-    if (most !== this.#ratio) {
-      this.#stage.resize(width, height, most);
-      this.#ratio = most;
+    if (ratio !== this.#ratio) {
+      this.#stage.resize(width, height, ratio);
+      this.#ratio = ratio;
     }
     const smooth = this.#confidence * this.#confidence * (3 - 2 * this.#confidence);
     const split = this.#stage.draw({
-      view: this.#pose.view, mode: this.#mode, confidence: smooth, blend: this.#blend, stride,
+      view: this.#pose.view, mode: this.#mode, confidence: smooth, blend: this.#blend,
+      stride: still ? 1 : this.#detail.stride,
     });
     this.onSplit?.(split);
   }
