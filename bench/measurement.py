@@ -22,11 +22,9 @@ from tests.simulator.true_lengths import true_lengths
 __all__ = ["NAMES", "Sample", "choosing", "reporting", "samples"]
 
 NAMES = ("face_width", "face_length", "nose_width", "nose_length")
-_SCANS = {"choosing": ("ict_id1", "ict_id2", "mh_asian_f", "procedural"),
-          "reporting": ("lps", "mh_afr_f", "mh_cauc_m")}
-"""Whose shape, stretched in different ways, is on which side; `ict_neutral` is a model of which
-even draws are on the one, odd ones on the other."""
-_IDENTITIES, _STRETCHES = 30, 8
+_SCANS = ("lps", "mh_afr_f", "mh_cauc_m", "mh_asian_f", "ict_id1", "procedural")
+"""Whose shape is stretched; `ict_neutral` is a model of identities."""
+_IDENTITIES, _STRETCHES = 36, 6
 _DISTANCES_MM = (550.0, 950.0)
 _YAW, _PITCH, _ROLL = 12.0, 8.0, 6.0
 """Largest turns to either side, degrees: the gate lets no more pass."""
@@ -46,19 +44,18 @@ class Sample(NamedTuple):
 
 
 def choosing() -> list[str]:
-    """List the heads that coefficients are fitted on."""
-    return _heads("choosing", 0)
+    """List the heads that coefficients are fitted on: even draws."""
+    return _heads(0)
 
 
 def reporting() -> list[str]:
-    """List the heads that the table is of."""
-    return _heads("reporting", 1)
+    """List the heads that the table is of: odd draws."""
+    return _heads(1)
 
 
-def _heads(side: str, first: int) -> list[str]:
-    """The procedural head, stretched in other ways, stands in where no scans are at hand."""
-    known = [name for name in _SCANS[side] if name in head_names()] or ["procedural"]
-    heads = [f"{name}~{first + 2 * k}" for k in range(_STRETCHES) for name in known]
+def _heads(first: int) -> list[str]:
+    heads = [f"{name}~{first + 2 * k}" for k in range(_STRETCHES)
+             for name in _SCANS if name in head_names()]
     if "ict_neutral" in head_names():
         heads += [f"ict_neutral~{first + 2 * k}" for k in range(_IDENTITIES)]
     return heads
