@@ -19,12 +19,13 @@ from denseface.recon.measurement import Measurements, Raw, measure, raw_lengths
 from tests.simulator import KINECT_CALIBRATED, Person, Scene, head_names, simulate
 from tests.simulator.true_lengths import true_lengths
 
-__all__ = ["NAMES", "Sample", "choosing", "reporting", "samples"]
+__all__ = ["NAMES", "Sample", "choosing", "reporting", "sampled", "samples"]
 
 NAMES = ("face_width", "face_length", "nose_width", "nose_length")
 _SCANS = ("lps", "mh_afr_f", "mh_cauc_m", "mh_asian_f", "ict_id1", "procedural")
 """Whose shape is stretched; `ict_neutral` is a model of identities."""
-_IDENTITIES, _STRETCHES = 36, 6
+_IDENTITIES, _STRETCHES, _REPORTING_FROM = 60, 10, 101
+"""How many draws of each there are, and the first one of the table."""
 _DISTANCES_MM = (550.0, 950.0)
 _YAW, _PITCH, _ROLL = 12.0, 8.0, 6.0
 """Largest turns to either side, degrees: the gate lets no more pass."""
@@ -44,40 +45,48 @@ class Sample(NamedTuple):
 
 
 def choosing() -> list[str]:
-    """List the heads that coefficients are fitted on: even draws."""
+    """List the heads that coefficients are fitted on."""
     return _heads(0)
 
 
 def reporting() -> list[str]:
-    """List the heads that the table is of: odd draws."""
-    return _heads(1)
+    """List the heads that the table is of: others."""
+    return _heads(_REPORTING_FROM)
 
 
 def _heads(first: int) -> list[str]:
-    heads = [f"{name}~{first + 2 * k}" for k in range(_STRETCHES)
-             for name in _SCANS if name in head_names()]
-    if "ict_neutral" in head_names():
-        heads += [f"ict_neutral~{first + 2 * k}" for k in range(_IDENTITIES)]
-    return heads
+    """The head made by code alone where no scans are at hand; identities and scans in turn."""
+    stretched = [f"{name}~{first + k}" for k in range(_STRETCHES)
+                 for name in _SCANS if name in head_names()]
+    if "ict_neutral" not in head_names():
+        return stretched
+    identities = [f"ict_neutral~{first + k}" for k in range(_IDENTITIES)]
+    return [head for pair in zip(identities, stretched, strict=True) for head in pair]
 
 
 def samples(heads: list[str], frames: int, seed: int) -> Iterator[Sample]:
     """Take frames of heads in turn, each from somewhere else, and measure them."""
     for index in range(frames):
-        rng = np.random.default_rng([61, seed, index])
-        head = heads[index % len(heads)]
-        x, y = (rng.uniform(-most, most) for most in _ASIDE_MM)
-        person = Person(head, rng.uniform(*_DISTANCES_MM), yaw=rng.uniform(-_YAW, _YAW),
-                        pitch=rng.uniform(-_PITCH, _PITCH), roll=rng.uniform(-_ROLL, _ROLL),
-                        offset_mm=(float(x), float(y)))
-        scene = Scene((person,), holes=float(rng.choice(_HOLES)), decor=index)
-        shot, = simulate(scene, KINECT_CALIBRATED, seed=1000 * seed + index)
-        try:
-            face = reconstruct(shot.frame)
-        except ReconstructionError as error:
-            print(f"{head} is left out: {error}", file=sys.stderr)
-            continue
-        yield Sample(head, raw_lengths(face.dense), measure(face), true_lengths(head))
+        taken = sampled(heads[index % len(heads)], index, seed)
+        if taken is not None:
+            yield taken
+
+
+def sampled(head: str, index: int, seed: int) -> Sample | None:
+    """Take one frame of a head and measure it; None, and a line, where there is no face."""
+    rng = np.random.default_rng([61, seed, index])
+    x, y = (rng.uniform(-most, most) for most in _ASIDE_MM)
+    person = Person(head, rng.uniform(*_DISTANCES_MM), yaw=rng.uniform(-_YAW, _YAW),
+                    pitch=rng.uniform(-_PITCH, _PITCH), roll=rng.uniform(-_ROLL, _ROLL),
+                    offset_mm=(float(x), float(y)))
+    scene = Scene((person,), holes=float(rng.choice(_HOLES)), decor=index)
+    shot, = simulate(scene, KINECT_CALIBRATED, seed=1000 * seed + index)
+    try:
+        face = reconstruct(shot.frame)
+    except ReconstructionError as error:
+        print(f"{head} is left out: {error}", file=sys.stderr)
+        return None
+    return Sample(head, raw_lengths(face.dense), measure(face), true_lengths(head))
 
 
 def _row(name: str, taken: list[Sample]) -> str:
@@ -114,7 +123,7 @@ def _fitted(name: str, taken: list[Sample]) -> str:
 def main() -> int:
     """Print the table."""
     parser = argparse.ArgumentParser(prog="script/bench measurement", description=__doc__)
-    parser.add_argument("--frames", type=int, default=216, help="(%(default)s)")
+    parser.add_argument("--frames", type=int, default=240, help="(%(default)s)")
     parser.add_argument("--seed", type=int, default=1, help="of poses and noise (%(default)s)")
     parser.add_argument("--fit", action="store_true", help="fit the coefficients")
     args = parser.parse_args()
