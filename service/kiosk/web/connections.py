@@ -5,6 +5,7 @@ from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.frames import Frame
 
 __all__ = ["MAX_CONNECTIONS", "MAX_MESSAGE_BYTES", "BoundedHttp", "BoundedWebSocket"]
 
@@ -12,6 +13,10 @@ MAX_CONNECTIONS = 128
 """Connections at a time; a further one is closed at once."""
 MAX_MESSAGE_BYTES = 4096
 """Longest message of a page, in whatever fragments."""
+_MAX_FRAGMENTS = 64
+"""Most fragments of a message: browsers send one."""
+_MAX_UNTAKEN_BYTES = 8 * 2**20
+"""Most that waits to be taken, eight faces: answers to pings are not counted elsewhere."""
 _ASK_S = 10.0
 """Longest time from the connection, or the last answer, to the end of a request, seconds."""
 _ANSWER_S = 120.0
@@ -66,7 +71,21 @@ class BoundedHttp(H11Protocol):
 
 
 class BoundedWebSocket(WebSocketsSansIOProtocol):
-    """Ends a connection for good when its application is through with it."""
+    """Ends a connection for good when its application is through with it, or it is abused."""
+
+    def data_received(self, data: bytes) -> None:
+        """Take what comes, unless the other side lets all that it is answered lie."""
+        if self.transport.get_write_buffer_size() > _MAX_UNTAKEN_BYTES:
+            self.transport.abort()
+            return
+        super().data_received(data)
+
+    def handle_cont(self, event: Frame) -> None:
+        """Take a further fragment; empty ones have no length that would end it."""
+        if len(self.frames) >= _MAX_FRAGMENTS:
+            self.transport.abort()
+            return
+        super().handle_cont(event)
 
     def on_task_complete(self, task: "asyncio.Task[Any]") -> None:
         """Cut it off where the other side does not take what was said last."""

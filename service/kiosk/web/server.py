@@ -27,8 +27,6 @@ _RETRY_S = 2.0
 """Time between two tries to have a port that another program has, seconds."""
 _STOP_S = 2
 """Longest wait for answers under way when it stops, seconds: the supervisor waits for five."""
-_MAX_HEAD_BYTES = 16 * 1024
-"""Longest head of a request."""
 _BACKLOG = 64
 """Connections that wait to be accepted."""
 _log = structlog.get_logger("kiosk")
@@ -97,7 +95,7 @@ async def serve(
         interface="asgi3", log_config=None, access_log=False, server_header=False,
         proxy_headers=False, workers=1, backlog=_BACKLOG,
         ssl_context_factory=(lambda *_: tls) if tls else None,
-        h11_max_incomplete_event_size=_MAX_HEAD_BYTES, ws_max_size=MAX_MESSAGE_BYTES,
+        ws_max_size=MAX_MESSAGE_BYTES,
         ws_per_message_deflate=False, ws_ping_interval=10.0, ws_ping_timeout=10.0,
         timeout_keep_alive=10, timeout_graceful_shutdown=_STOP_S))
     serving = asyncio.create_task(server.serve([bound]))

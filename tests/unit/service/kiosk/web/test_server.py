@@ -212,6 +212,40 @@ def test_a_message_that_is_too_long_ends_the_connection(pieces):
     run(main)
 
 
+async def handshake(url):
+    """Open a WebSocket by hand, and give it once it is accepted."""
+    reader, writer = await opened(url)
+    writer.write(request_to(
+        url, "GET /ws HTTP/1.1", f"Origin: {url}", "Upgrade: websocket", "Connection: Upgrade",
+        "Sec-WebSocket-Version: 13", "Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==",
+    ).replace(b"Connection: close\r\n", b""))
+    assert b" 101 " in await reader.readuntil(b"\r\n\r\n")
+    return reader, writer
+
+
+@pytest.mark.parametrize(("begun", "again"), [
+    (b"\x01\x80abcd", b"\x00\x80abcd"),  # a message of empty fragments without an end
+    (b"", b"\x89\xfdabcd" + bytes(125)),  # pings, whose answers nobody takes
+])
+def test_what_has_no_end_and_no_length_ends_the_connection(begun, again, monkeypatch):
+    monkeypatch.setattr(connections, "_MAX_UNTAKEN_BYTES", 2**20)
+
+    async def main():
+        async with serving() as url:
+            reader, writer = await handshake(url)
+            writer.write(begun)
+            answered = b""
+            with contextlib.suppress(OSError):
+                for _ in range(300):
+                    writer.write(again * 1000)
+                    await writer.drain()
+                answered = await reader.read()
+            assert b"keepalive" not in answered  # which would end it in the end
+            await closed(writer)
+            assert b" 200 " in await said(url, request_to(url))
+    run(main)
+
+
 def test_a_web_socket_of_another_page_is_refused():
     async def main():
         async with serving() as url:
