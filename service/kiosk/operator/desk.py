@@ -94,8 +94,10 @@ class Desk:
         return [one.model_dump(mode="json") for one in captures]
 
     async def look(self, capture_id: str) -> Look:
-        """Show one; raises as `AsyncClient.get`."""
-        return await self._looks.of(_checked(capture_id))
+        """Show one that the hub has still; raises as `AsyncClient.get`."""
+        capture_id = _checked(capture_id)
+        await self.captures(MOST_CAPTURES)  # what was removed meanwhile, by a visitor too, is gone
+        return await self._looks.of(capture_id)
 
     async def delete(self, capture_id: str) -> None:
         """Remove all of a capture, its links first."""

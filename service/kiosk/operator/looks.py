@@ -14,6 +14,8 @@ _SIDE = 192
 """Width and height of a thumbnail, pixels: 96 on a screen of double density."""
 _MAX_LOOKS = 100
 """Of some 40 kB each."""
+_KEPT_S = 60.0
+"""How long one is kept, seconds: the hub removes captures, and visitors withdraw them, unseen."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,8 @@ class Looks:
             look = await asyncio.to_thread(_look, face)
             if self._forgotten == before:  # else it may be this one that was removed meanwhile
                 self._looks[capture_id] = look
+                asyncio.get_running_loop().call_later(
+                    _KEPT_S, self._looks.pop, capture_id, None)
             return look
 
     def forget(self, capture_id: str) -> None:

@@ -193,9 +193,18 @@ def test_what_the_hub_removed_by_itself_is_not_shown_from_memory(page):
     async def use(browser):
         await browser.get(f"{API}/captures/capture-1/thumbnail.png")
         del page.hub.faces["capture-1"]
-        await browser.get(f"{API}/captures")
         answer = await browser.get(f"{API}/captures/capture-1/thumbnail.png")
         assert answer.status_code == 404
+    page.run(use)
+
+
+def test_a_small_picture_is_not_kept_for_long(page, monkeypatch):
+    monkeypatch.setattr("denseface.service.kiosk.operator.looks._KEPT_S", 0.0)
+
+    async def use(browser):
+        for number in (1, 2):
+            await browser.get(f"{API}/captures/capture-1/thumbnail.png")
+            assert page.hub.gets == number
     page.run(use)
 
 
