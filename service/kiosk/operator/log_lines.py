@@ -41,7 +41,7 @@ def _of_journal(environment: Mapping[str, str]) -> bytes:
         return b""
     try:
         return subprocess.run(
-            ["journalctl", "--no-pager", "--output=cat", f"--lines={_MAX_LINES}", "--user",
+            ["journalctl", "--no-pager", "--output=cat", f"--lines={_MAX_LINES}",
              f"_SYSTEMD_INVOCATION_ID={invocation}"],
             check=False, capture_output=True, timeout=_JOURNAL_S).stdout
     except (OSError, subprocess.TimeoutExpired):

@@ -274,6 +274,7 @@ def test_one_client_holds_no_more_than_its_share_of_connections(served):
             except ConnectionError:
                 cut += 1
         assert cut == 18
+        assert not any(reader.at_eof() for reader, _ in writers[:12]), "the first ones are kept"
         for _, writer in writers:
             writer.close()
     served(use)
