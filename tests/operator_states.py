@@ -53,7 +53,7 @@ class ExampleHub(Hub):
         await super().captures(last)
         return tuple(
             CaptureSummary(capture_id=name, sequence=100 - n, state=state, error=error, attempts=1,
-                           accepted_at=f"2026-11-29T1{n % 3}:20:{59 - n:02}Z")
+                           accepted_at=f"2026-11-29T12:{59 - 3 * n:02}:{7 * n % 60:02}Z")
             for n, (name, state, error) in enumerate(self.rows))[:last]
 
     async def purge(self, *, capture_id: str | None = None, **_: float) -> int:
