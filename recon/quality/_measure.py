@@ -32,6 +32,9 @@ _SAME_BOX = 0.5
 """Boxes whose middles are nearer than this, by the width of one, are of one face."""
 _RECENT_BEST = 0.99
 """What is left of the best sharpness after each measurement: half after seven seconds."""
+_RECENT_US = 2_000_000
+"""Between two measurements; after longer the face may be somebody else's, who is sharp in another
+way: a beard has twice the gradient of a cheek."""
 _NO_DEPTH_SHARE = 0.35
 """Of the middle of the depth image: with more of it unmeasured, something may be too near."""
 
@@ -149,7 +152,9 @@ def _of_face(
     patch = Patch.of(frame, box, distance, exposed_us, shaded=not colored)
     motion = None if patch is None else motion_mm(frame, patch, memory.patch)
     sharp = None if patch is None or not colored else sharpness(patch.image)
-    best = max(sharp or 0.0, memory.best_sharpness * _RECENT_BEST)
+    recent = patch is None or memory.patch is None or (
+        exposed_us - memory.patch.exposed_us <= _RECENT_US)
+    best = max(sharp or 0.0, memory.best_sharpness * _RECENT_BEST if recent else 0.0)
     lit = light(frame.rgb, box) if colored else None
     looks = pose(frame, box, distance)
     missed = memory.missed + 1 if found.sight is Sight.DEPTH else 0

@@ -155,6 +155,14 @@ def test_a_blurred_face_is_less_sharp_than_before(ahead):
     assert stream(blurred, ahead).face.sharpness == 1
 
 
+def test_nobody_is_less_sharp_than_somebody_who_was_there_a_while_ago(ahead):
+    """The next visitor was told to hold still until the last one's beard was forgotten."""
+    smooth = replace(ahead, color=np.asarray(cv2.GaussianBlur(ahead.color, (0, 0), 3), np.uint8))
+    first = measure(ahead, at_us=1_000_000)
+    assert measure(smooth, first, at_us=2_900_000).face.sharpness < 0.6
+    assert measure(smooth, first, at_us=3_100_000).face.sharpness == 1
+
+
 def test_dark_and_burnt_parts_are_measured(ahead):
     half = ahead.color.copy()
     half[:, :half.shape[1] // 2] //= 12
