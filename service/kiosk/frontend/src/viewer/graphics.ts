@@ -38,15 +38,23 @@ function isSoftware(): boolean | null {
  * @returns false where the context was lost meanwhile.
  */
 export async function drawn(context: WebGL2RenderingContext): Promise<boolean> {
-  const fence = context.fenceSync(context.SYNC_GPU_COMMANDS_COMPLETE, 0);
+  const ended = new AbortController();
+  // Lost and restored between two looks, it has another life, in which the fence is none.
+  let lost = context.isContextLost();
+  context.canvas.addEventListener(
+    "webglcontextlost", () => (lost = true), { signal: ended.signal });
+  const fence = lost ? null : context.fenceSync(context.SYNC_GPU_COMMANDS_COMPLETE, 0);
   context.flush();
-  for (;;) {
-    // A fence's state is only seen to change between tasks.
-    await new Promise((next) => setTimeout(next, 1));
-    if (context.isContextLost()) return false;
-    if (!fence) return true;
-    if (context.clientWaitSync(fence, 0, 0) !== context.TIMEOUT_EXPIRED) break;
+  try {
+    while (!lost && fence) {
+      // A fence's state is only seen to change between tasks.
+      await new Promise((next) => setTimeout(next, 1));
+      if (context.isContextLost()) lost = true;
+      else if (!lost && context.clientWaitSync(fence, 0, 0) !== context.TIMEOUT_EXPIRED) break;
+    }
+    if (!lost) context.deleteSync(fence);
+    return !lost;
+  } finally {
+    ended.abort();
   }
-  context.deleteSync(fence);
-  return true;
 }

@@ -65,6 +65,8 @@ export class Stage {
   readonly #dotMaterial = dotMaterial(this.#sigma, this.#focal, 1);
   readonly #seedMaterial = dotMaterial(
     { ...this.#sigma, confidence: { value: 0 } }, this.#focal, 0);
+  readonly #mesh = new Mesh<BufferGeometry, ShaderMaterial>();
+  readonly #points = new Points<BufferGeometry, ShaderMaterial>();
   #loaded: Loaded | null = null;
   #aspect = 1;
 
@@ -72,6 +74,7 @@ export class Stage {
     this.renderer = new WebGLRenderer({ canvas, context });
     this.renderer.autoClear = false;
     this.#scene.add(this.#turned);
+    this.#mesh.frustumCulled = this.#points.frustumCulled = false;
   }
 
   /** The whole canvas's size in CSS pixels and pixels for each of them. */
@@ -120,7 +123,7 @@ export class Stage {
     if (at < 1) {
       this.#within(at * width, (1 - at) * width, height);
       this.#seedMaterial.uniforms["diameter"]!.value = SEED_SIZE * this.#loaded.face.spacingMm;
-      this.#draw(new Points(this.#loaded.seeds, this.#seedMaterial));
+      this.#draw(this.#points, this.#loaded.seeds, this.#seedMaterial);
     }
     if (at <= 0 || at >= 1) return null;
     this.#within(at * width - HANDLE_PX / 2, HANDLE_PX, height);
@@ -151,7 +154,7 @@ export class Stage {
 
   #drawDense({ mode, stride }: Shown, loaded: Loaded): void {
     if (mode !== "points") {
-      this.#draw(new Mesh(loaded.mesh(stride), this.#surfaceMaterial));
+      this.#draw(this.#mesh, loaded.mesh(stride), this.#surfaceMaterial);
       return;
     }
     const { face, surface } = loaded;
@@ -159,12 +162,16 @@ export class Stage {
     const pixels = face.stepMm * this.#focal.value / distance;
     const every = Math.max(1, Math.round(DOT_DISTANCE_PX / pixels));
     this.#dotMaterial.uniforms["diameter"]!.value = DOT_SIZE * every * face.stepMm;
-    this.#draw(new Mesh(loaded.mesh(Math.max(2, stride)), this.#screenMaterial));
-    this.#draw(new Points(loaded.dots(every), this.#dotMaterial));
+    this.#draw(this.#mesh, loaded.mesh(Math.max(2, stride)), this.#screenMaterial);
+    this.#draw(this.#points, loaded.dots(every), this.#dotMaterial);
   }
 
-  #draw(object: Mesh | Points): void {
-    object.frustumCulled = false;
+  #draw(
+    object: Mesh<BufferGeometry, ShaderMaterial> | Points<BufferGeometry, ShaderMaterial>,
+    geometry: BufferGeometry, material: ShaderMaterial,
+  ): void {
+    object.geometry = geometry;
+    object.material = material;
     this.#turned.add(object);
     this.renderer.render(this.#scene, this.#camera);
     this.#turned.remove(object);

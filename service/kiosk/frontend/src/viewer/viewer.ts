@@ -200,7 +200,7 @@ export class FaceViewer {
   #restored(): Promise<void> {
     return new Promise((done) => {
       const { signal } = this.#ended;
-      if (signal.aborted) done();
+      if (signal.aborted || !this.#graphics?.context.isContextLost()) done();
       signal.addEventListener("abort", () => done(), { once: true });
       this.#canvas.addEventListener("webglcontextrestored", () => done(), { once: true, signal });
     });
