@@ -14,6 +14,7 @@ import pytest
 from denseface.service.errors import UnknownCaptureError
 from tests.system.kiosk_pages import RawPage, is_closed, kiosk_service, kiosk_url, process_of
 from tests.system.running import RECORDINGS, REPOSITORY
+from tests.unit.service.kiosk.button.test_button import DOWN, HELD, UP
 from tests.waiting import LIMIT_S, until
 
 SOURCE = f"{RECORDINGS / 'frontal_700.oni'}?rate=real"
@@ -23,7 +24,9 @@ SOURCE = f"{RECORDINGS / 'frontal_700.oni'}?rate=real"
 def kiosk(tmp_path_factory):
     """One service for all."""
     folder = tmp_path_factory.mktemp("kiosk")
-    with kiosk_service(SOURCE, folder, "--kiosk-countdown", "0", "--metrics", "0") as running:
+    os.mkfifo(folder / "button")
+    with kiosk_service(SOURCE, folder, "--kiosk-countdown", "0", "--metrics", "0",
+                       "--kiosk-button", folder / "button") as running:
         yield running
 
 
@@ -57,6 +60,21 @@ def test_no_picture_is_asked_of_the_sensor_before_yes(kiosk, page):
     page.say("consent", agreed=False, language="en")
     page.until("thanks")
     assert metric(running, "denseface_previews_total") == before
+
+
+def test_a_physical_button_begins_a_visit_and_agrees_to_nothing(kiosk, page):
+    """No input device is at hand: a named pipe gives the records of one."""
+    running, _ = kiosk
+    visit = page.until("attract", trouble=None)["visit"]
+    with (running.data.parent / "button").open("wb", buffering=0) as button:
+        button.write(DOWN + HELD * 9 + UP)
+        assert page.until("consent")["visit"] == visit
+        button.write(DOWN + HELD * 9 + UP)
+    page.say("consent", agreed=False, language="en")
+    page.until("thanks")
+    page.say("done")
+    page.until("attract")
+    assert page.screen["visit"] == visit + 1
 
 
 def test_a_visit_ends_with_the_very_face_and_delete_leaves_nothing(kiosk, page):
