@@ -88,10 +88,9 @@ class Desk:
 
     async def captures(self, last: int) -> list[dict[str, Any]]:
         """List the last captures, at most `MOST_CAPTURES`, newest first."""
-        captures = await self._hub.captures(last)
-        if last == MOST_CAPTURES:  # those that are not among them need not be known any more
-            self._looks.keep_only(frozenset(one.capture_id for one in captures))
-        return [one.model_dump(mode="json") for one in captures]
+        captures = await self._hub.captures(MOST_CAPTURES)
+        self._looks.keep_only(frozenset(one.capture_id for one in captures))
+        return [one.model_dump(mode="json") for one in captures[:last]]
 
     async def look(self, capture_id: str) -> Look:
         """Show one that the hub has still; raises as `AsyncClient.get`."""
