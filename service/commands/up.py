@@ -53,6 +53,7 @@ def _kiosk(args: argparse.Namespace) -> list[str] | None:
     import structlog
 
     from denseface.service.errors import SettingsError
+    from denseface.service.kiosk.consent_text import check_files
     from denseface.service.kiosk.installed import why_not
 
     given = os.environ.get(KIOSK_VARIABLE, "")
@@ -60,7 +61,7 @@ def _kiosk(args: argparse.Namespace) -> list[str] | None:
         raise SettingsError(f"{KIOSK_VARIABLE}: expected on or off, found {given!r}")
     if args.no_kiosk or given == "off":
         return None
-    kiosk_settings(args)
+    check_files(kiosk_settings(args))
     if reason := why_not():
         structlog.get_logger("up").info(reason)
         return None

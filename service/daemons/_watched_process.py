@@ -38,6 +38,8 @@ class ProcessSpec:
     """Added to the supervisor's own."""
     vital: bool = True
     """All stop where this one ends again and again; else it is tried for ever."""
+    needed: bool = True
+    """All stop where this one says that its usage or input is wrong; else it is tried again."""
 
 
 class AttendedClock:

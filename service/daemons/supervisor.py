@@ -52,8 +52,8 @@ def process_table(workers: int, common: Sequence[str], hub: Sequence[str],
           for number, flags in enumerate(captures, 1)),
         *(ProcessSpec(f"worker-{number}", ("worker", *common), ONE_THREAD)
           for number in range(1, workers + 1)),
-        # Presses go on without it.
-        *([ProcessSpec("kiosk", ("kiosk", *kiosk, *common), vital=False)]
+        # Presses go on without it, also where its certificate is too old one day.
+        *([ProcessSpec("kiosk", ("kiosk", *kiosk, *common), vital=False, needed=False)]
           if kiosk is not None else []),
     ]
 
@@ -103,8 +103,8 @@ class Supervisor:
     def run(self) -> int:
         """Start all, restart what ends or hangs, stop all at SIGINT or SIGTERM.
 
-        Gives the exit status. All stop with status 2 where one ends so: its usage or input is
-        wrong. All stop with status 1 where a vital one ends again and again.
+        Gives the exit status. All stop with status 2 where one that is needed ends so: its usage
+        or input is wrong. All stop with status 1 where a vital one ends again and again.
         """
         with StopSignal(signal.SIGCHLD) as stop:
             try:
@@ -168,7 +168,7 @@ class Supervisor:
     def _ended(self, process: WatchedProcess, end: End) -> int:
         """Plan the restart of a process that ended; give the status with which all stop, or 0."""
         name = process.spec.name
-        if end.status == _USAGE:
+        if end.status == _USAGE and process.spec.needed:
             return _USAGE  # it has said why
         self._told = False
         calm = process.plan_restart(time.monotonic(), holding=end.holding)

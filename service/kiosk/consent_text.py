@@ -9,8 +9,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from denseface.files import read_bounded
 from denseface.service.errors import SettingsError, first_error, reason_of
 from denseface.service.kiosk.page_messages import Language
+from denseface.service.kiosk.settings import KioskSettings
 
-__all__ = ["ConsentText", "load_consent_text"]
+__all__ = ["ConsentText", "check_files", "load_consent_text"]
 
 _MAX_BYTES = 256 * 1024
 """Of the file."""
@@ -52,3 +53,11 @@ def load_consent_text(path: Path, languages: tuple[str, ...]) -> ConsentText:
         raise SettingsError(f"--kiosk-consent-text: {path}: text: has no words in {missing[0]}, "
                             "which --kiosk-languages offers")
     return found
+
+
+def check_files(settings: KioskSettings) -> None:
+    """Raise at once what the kiosk would raise later of the files that are named: SettingsError."""
+    settings.tls()
+    settings.lan_tls()
+    if settings.consent_text is not None:
+        load_consent_text(settings.consent_text, settings.languages)

@@ -47,6 +47,15 @@ def test_the_table_names_what_runs():
     assert table[2].environment["OMP_NUM_THREADS"] == "1"
 
 
+def test_the_page_for_visitors_is_in_the_table_where_it_is_wanted_and_nobody_depends_on_it():
+    *others, kiosk = process_table(
+        1, ["--address=ipc:///x"], hub=[], captures=[[]], kiosk=["--kiosk-countdown=0"])
+    assert kiosk.arguments == ("kiosk", "--kiosk-countdown=0", "--address=ipc:///x")
+    assert not kiosk.vital
+    assert not kiosk.needed
+    assert all(one.needed for one in others)
+
+
 def test_each_source_has_a_capture_process_of_its_own():
     table = process_table(1, [], hub=[], captures=[["--source=a"], ["--source=b"]])
     assert [(one.name, one.arguments) for one in table[1:3]] == [
@@ -71,6 +80,20 @@ def test_an_old_restart_is_forgotten():
 
 def test_wrong_usage_of_a_child_ends_all_with_status_2():
     assert Supervisor([ProcessSpec("x", ("no-such-command",))]).run() == 2
+
+
+def test_wrong_usage_of_a_child_that_is_not_needed_ends_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(f"{_WATCHED}._BACKOFF_S", 0.0)
+    table = [ProcessSpec("hub", ("hub", "--address", f"ipc://{tmp_path}/h",
+                                 "--data", str(tmp_path / "data"))),
+             ProcessSpec("x", ("no-such-command",), vital=False, needed=False)]
+    supervisor = Supervisor(table)
+    stopper = threading.Thread(target=lambda: (
+        until(lambda: supervisor._processes[1].counts["exited"] > 1),
+        os.kill(os.getpid(), signal.SIGTERM)))
+    stopper.start()
+    assert supervisor.run() == 0
+    stopper.join()
 
 
 def test_a_storm_ends_all_with_status_1(monkeypatch):
