@@ -1,6 +1,7 @@
 """Links for visitors: made when they keep a face, served at the LAN door, gone with the capture."""
 
 import asyncio
+import socket
 import ssl
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from contextlib import suppress
@@ -14,7 +15,7 @@ import segno
 import structlog
 
 from denseface.recon.face import Face
-from denseface.service.errors import ServiceError
+from denseface.service.errors import AddressError, ServiceError
 from denseface.service.kiosk.links.addresses import (
     best_address,
     interfaces,
@@ -37,6 +38,8 @@ __all__ = ["LinkOptions", "Links", "NoAddressError", "links_of", "qr_rows"]
 
 _FILE = "links.json"
 """In the kiosk's folder."""
+_BIND_S = 5.0
+"""Time between two tries to have an address that is not there, seconds."""
 _TIDY_S = 60.0
 """Time between two looks for links that have expired, seconds."""
 _HUB_S = 10.0
@@ -127,14 +130,11 @@ class Links:
         return False
 
     async def serve(self) -> None:
-        """Serve the door until cancelled; where another program has its port, wait for that.
+        """Serve the door until cancelled; where it cannot have its address, wait for that.
 
-        Raises
-        ------
-        AddressError
-            Its address is none of this machine's, or this user may not have the port.
+        Visitors need not: until then they are offered no links.
         """
-        bound = BoundedListener(await bind(self._options.address, "--kiosk-lan"))
+        bound = BoundedListener(await self._bind())
         self.port = bound.getsockname()[1]
         self.listening.set()
         structlog.get_logger("links").info("links are served", scheme=self._scheme,
@@ -142,6 +142,18 @@ class Links:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(serve(self._door, bound, self._options.tls, http=LanConnection))
             tasks.create_task(self._tidy())
+
+    async def _bind(self) -> socket.socket:
+        """Bind, once a cable is in and the address is there; say once what is waited for."""
+        said = ""
+        while True:
+            try:
+                return await bind(self._options.address, "--kiosk-lan")
+            except AddressError as error:
+                if str(error) != said:
+                    said = str(error)
+                    structlog.get_logger("links").warning("no links yet", reason=said)
+            await asyncio.sleep(_BIND_S)
 
     async def _tidy(self) -> None:
         while True:

@@ -13,12 +13,13 @@ from pathlib import Path
 import pytest
 
 from denseface.recon.face import Face
-from denseface.service.errors import ClientTimeoutError, UnknownCaptureError
+from denseface.service.errors import AddressError, ClientTimeoutError, UnknownCaptureError
 from denseface.service.kiosk.certificates import tls_context
 from denseface.service.kiosk.links import lan_door
 from denseface.service.kiosk.links.lan_guard import LanGuard
 from denseface.service.kiosk.links.links import LinkOptions, Links, NoAddressError
 from denseface.service.kiosk.texts import Texts
+from denseface.service.kiosk.web.server import bind as real_bind
 from tests.unit.service.faces import small_face
 from tests.unit.service.kiosk.links.certificate_files import make_certificate
 from tests.waiting import LIMIT_S
@@ -439,3 +440,24 @@ def test_a_port_that_is_taken_is_waited_for(served, tmp_path):
         assert not waiting.done()
         waiting.cancel()
     served(use)
+
+
+def test_an_address_that_is_not_there_yet_is_waited_for(tmp_path, run, monkeypatch, capfd):
+    monkeypatch.setattr("denseface.service.kiosk.links.links._BIND_S", 0.0)
+    tries = []
+
+    async def bind(address, flag):
+        tries.append(address)
+        if len(tries) < 5:
+            raise AddressError(f"{flag} {address[0]}: Cannot assign requested address")
+        return await real_bind(("127.0.0.1", 0), flag)
+
+    monkeypatch.setattr("denseface.service.kiosk.links.links.bind", bind)
+
+    async def life():
+        async with door(tmp_path, address=("192.0.2.200", 8090)) as one:
+            assert one.links.port
+            assert not one.links.reachable, "the address of the settings is what is named"
+    run(life())
+    assert len(tries) == 5
+    assert "".join(capfd.readouterr()).count("Cannot assign requested address") == 1

@@ -164,6 +164,7 @@ def test_captures_have_small_pictures_and_reports_made_once(page):
         for name in ("unknown", "..", "a.b", "x" * 65):
             answer = await browser.get(f"{API}/captures/{name}/thumbnail.png")
             assert answer.status_code == 404
+        assert page.hub.gets == 2, "what is no id is asked of nobody"
     page.run(use)
 
 
