@@ -71,8 +71,7 @@ class GatedPress:
         score = score_of(judged.quality)
         better = score is not None and (self.best is None or score < self.best)
         if better:
-            if score is not None and score.severity == 0 and (
-                    self.best is None or self.best.severity > 0):
+            if score is not None and score.severity == 0:
                 self.deadline_s = min(self.deadline_s, now_s + _BETTER_WITHIN_S)
             self.best = score
         with_face = self.best is not None and self.best.with_face
