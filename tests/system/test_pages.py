@@ -11,7 +11,7 @@ from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.process import environment, play
 from tests.waiting import PATIENCE
 
-PAGES = ["README.md", "CONTRIBUTING.md", "docs/operating.md"]
+PAGES = ["README.md", "CONTRIBUTING.md", "docs/kiosk.md", "docs/operating.md"]
 HOW_TOS = sorted(path.relative_to(REPOSITORY) for path in (REPOSITORY / "docs/howto").glob("*.md"))
 LANGUAGES = {"", "sh", "python", "json", "diff"}
 _TIMEOUT_S = 200 * PATIENCE
