@@ -5,6 +5,7 @@ The page itself is the real one: its bundle, its languages, its socket.
 """
 
 import asyncio
+import functools
 import json
 import socket
 import struct
@@ -109,8 +110,7 @@ class States:
         self.url = ""
         self.face = next(path for path in (
             STATIC / "sample.face", VECTORS / "dome.face") if path.exists())
-        with open_source(str(ROOT / "fixtures/recorded_oni/frontal_700.oni")) as source:
-            self.picture = preview_jpeg(next(iter(source)))
+        self.picture = _picture()
 
     def show(self, name: str, visit: int = 1, **changes: Any) -> None:
         """Show a state on every page; callable from any thread."""
@@ -177,6 +177,12 @@ class States:
         """Serve until the server is told to exit."""
         self._loop = asyncio.get_running_loop()
         await server.serve(sockets=[bound])
+
+
+@functools.cache
+def _picture() -> bytes:
+    with open_source(str(ROOT / "fixtures/recorded_oni/frontal_700.oni")) as source:
+        return preview_jpeg(next(iter(source)))
 
 
 def _binary(kind: int, head: dict[str, Any], payload: bytes) -> bytes:
