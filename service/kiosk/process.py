@@ -84,11 +84,13 @@ async def _run(service: ServiceSettings, settings: KioskSettings, options: Visit
     with closing(AsyncOperator(service.address, key=service.key, hub_key=service.hub_key)) as hub:
         kiosk = Kiosk(options, new_id=lambda: secrets.token_hex(16), utc=_utc)
         links = links_of(settings, hub.get)
-        routes = operator_routes(hub, service, settings, files, kiosk.hint_statistics.as_dict,
-                                 links.forget if links else _no_links)
         conductor = Conductor(
             kiosk, hub, kept, ConductorOptions(hello, settings.sensor, settings.measurements),
             links)
+        routes = operator_routes(
+            hub, service, settings, files,
+            lambda: kiosk.hint_statistics.as_dict() | conductor.figures.as_dict(),
+            links.forget if links else _no_links)
         conductor.start()
         also = [asyncio.create_task(asyncio.to_thread(prepare))] if settings.measurements else []
         button = [] if settings.button is None else [

@@ -42,6 +42,8 @@ export interface Statistics {
   readonly kept: number;
   readonly ends: Readonly<Record<string, number>>;
   readonly positioning_s: number;
+  /** From exposure to first mesh, the median, ms; missing before there is one. */
+  readonly exposure_to_drawn_p50_ms?: number;
 }
 
 /** All that changes by itself. */

@@ -73,6 +73,9 @@ export function visitFacts(texts: Texts, of: Statistics): (readonly [string, str
     ...counts.map((name) => [t(`operator.visits.${name}`), texts.number(of[name])] as const),
     ...(of.captures ? [[t("operator.visits.average"), t("operator.statistics.time",
       { seconds: Math.round(of.positioning_s / of.captures) })] as const] : []),
+    ...(of.exposure_to_drawn_p50_ms ? [[t("operator.visits.shown"), t("operator.statistics.time", {
+      seconds: texts.number(Math.round(of.exposure_to_drawn_p50_ms / 100) / 10),
+    })] as const] : []),
     ...Object.entries(of.ends).map(([end, count]) =>
       [texts.either(`operator.ends.${end}`, "operator.state.other"), texts.number(count)] as const),
   ];
