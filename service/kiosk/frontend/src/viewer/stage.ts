@@ -38,6 +38,8 @@ const SEED_SIZE = 0.85;
 /** What hides the dots of the far side lies so far behind the surface, mm. */
 const BEHIND_MM = 2;
 const HANDLE_PX = 3;
+/** How far the line between dense and initial cloud reaches, halves of a face. */
+const BEYOND = 1.08;
 const SCALE_COLORS = 256;
 
 /** All that WebGL holds of one face, and how it is drawn. */
@@ -126,7 +128,8 @@ export class Stage {
       this.#draw(this.#points, this.#loaded.seeds, this.#seedMaterial);
     }
     if (at <= 0 || at >= 1) return null;
-    this.#within(at * width - HANDLE_PX / 2, HANDLE_PX, height);
+    const [bottom, top] = this.#faceHeight(shown, this.#loaded.surface);
+    this.#within(at * width - HANDLE_PX / 2, HANDLE_PX, (top - bottom) * height, bottom * height);
     renderer.setClearColor(0xffffff, 0.9);
     renderer.clear();
     return at;
@@ -196,14 +199,21 @@ export class Stage {
   #split({ blend, view }: Shown, { halfSize: [halfWidth, , halfDepth] }: Surface): number {
     if (blend <= 0 || blend >= 1) return blend <= 0 ? 0 : 1;
     const across = this.#camera.projectionMatrix.elements[0]! / this.#camera.position.z / 2;
-    const reach = 1.08 * Math.hypot(halfWidth, halfDepth) * across;
+    const reach = BEYOND * Math.hypot(halfWidth, halfDepth) * across;
     const middle = 0.5 + view.panX * halfWidth * across;
     return Math.min(0.999, Math.max(0.001, middle + (2 * blend - 1) * reach));
   }
 
-  #within(left: number, width: number, height: number): void {
+  /** Where the face's lower and upper end are, a little beyond it, as parts of the canvas's height. */
+  #faceHeight({ view }: Shown, { halfSize: [, halfHeight] }: Surface): [number, number] {
+    const half = halfHeight * this.#camera.projectionMatrix.elements[5]! / this.#camera.position.z / 2;
+    const middle = 0.5 - view.panY * half;
+    return [Math.max(0, middle - BEYOND * half), Math.min(1, middle + BEYOND * half)];
+  }
+
+  #within(left: number, width: number, height: number, bottom = 0): void {
     this.renderer.setScissorTest(true);
-    this.renderer.setScissor(left, 0, width, height);
+    this.renderer.setScissor(left, bottom, width, height);
   }
 }
 
