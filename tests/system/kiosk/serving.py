@@ -1,6 +1,5 @@
 """`denseface up` with its page for visitors, on a virtual sensor that a test steers."""
 
-import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -68,9 +67,8 @@ class Served:
 
     def previews(self) -> float:
         """Give how many pictures were asked of the sensor so far."""
-        url = re.search(r"http://\S+/metrics", self.up.log.read_text())
-        assert url
-        with urlopen(url[0], timeout=LIMIT_S) as answer:  # noqa: S310 - this machine
+        *_, url = re.findall(r"http://\S+/metrics", self.up.log.read_text())
+        with urlopen(url, timeout=LIMIT_S) as answer:  # noqa: S310 - this machine
             text = answer.read().decode()
         counted = re.findall(r"^denseface_previews_total\S* (\S+)$", text, re.MULTILINE)
         return sum(map(float, counted))
@@ -96,17 +94,17 @@ def somebody(path: Path) -> Path:
 
 
 @contextmanager
-def serving(folder: Path, *arguments: str, **variables: str) -> Iterator[Served]:
-    """Run the service with its page until the sensor streams and there is a worker."""
-    with Control(folder / "sensor", somebody(folder / "clip")) as control, service(
+def serving(
+    folder: Path, *arguments: str, marks: bool = False, **variables: str
+) -> Iterator[Served]:
+    """Run the service with its page until the sensor streams and there is a worker.
+
+    marks : whether pictures say when they were exposed
+    """
+    with Control(folder / "sensor", somebody(folder / "clip"), marks=marks) as control, service(
             "openni2:", folder / "data", "--kiosk-address", "127.0.0.1:0", "--kiosk-folder",
             str(folder / "kiosk"), *arguments,
             environment={**environment(controls=[control]), "DENSEFACE_KIOSK": "on"} | variables,
     ) as up:
         url = until(lambda: _URL.search(up.log.read_text()))
         yield Served(up, control, url[1] if url else "")
-
-
-def rss_bytes(process: psutil.Process) -> int:
-    """Give the memory of a process that is its own."""
-    return int(process.memory_info().rss) if os.name == "posix" else 0
