@@ -13,7 +13,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -180,9 +180,12 @@ def _pushing(served: Served) -> Iterator[str]:
     async def push(socket: websockets.ServerConnection) -> None:
         from denseface.service.client import AsyncClient  # of this loop alone
         async with AsyncClient(served.up.address) as client:
-            async for preview in client.previews():
-                head = json.dumps({"timestamp_us": preview.timestamp_us}).encode()
-                await socket.send(b"\1" + len(head).to_bytes(4, "little") + head + preview.jpeg)
+            # A page that goes away ends it.
+            with suppress(websockets.ConnectionClosed):
+                async for preview in client.previews():
+                    head = json.dumps({"timestamp_us": preview.timestamp_us}).encode()
+                    await socket.send(
+                        b"\1" + len(head).to_bytes(4, "little") + head + (preview.jpeg or b""))
 
     def page(connection: websockets.ServerConnection, request: websockets.Request) -> object:
         if request.headers.get("Upgrade"):

@@ -72,7 +72,7 @@ _ERRORS = {
     "face_width": _Error(-0.42, 1.95, 0.25, 90.0, 190.0),
     "face_length": _Error(-0.87, 0.35, 2.0, 70.0, 160.0),
     "nose_width": _Error(1.70, 2.13, 1.25, 22.0, 70.0),
-    "nose_length": _Error(-0.57, 1.73, 1.0, 28.0, 80.0),
+    "nose_length": _Error(-0.57, 1.90, 1.0, 28.0, 80.0),
 }
 
 

@@ -62,8 +62,8 @@ class Served:
         return process
 
     def pressed(self) -> list[str]:
-        """Give the ids of all captures so far."""
-        return re.findall(r"pressed +.*?capture_id=(\w+)", self.up.log.read_text())
+        """Give the ids of all captures whose frame is safe, so far."""
+        return re.findall(r"accepted +capture_id=(\w+)", self.up.log.read_text())
 
     def previews(self) -> float:
         """Give how many pictures were asked of the sensor so far."""
