@@ -44,7 +44,7 @@ def opened(browser, operated):
         contexts.append(context)
         page = context.new_page()
         page.set_default_timeout(LIMIT_MS)
-        page.on("console", lambda message: said.append(message.text)
+        page.on("console", lambda message: said.append(f"{message.text} {message.location}")
                 if message.type in ("error", "warning") else None)
         page.on("pageerror", lambda error: said.append(str(error)))
         page.on("request", lambda request: None if request.url.startswith(

@@ -173,6 +173,8 @@ export class OperatorPage {
     window.clearTimeout(this.again);
     this.sections = undefined;
     await this.asking;
+    // Pictures on their way would be refused.
+    for (const picture of this.place.querySelectorAll("img")) picture.removeAttribute("src");
     try {
       await ask("logout", "POST");
       this.enter();
