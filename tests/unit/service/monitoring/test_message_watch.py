@@ -7,7 +7,7 @@ from denseface.service.hub import Hub
 from denseface.service.monitoring import Figures
 from denseface.service.monitoring.message_watch import MessageWatch
 from denseface.service.protocol import messages
-from denseface.service.protocol.outgoing import send, steps
+from denseface.service.protocol.outgoing import Send, send, steps
 from denseface.service.protocol.wire import Packet
 from denseface.service.storage import FolderStore
 from tests.unit.service.faces import small_face
@@ -32,9 +32,9 @@ class WatchedBench(Bench):
         super().__init__(Hub(store, SETTINGS, Settings(), self.figures), store)
         self.watch = MessageWatch(self.figures)
 
-    def say(self, peer, message, arrays=None):
+    def say(self, peer, message, arrays=None, key=""):
         packet = Packet(message, arrays or {})
-        outputs = self.hub.receive(self.now, peer, packet)
+        outputs = self.hub.receive(self.now, peer, packet, key)
         self.now += 0.5
         for step in steps(outputs):
             self.watch.record(self.now, packet, step)
@@ -83,8 +83,8 @@ def test_what_is_said_before_a_job_has_its_own_time(bench):
     bench.accepted("a", "b")
     outputs = [send(SENSOR, messages.FrameAccepted(capture_id="a"))]
     for credit, capture_id in enumerate("ab"):
-        outputs += bench.hub.receive(bench.now, WORKER, Packet(
-            messages.WorkerReady(name="w", credit=credit)))
+        outputs += [one for one in bench.hub.receive(bench.now, WORKER, Packet(
+            messages.WorkerReady(name="w", credit=credit))) if isinstance(one, Send)]
         outputs.append(send(CLIENT, messages.PressAccepted(request=1, capture_id=capture_id)))
     assert [[one.packet.message.kind for one in step] for step in steps(outputs)] == [
         ["frame_accepted"], ["job", "press_accepted"], ["job", "press_accepted"]]
