@@ -76,6 +76,7 @@ STATES: dict[str, dict[str, Any]] = {
     "captured": {"name": "captured"},
     "reconstructing": {"name": "reconstructing"},
     "result": {"name": "result", "result": _RESULT},
+    "result_unlinked": {"name": "result", "result": {**_RESULT, "no_links": True}},
     "result_measured": {"name": "result", "result": {
         **_RESULT, "warnings": ["more_light"], "measurements": _MEASURED}},
     "keep": {"name": "keep", "result": _RESULT, "keep": _KEPT},

@@ -177,6 +177,7 @@ class WatchedSensor(LiveSensor):
             else:
                 self._advance(LiveEvent.FOUND, "the sensor is being opened")
             return
+        self._in_vain = 0  # what is plugged in anew is not what gave nothing
         if self._states.state is LiveState.BLOCKED:
             self._advance(LiveEvent.LOST)
         if self._known_as is None:

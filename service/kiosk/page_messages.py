@@ -209,6 +209,8 @@ class ResultScreen(_Said):
     initial_points: Number = 0
     dense_points: Number = 0
     can_keep: bool = False
+    no_links: bool = False
+    """Links were asked for, and none can be made now."""
     measurements: tuple[Measurement, ...] | None = None
     """None where the operator does not offer them."""
 

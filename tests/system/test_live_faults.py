@@ -101,6 +101,16 @@ def test_an_unplugged_sensor_is_noticed_and_taken_again_under_any_uri(control, s
     assert control.loads == 1  # in the same process
 
 
+def test_who_pulls_it_out_while_it_warms_up_waits_no_longer_for_it(control, sensor):
+    sensor.ask("pause", 1000)
+    for number in range(1, 4):
+        sensor.wait_state("warming", "streaming")
+        control.unplug()
+        sensor.wait_state("absent")
+        control.replug(f"virtual:{number}")
+    sensor.wait_state("warming", "streaming")
+
+
 def test_a_loop_of_disconnects_is_named(control, sensor):
     for _ in range(3):
         sensor.wait_state("streaming")

@@ -142,12 +142,16 @@ def _serve(uri: str) -> None:
             after_s = math.nextafter(shot.earliest_s, math.inf)
         return numbers
 
+    def pause(seconds: int) -> None:
+        """Let it wait for so long before what was opened in vain is opened again."""
+        _sensor._RETRY_S = _sensor._MAX_RETRY_S = seconds
+
     calls: dict[str, Callable[..., Any]] = {
         "state": state, "press": press, "burst": burst, "history": lambda: history,
         "told_again": told_again, "figures": lambda: asdict(sensor.figures),
         "identity": lambda: sensor.identity,
         "stuck": sensor.needs_new_process, "close": sensor.close,
-        "cpu": time.process_time,
+        "cpu": time.process_time, "pause": pause,
     }
     for line in sys.stdin:
         name, *numbers = line.split()

@@ -43,6 +43,7 @@ from denseface.service.kiosk.visit.events import (
     Event,
     FaceCame,
     HintCame,
+    LinksFailed,
     LinksMade,
     PageCame,
     PageWent,
@@ -234,6 +235,7 @@ class Conductor:
             keep = await self._links.make(effect.capture_id, self._language)
         except ServiceError as error:
             _log.warning("no links", reason=str(error))
+            self._happened(LinksFailed(effect.visit, effect.capture_id))
             return
         self._happened(LinksMade(effect.visit, effect.capture_id, keep))
 

@@ -30,6 +30,7 @@ from denseface.service.kiosk.visit.events import (
     FaceFailed,
     FrameTaken,
     HintCame,
+    LinksFailed,
     LinksMade,
     PageWent,
     ServiceIs,
@@ -201,6 +202,7 @@ def _keep(state: State, said: Keep, now_s: float) -> None:  # noqa: ARG001
     result = state.visit.result
     if result is not None and result.can_keep and not state.visit.linking:
         state.visit.linking = True
+        state.visit.result = result.model_copy(update={"no_links": False})
         state.effects.append(MakeLinks(state.visit.number, result.capture_id))
 
 
@@ -210,6 +212,14 @@ def _linked(state: State, happened: LinksMade, now_s: float) -> None:
         state.visit.keep, state.visit.linking = happened.keep, False
         state.statistics.kept += 1
         state.go(ScreenName.KEEP, now_s)
+
+
+def _unlinked(state: State, happened: LinksFailed, now_s: float) -> None:  # noqa: ARG001
+    """Say so; the button may be pressed again."""
+    result = state.visit.result
+    if result is not None and happened.capture_id == result.capture_id:
+        state.visit.linking = False
+        state.visit.result = result.model_copy(update={"no_links": True})
 
 
 def _delete(state: State, said: Delete, now_s: float) -> None:  # noqa: ARG001
@@ -271,6 +281,7 @@ TRANSITIONS: dict[tuple[ScreenName, type | Timer], Step] = {
     (_S.RESULT, Drawn): _drawn,
     (_S.RESULT, Keep): _keep,
     (_S.RESULT, LinksMade): _linked,
+    (_S.RESULT, LinksFailed): _unlinked,
 
     (_S.DELETING, Withdrawn): _removed,
 

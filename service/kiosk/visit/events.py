@@ -6,7 +6,8 @@ from denseface.service.kiosk.page_messages import KeepScreen, ResultScreen, Trou
 from denseface.service.protocol.hint import Hint
 
 __all__ = [
-    "CaptureRefused", "Event", "FaceCame", "FaceFailed", "FrameTaken", "HintCame", "LinksMade",
+    "CaptureRefused", "Event", "FaceCame", "FaceFailed", "FrameTaken", "HintCame", "LinksFailed",
+    "LinksMade",
     "PageCame", "PageWent", "ServiceIs", "Withdrawn",
 ]
 
@@ -94,5 +95,13 @@ class LinksMade:
     keep: KeepScreen
 
 
+@dataclass(frozen=True)
+class LinksFailed:
+    """No links can be made of a capture now."""
+
+    visit: int
+    capture_id: str
+
+
 Event = (PageCame | PageWent | ServiceIs | HintCame | FrameTaken | CaptureRefused | FaceCame
-         | FaceFailed | Withdrawn | LinksMade)
+         | FaceFailed | Withdrawn | LinksMade | LinksFailed)

@@ -54,6 +54,7 @@ const result = fields({
   initial_points: or(count, 0),
   dense_points: or(count, 0),
   can_keep: or(flag, false),
+  no_links: or(flag, false),
   measurements: orNull(list(measurement)),
 });
 

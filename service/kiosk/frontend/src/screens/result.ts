@@ -57,10 +57,11 @@ export const result: MakeView = (screen, kiosk) => {
   const remove = (): void => show(confirmDelete(texts, () => kiosk.say({ kind: "delete" }), () => show()));
   const keep = (): void => now.keep ? sheet() : void kiosk.say({ kind: "keep" });
   const unseen = html("p");
+  const unlinked = html("p", { class: "small", role: "status" });
   const front = html("div", { class: "front" },
     html("div", { class: "unseen" }, waiting(), unseen),
     html("div", { class: "tools" },
-      html("div", { class: "head" }, title, facts(screen, kiosk)),
+      html("div", { class: "head" }, title, facts(screen, kiosk), unlinked),
       ...(face.viewer.rotatable ? [moves(face, texts)]
         : [html("p", { class: "small" }, t("view.flat"))]),
       beforeAfter(face, texts), modes(face, texts),
@@ -71,6 +72,7 @@ export const result: MakeView = (screen, kiosk) => {
   const update = (next: Screen): void => {
     now = next;
     write(unseen, t(face.failed === screen.result?.capture_id ? "result.no_view" : "result.unseen"));
+    write(unlinked, next.result?.no_links ? t("result.no_links") : "");
     if (next.name === "keep" && next.keep && next.keep.page !== sheeted?.page) sheet();
   };
   update(screen);

@@ -3,7 +3,7 @@
 import asyncio
 from contextlib import asynccontextmanager
 
-import httpx
+import httpx2
 from starlette.applications import Starlette
 
 from denseface.recon.face import Face
@@ -107,12 +107,12 @@ class Page:
 
     @asynccontextmanager
     async def browser(self, address: str = "127.0.0.1", origin: str = ORIGIN):
-        transport = httpx.ASGITransport(self.app, client=(address, 5000))
-        async with httpx.AsyncClient(
+        transport = httpx2.ASGITransport(self.app, client=(address, 5000))
+        async with httpx2.AsyncClient(
                 transport=transport, base_url=origin, headers={"Origin": origin}) as browser:
             yield browser
 
-    async def logged_in(self, browser: httpx.AsyncClient) -> httpx.AsyncClient:
+    async def logged_in(self, browser: httpx2.AsyncClient) -> httpx2.AsyncClient:
         answer = await browser.post("/operator/api/login", json={"token": self.secret})
         assert answer.status_code == 200
         return browser

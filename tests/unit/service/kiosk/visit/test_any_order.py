@@ -131,7 +131,7 @@ class AnyOrder(RuleBasedStateMachine):
 
     @rule(target=answers, which=st.integers(0, 3), kind=st.sampled_from([
         events.FrameTaken, events.CaptureRefused, events.FaceCame, events.FaceFailed,
-        events.LinksMade]))
+        events.LinksMade, events.LinksFailed]))
     def prepare_an_answer(self, which, kind):
         """Make an answer that may be given at once, later, twice, or never."""
         taken = self.driven.of(TakePicture)
@@ -142,6 +142,7 @@ class AnyOrder(RuleBasedStateMachine):
             events.FrameTaken: (), events.CaptureRefused: ("quality",),
             events.FaceCame: (page.ResultScreen(capture_id=asked.capture_id, can_keep=True),),
             events.FaceFailed: ("NoFaceError",), events.LinksMade: (KEEP,),
+            events.LinksFailed: (),
         }[kind]
         return kind(asked.visit, asked.capture_id, *fields)
 

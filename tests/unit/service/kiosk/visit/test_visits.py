@@ -315,6 +315,17 @@ def test_links_are_made_once_and_only_where_they_may():
     assert not closed.linked
 
 
+def test_links_that_cannot_be_made_are_said_and_may_be_asked_for_again():
+    kiosk = Driven().to("result")
+    kiosk.say(page.Keep)
+    kiosk.answer(events.LinksFailed)
+    assert (kiosk.name, kiosk.screen.result.no_links) == ("result", True)
+    kiosk.say(page.Keep)
+    assert (kiosk.linked, kiosk.screen.result.no_links) == (["c1", "c1"], False)
+    kiosk.answer(events.LinksMade, KEEP)
+    assert kiosk.name == "keep"
+
+
 @pytest.mark.parametrize("name", ["result", "keep"])
 @pytest.mark.parametrize("said", [page.Done, page.Cancel])
 def test_who_has_seen_the_face_leaves_it_for_its_time(name, said):
