@@ -178,7 +178,7 @@ def test_several_visits_leave_nothing_in_the_page(served, browser):
         home(visitor)
         nodes = visitor.page.locator("*").count()
         before = used()
-        for _ in range(3):
+        for _ in range(2):
             to_result(visitor)
             home(visitor)
         gc.collect()
