@@ -23,6 +23,9 @@ _ALIKE = {"position_right", "position_up", "position_down", "position_closer", "
           "thanks_nothing", "trouble_disk", "trouble_hub"}
 """States that look like another one, by and large: not looked at here."""
 _SEEN = [name for name in STATES if name not in _ALIKE]
+_KEPT = {"de", "ar"}
+_PICTURES = REPOSITORY / "out" / "kiosk" / "states"
+"""Where screenshots of every state are kept, for those who look at them."""
 _EXPECTED = ("WebSocket connection to", "a face cannot be shown FaceGridError", "[.WebGL-")
 """What a browser's console may say: of a server that is gone, a damaged face, slow rendering."""
 _AXE = REPOSITORY / "service/kiosk/frontend/node_modules/axe-core/axe.min.js"
@@ -116,16 +119,19 @@ def shown(context: BrowserContext) -> Iterator[tuple[Page, States]]:
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_nothing_is_cut_or_hidden_at_any_size(context, language):
+    _PICTURES.mkdir(parents=True, exist_ok=True)
     with serving(languages=(language, *(each for each in LANGUAGES if each != language))) as states:
         page = _open(context, states)
         faults = []
         for name in _SEEN:
-            if name not in _WORDY and language not in {"de", "ar"}:
+            if name not in _WORDY and language not in _KEPT:
                 continue
             _show(page, states, name)
             for width, height in _SIZES:
                 page.set_viewport_size({"width": width, "height": height})
                 faults += [f"{name} {width}x{height}: {fault}" for fault in page.evaluate(_LAYOUT)]
+                if language in _KEPT and (width, height) != _SIZES[0]:
+                    page.screenshot(path=_PICTURES / f"{name}_{language}_{width}x{height}.png")
         assert faults == []
 
 

@@ -235,7 +235,7 @@ export class FaceViewer {
     clearTimeout(this.#settle);
     if (elapsed) this.#detail.took(elapsed);
     const seconds = Math.min(MAX_STEP_S, (elapsed || 16) / 1000);
-    const moving = this.#pose.step(seconds);
+    const moving = this.#pose.step(seconds) && !this.#flat;  // a flat picture is of the front
     const fading = this.#fade(seconds);
     this.#draw(false);
     if (moving || fading) {
