@@ -12,7 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from denseface.service.errors import SettingsError, first_error
 from denseface.service.runtime.parsing import parse_loopback_address, parse_retention
 
-__all__ = ["ServiceSettings", "default_address", "runtime_folder"]
+__all__ = ["ServiceSettings", "default_address", "given_settings", "runtime_folder"]
 
 _PREFIX = "DENSEFACE_"
 _MESSAGE_PIXELS = 2**25 // 3
@@ -38,6 +38,15 @@ def runtime_folder() -> Path:
 def default_address() -> str:
     """Give the address of this user's hub: a socket file that no other user can open."""
     return f"ipc://{runtime_folder() / 'hub'}"
+
+
+def given_settings(
+    model: type[BaseModel], prefix: str, environment: Mapping[str, str], flags: Mapping[str, Any]
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Give the flags that are not None, and what variables of a prefix say of a model's fields."""
+    given = {name: environment[prefix + name.upper()] for name in model.model_fields
+             if environment.get(prefix + name.upper())}
+    return {name: value for name, value in flags.items() if value is not None}, given
 
 
 class ServiceSettings(BaseModel):
@@ -104,9 +113,7 @@ class ServiceSettings(BaseModel):
         SettingsError
             One line that names the flag or variable and what is wrong with it.
         """
-        given = {name: environment[_PREFIX + name.upper()] for name in cls.model_fields
-                 if environment.get(_PREFIX + name.upper())}
-        flags = {name: value for name, value in flags.items() if value is not None}
+        flags, given = given_settings(cls, _PREFIX, environment, flags)
         try:
             return cls(**(given | flags))
         except ValidationError as error:

@@ -15,6 +15,7 @@ from denseface.service.kiosk.certificates import tls_context
 from denseface.service.kiosk.page_messages import Language
 from denseface.service.protocol.message_base import PeerName
 from denseface.service.runtime.parsing import parse_address
+from denseface.service.settings import given_settings
 
 __all__ = ["Address", "KioskSettings", "is_loopback"]
 
@@ -163,9 +164,7 @@ class KioskSettings(BaseModel):
         SettingsError
             One line that names the flag or variable and what is wrong with it.
         """
-        given = {name: environment[_PREFIX + name.upper()] for name in cls.model_fields
-                 if environment.get(_PREFIX + name.upper())}
-        flags = {name: value for name, value in flags.items() if value is not None}
+        flags, given = given_settings(cls, _PREFIX, environment, flags)
         try:
             return cls(**(given | flags))
         except ValidationError as error:
