@@ -4,16 +4,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from denseface.service.kiosk.page_messages import FromPage
 from tests.kiosk_states import LANGUAGES, STATES, VECTORS, States, serving
 from tests.system.running import REPOSITORY
+from tests.viewer_page import software_browser
 from tests.waiting import LIMIT_MS, until
 
-_ARGUMENTS = ["--no-sandbox", "--no-first-run", "--disable-background-networking",
-              "--disable-component-update", "--use-angle=swiftshader",
-              "--enable-unsafe-swiftshader"]
 _SIZES = [(800, 480), (480, 800), (1280, 800)]
 _WORDY = {"consent", "position_uncover", "result_measured", "keep", "trouble_worker", "leaving"}
 """States with much text: looked at in every language, the others in the longest and in one that
@@ -66,11 +64,8 @@ _LAYOUT = """() => {
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(
-            executable_path="/usr/bin/chromium", args=_ARGUMENTS, timeout=LIMIT_MS)
+    with software_browser() as chromium:
         yield chromium
-        chromium.close()
 
 
 @pytest.fixture

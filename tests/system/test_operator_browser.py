@@ -4,10 +4,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect
 
 from tests.operator_states import Operated, serving_operator
 from tests.system.running import REPOSITORY
+from tests.viewer_page import software_browser
 from tests.waiting import LIMIT_MS, until
 
 AXE = REPOSITORY / "service/kiosk/frontend/node_modules/axe-core/axe.min.js"
@@ -18,12 +19,8 @@ expect.set_options(timeout=LIMIT_MS)
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(
-            executable_path="/usr/bin/chromium", timeout=LIMIT_MS,
-            args=["--no-sandbox", "--no-first-run", "--disable-background-networking"])
+    with software_browser() as chromium:
         yield chromium
-        chromium.close()
 
 
 @pytest.fixture

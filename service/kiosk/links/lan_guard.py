@@ -58,10 +58,7 @@ class LanGuard:
     def _has_room(self, scope: Scope) -> bool:
         now = self._clock()
         client = client_of(scope["client"][0] if scope["client"] else "")
-        bucket = self._clients.get(client)
-        if bucket is None:
-            bucket = self._clients[client] = TokenBucket(_BURST, _RATE, now)
-        return bucket.take(now)
+        return self._clients.setdefault(client, TokenBucket(_BURST, _RATE, now)).take(now)
 
     def _is_known(self, hosts: list[str]) -> bool:
         now = self._clock()

@@ -61,10 +61,7 @@ class Limits:
     def _may_ask(self, scope: Scope) -> bool:
         address = str((scope.get("client") or ("",))[0])
         now = self._clock()
-        bucket = self._buckets.get(address)
-        if bucket is None:
-            bucket = self._buckets[address] = TokenBucket(_BURST, _RATE, now)
-        return bucket.take(now)
+        return self._buckets.setdefault(address, TokenBucket(_BURST, _RATE, now)).take(now)
 
 
 class _Bounded:

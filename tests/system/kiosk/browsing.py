@@ -6,17 +6,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from urllib.parse import urlsplit
 
-from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
 
 from tests.system.running import REPOSITORY
+from tests.viewer_page import software_browser
 from tests.waiting import LIMIT_MS
 
 __all__ = ["Visitor", "chromium", "visiting"]
 
-_ARGUMENTS = ["--no-sandbox", "--disable-quic", "--no-first-run",
-              "--disable-background-networking", "--disable-component-update", "--disable-sync",
-              "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-              "--js-flags=--expose-gc"]
 _AXE = REPOSITORY / "service/kiosk/frontend/node_modules/axe-core/axe.min.js"
 _TAGS = ["wcag2a", "wcag2aa", "wcag21aa", "wcag22aa"]
 _PICTURES = REPOSITORY / "out" / "kiosk"
@@ -39,13 +36,8 @@ _OUTSIDE = """() => [...document.querySelectorAll("button, h1, h2, p")].filter((
 @contextmanager
 def chromium() -> Iterator[Browser]:
     """Run a browser that renders by software."""
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path="/usr/bin/chromium", args=_ARGUMENTS, timeout=LIMIT_MS)
-        try:
-            yield browser
-        finally:
-            browser.close()
+    with software_browser("--disable-quic", "--disable-sync", "--js-flags=--expose-gc") as browser:
+        yield browser
 
 
 @dataclass
