@@ -122,7 +122,7 @@ def _simulated(view: View, folder: Path | None) -> tuple[RgbdFrame, Truth]:
     shot, = simulate(view.scene, KINECT_CALIBRATED, seed=view.seed)
     frame = _with_balls(shot.frame, view) if view.balls else shot.frame
     if kept and truth_path:
-        save_frame(kept, frame)
+        save_frame(frame, kept)
         shot.truth.save(truth_path)
     return frame, shot.truth
 

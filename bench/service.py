@@ -140,7 +140,7 @@ def main() -> int:
         # Both sides have it in memory. The recording itself has three frames and OpenNI2 takes
         # 110 ms to begin it again: 26 frames a second, less than one worker can do.
         source = folder / "frame.npz"
-        save_frame(source, frame)
+        save_frame(frame, source)
         services = {count: stack.enter_context(running(source, count)) for count in (1, 2)}
         bare = {count: Bare(source, count) for count in (1, 2)}
         for each in bare.values():

@@ -4,6 +4,7 @@ The camera frame is OpenCV's: x right, y down, z forward; lengths in millimetres
 in pixels with (0, 0) the centre of the top left pixel.
 """
 
+import math
 from collections import OrderedDict
 from functools import lru_cache
 from threading import Lock
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from denseface.capture.errors import CalibrationError
+from denseface.short_repr import short_repr
 
 __all__ = ["MAX_SIDE", "Calibration", "CameraModel", "ChosenCalibration", "DepthToColor"]
 
@@ -312,6 +314,15 @@ class Calibration(_Model):
     color: CameraModel
     """The depth camera again where a sensor has no other."""
     depth_to_color: DepthToColor = DepthToColor()
+
+    def __repr__(self) -> str:
+        apart = math.hypot(*self.depth_to_color.translation_mm)
+        return short_repr(self, *(
+            f"{name} {camera.width}x{camera.height} of focal length {camera.fx:.1f}"
+            for name, camera in (("depth", self.depth), ("color", self.color))),
+            f"{apart:.1f} mm apart")
+
+    __str__ = __repr__
 
     @model_validator(mode="before")
     @classmethod

@@ -3,11 +3,13 @@
 Each error is also the builtin kind that a caller would expect to catch.
 """
 
+from denseface.errors import DensefaceError
+
 __all__ = ["CalibrationError", "CaptureError", "FrameError", "MismatchedFrameError",
            "SensorError", "SensorTimeoutError", "UnreadableSourceError", "WrongSizeError"]
 
 
-class CaptureError(Exception):
+class CaptureError(DensefaceError):
     """Base of every error raised by `capture`."""
 
 

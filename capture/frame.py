@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
 from denseface.capture.errors import FrameError
+from denseface.short_repr import short_repr
 
 __all__ = ["MAX_BURST", "DepthMeaning", "DepthRounding", "FrameOrigin", "RgbdFrame"]
 
@@ -96,7 +97,7 @@ class FrameOrigin:
             raise FrameError(f"fused must be 1 to {MAX_BURST}, found {self.fused}")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RgbdFrame:
     """One synchronized depth + colour pair with its calibration; never mirrored.
 
@@ -146,6 +147,14 @@ class RgbdFrame:
             if (width, height) != (camera.width, camera.height):
                 raise FrameError(f"{name} is {width}x{height}, its calibration says "
                                  f"{camera.width}x{camera.height}")
+
+    def __repr__(self) -> str:
+        depth, color = ("no color" if image is None else f"{name} {image.shape[1]}x{image.shape[0]}"
+                        for name, image in (("depth", self.depth), ("color", self.color)))
+        readings = np.count_nonzero(self.depth) / self.depth.size
+        return short_repr(
+            self, depth, f"{readings:.0%} of it measured", color,
+            "registered" if self.registered else "", self.origin.sensor, self.origin.captured_at)
 
     @property
     def rgb(self) -> NDArray[np.uint8]:

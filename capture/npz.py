@@ -111,7 +111,7 @@ class FolderWriter:
 
     def add(self, frame: RgbdFrame) -> None:
         """Write one more; OSError as from the system."""
-        save_frame(self.path / f"{self.frames:06}.npz", frame, quickly=True, mode=self._mode)
+        save_frame(frame, self.path / f"{self.frames:06}.npz", quickly=True, mode=self._mode)
         self.frames += 1
 
     def close(self) -> None:
@@ -180,7 +180,7 @@ def _size(image: NDArray[Any]) -> tuple[int, int]:
 
 
 def save_frame(
-    path: str | Path, frame: RgbdFrame, *, quickly: bool = False, mode: int | None = None
+    frame: RgbdFrame, path: str | Path, *, quickly: bool = False, mode: int | None = None
 ) -> None:
     """Write a frame file: whole, or not at all; OSError as from the system.
 

@@ -1,4 +1,4 @@
-"""The public face: what other programs import.
+"""The public face: what other programs import; docs/python.md shows it by what people do.
 
 Everything is imported when first used, so that `import denseface` costs nothing.
 """
@@ -7,32 +7,113 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from denseface.capture import RgbdFrame, open_source
-    from denseface.recon import Face, Settings, reconstruct
-    from denseface.recon.face import Consent
-    from denseface.service.client import AsyncClient, Client
+    from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
+    from denseface.capture.errors import (
+        CalibrationError,
+        CaptureError,
+        FrameError,
+        MismatchedFrameError,
+        SensorError,
+        SensorTimeoutError,
+        UnreadableSourceError,
+        WrongSizeError,
+    )
+    from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
+    from denseface.capture.npz import load_frame, save_frame
+    from denseface.capture.source import Source, open_source
+    from denseface.errors import DensefaceError
+    from denseface.recon.errors import (
+        CoarseDepthError,
+        FaceWithoutDepthError,
+        ImpossibleFrameError,
+        ImpossibleSettingsError,
+        NoDepthError,
+        NoFaceError,
+        ReconstructionError,
+        TooLittleDepthError,
+    )
+    from denseface.recon.face import Consent, DenseCloud, Face, FaceCandidate, PointCloud, Report
+    from denseface.recon.pipeline import reconstruct
+    from denseface.recon.settings import Neighbors, Preset, Settings
+    from denseface.service.client import (
+        AsyncClient,
+        AsyncOperator,
+        Client,
+        Operator,
+        Published,
+        PublishedFace,
+        PublishedFailure,
+        PublishedHint,
+        PublishedPreview,
+    )
+    from denseface.service.errors import (
+        AddressError,
+        CaptureFailedError,
+        ClientClosedError,
+        ClientForkedError,
+        ClientTimeoutError,
+        FormatError,
+        KeyFileError,
+        KeyRefusedError,
+        LocalProtocolError,
+        PressRefusedError,
+        ProtocolError,
+        RemoteProtocolError,
+        RequestFailedError,
+        ServiceError,
+        SettingsError,
+        UnknownCaptureError,
+    )
     from denseface.service.export import load_face, save_face
+    from denseface.service.protocol.message_base import CaptureSummary, DeadLetter
+    from denseface.service.protocol.status import Status
 
     __version__: str
 
 __all__ = [
-    "AsyncClient", "Client", "Consent", "Face", "RgbdFrame", "Settings", "__version__", "load_face",
-    "open_source", "reconstruct", "save_face",
+    "AddressError", "AsyncClient", "AsyncOperator", "Calibration", "CalibrationError",
+    "CameraModel", "CaptureError", "CaptureFailedError", "CaptureSummary", "Client",
+    "ClientClosedError", "ClientForkedError", "ClientTimeoutError", "CoarseDepthError", "Consent",
+    "DeadLetter", "DenseCloud", "DensefaceError", "DepthMeaning", "DepthRounding", "DepthToColor",
+    "Face", "FaceCandidate", "FaceWithoutDepthError", "FormatError", "FrameError", "FrameOrigin",
+    "ImpossibleFrameError", "ImpossibleSettingsError", "KeyFileError", "KeyRefusedError",
+    "LocalProtocolError", "MismatchedFrameError", "Neighbors", "NoDepthError", "NoFaceError",
+    "Operator", "PointCloud", "Preset", "PressRefusedError", "ProtocolError", "Published",
+    "PublishedFace", "PublishedFailure", "PublishedHint", "PublishedPreview",
+    "ReconstructionError", "RemoteProtocolError", "Report", "RequestFailedError", "RgbdFrame",
+    "SensorError", "SensorTimeoutError", "ServiceError", "Settings", "SettingsError", "Source",
+    "Status", "TooLittleDepthError", "UnknownCaptureError", "UnreadableSourceError",
+    "WrongSizeError", "__version__", "load_face", "load_frame", "open_source", "reconstruct",
+    "save_face", "save_frame",
 ]
 
-_MODULES = {
-    "AsyncClient": "denseface.service.client",
-    "Client": "denseface.service.client",
-    "Consent": "denseface.recon.face",
-    "Face": "denseface.recon",
-    "RgbdFrame": "denseface.capture",
-    "Settings": "denseface.recon",
-    "load_face": "denseface.service.export",
-    "open_source": "denseface.capture",
-    "reconstruct": "denseface.recon",
-    "save_face": "denseface.service.export",
+_NAMES = {
+    "capture.calibration": "Calibration CameraModel DepthToColor",
+    "capture.errors": "CalibrationError CaptureError FrameError MismatchedFrameError SensorError "
+                      "SensorTimeoutError UnreadableSourceError WrongSizeError",
+    "capture.frame": "DepthMeaning DepthRounding FrameOrigin RgbdFrame",
+    "capture.npz": "load_frame save_frame",
+    "capture.source": "Source open_source",
+    "errors": "DensefaceError",
+    "recon.errors": "CoarseDepthError FaceWithoutDepthError ImpossibleFrameError "
+                    "ImpossibleSettingsError NoDepthError NoFaceError ReconstructionError "
+                    "TooLittleDepthError",
+    "recon.face": "Consent DenseCloud Face FaceCandidate PointCloud Report",
+    "recon.pipeline": "reconstruct",
+    "recon.settings": "Neighbors Preset Settings",
+    "service.client": "AsyncClient AsyncOperator Client Operator Published PublishedFace "
+                      "PublishedFailure PublishedHint PublishedPreview",
+    "service.errors": "AddressError CaptureFailedError ClientClosedError ClientForkedError "
+                      "ClientTimeoutError FormatError KeyFileError KeyRefusedError "
+                      "LocalProtocolError PressRefusedError ProtocolError RemoteProtocolError "
+                      "RequestFailedError ServiceError SettingsError UnknownCaptureError",
+    "service.export": "load_face save_face",
+    "service.protocol.message_base": "CaptureSummary DeadLetter",
+    "service.protocol.status": "Status",
 }
-"""Module of each public name."""
+"""Module -> public names that it has. The imports above say the same to type checkers, and
+`__all__` to `import *`; a test holds the three together."""
+_MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 
 def __getattr__(name: str) -> Any:
@@ -41,7 +122,7 @@ def __getattr__(name: str) -> Any:
 
         value: Any = version("denseface")
     elif name in _MODULES:
-        value = getattr(import_module(_MODULES[name]), name)
+        value = getattr(import_module(f"denseface.{_MODULES[name]}"), name)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value

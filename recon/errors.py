@@ -1,11 +1,18 @@
 """Why a frame did not become a face: always one of these, never a bad cloud."""
 
-__all__ = ["CoarseDepthError", "FaceWithoutDepthError", "ImpossibleFrameError", "NoDepthError",
-           "NoFaceError", "ReconstructionError", "TooLittleDepthError"]
+from denseface.errors import DensefaceError
+
+__all__ = ["CoarseDepthError", "FaceWithoutDepthError", "ImpossibleFrameError",
+           "ImpossibleSettingsError", "NoDepthError", "NoFaceError", "ReconstructionError",
+           "TooLittleDepthError"]
 
 
-class ReconstructionError(Exception):
-    """Base of every error raised by `recon`."""
+class ReconstructionError(DensefaceError):
+    """Base of every error that a frame leads to."""
+
+
+class ImpossibleSettingsError(DensefaceError, ValueError):
+    """A setting of the reconstruction is unknown, or has a value that it may not have."""
 
 
 class NoFaceError(ReconstructionError):

@@ -11,13 +11,14 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, FailFast, Field, fiel
 from denseface.capture.frame import DepthRounding
 from denseface.recon.arrays import Bytes, Floats, Ints
 from denseface.recon.settings import Settings
+from denseface.short_repr import short_repr
 
 __all__ = [
     "Box", "Consent", "DenseCloud", "Face", "FaceCandidate", "PointCloud", "Report", "Seeds",
 ]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PointCloud:
     """Coloured points.
 
@@ -42,8 +43,11 @@ class PointCloud:
     def __len__(self) -> int:
         return len(self.points)
 
+    def __repr__(self) -> str:
+        return short_repr(self, f"{len(self):,} points", _extent(self.points))
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Seeds:
     """The measured points of the face, in the order of the depth image's rows.
 
@@ -59,8 +63,11 @@ class Seeds:
     colors: Bytes
     pixels: Ints
 
+    def __repr__(self) -> str:
+        return short_repr(self, f"{len(self.points):,} points", _extent(self.points))
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class DenseCloud(PointCloud):
     """The seeds propagated over a regular (X, Y) grid.
 
@@ -90,6 +97,12 @@ class DenseCloud(PointCloud):
         if len(self.cells) and (self.cells.min() < 0 or rows.max() >= self.grid_shape[0]
                                 or columns.max() >= self.grid_shape[1]):
             raise ValueError(f"cells must lie on the {self.grid_shape} grid")
+
+    def __repr__(self) -> str:
+        rows, columns = self.grid_shape
+        return short_repr(
+            self, f"{len(self):,} points", _extent(self.points), _sigma(self),
+            f"grid {rows}x{columns} every {self.grid_step_mm:.2f} mm")
 
 
 class _Model(BaseModel):
@@ -189,6 +202,17 @@ class Report(_Model):
     consent: Consent | None = None
     """Of the person, where the press came with one."""
 
+    def __repr__(self) -> str:
+        """Say what most readers look for; `model_dump_json` says all."""
+        warned = len(self.warnings)
+        return short_repr(
+            self, self.capture_id, f"{self.initial_points:,} measured points",
+            f"{self.dense_points:,} dense points", f"noise {self.noise_mm:.2f} mm",
+            f"{self.settings.preset}", f"{warned} warning{'s' * (warned != 1)}" if warned else "",
+            self.sensor, self.captured_at)
+
+    __str__ = __repr__
+
     @field_validator("timings_ms")
     @classmethod
     def _known_stages(cls, given: dict[str, float]) -> dict[str, float]:
@@ -198,13 +222,37 @@ class Report(_Model):
         return given
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Face:
-    """One reconstructed face."""
+    """One reconstructed face.
+
+    Attributes
+    ----------
+    initial : the seeds: what was measured of the face, mm, depth camera frame
+    dense : about ten points for each of them, with normals and `sigma`, in the same frame
+    report : what was done to the frame, and what is odd about it
+    """
 
     initial: PointCloud
     dense: DenseCloud
     report: Report
+
+    def __repr__(self) -> str:
+        return short_repr(
+            self, self.report.capture_id, f"{len(self.initial):,} measured points",
+            f"{len(self.dense):,} dense points", _sigma(self.dense), self.report.sensor,
+            self.report.captured_at)
+
+
+def _extent(points: Floats) -> str:
+    """Say how large a cloud is, along x, y and z."""
+    if not len(points):
+        return ""
+    return "{:.0f} x {:.0f} x {:.0f} mm".format(*np.ptp(points, axis=0))
+
+
+def _sigma(dense: DenseCloud) -> str:
+    return f"sigma {np.median(dense.sigma):.2f} mm (median)" if len(dense) else ""
 
 
 def _check(name: str, array: NDArray[Any], dtype: type[np.generic], shape: tuple[int, ...]) -> None:

@@ -1,11 +1,13 @@
 """The settings of the reconstruction, and the presets that choose them."""
 
 from enum import StrEnum
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, TypedDict, Unpack
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-__all__ = ["Neighbors", "Preset", "Settings"]
+from denseface.recon.errors import ImpossibleSettingsError
+
+__all__ = ["Changes", "Neighbors", "Preset", "Settings"]
 
 
 _FORMER = frozenset({"depth_offset_mm"})
@@ -45,6 +47,18 @@ class Preset(StrEnum):
     """The most accurate found; chosen on other heads than the reported ones."""
 
 
+class Changes(TypedDict, total=False):
+    """What `Settings.of` may change: the fields of `Settings`, as type checkers see them."""
+
+    r0_factor: float
+    smoothing: float
+    detail_factor: float | None
+    symmetry: bool
+    shading: bool
+    neighbors: Neighbors | str
+    ratio: float
+
+
 class Settings(BaseModel):
     """Settings of `reconstruct`; what is not given comes from the preset."""
 
@@ -81,6 +95,22 @@ class Settings(BaseModel):
         return preset.settings | {k: v for k, v in given.items() if k not in _FORMER}
 
     @classmethod
-    def of(cls, preset: Preset | str, **changes: Any) -> Self:
-        """Give a preset with some settings changed."""
-        return cls(preset=Preset(preset), **changes)
+    def of(cls, preset: Preset | str = Preset.BEST, **changes: Unpack[Changes]) -> Self:
+        """Give a preset with some settings changed.
+
+        Raises
+        ------
+        ImpossibleSettingsError
+            One line that names the setting: it is unknown, or its value is out of its range.
+        """
+        try:
+            return cls.model_validate({**changes, "preset": preset})
+        except ValidationError as error:
+            first = error.errors(include_url=False, include_context=False)[0]
+            name = ".".join(map(str, first["loc"]))
+            why = (f"expected one of {', '.join(cls.model_fields)}"
+                   if first["type"] == "extra_forbidden" else first["msg"])
+            raise ImpossibleSettingsError(
+                f"{name}: {why}, found {str(first['input'])[:60]!r}"
+                if name in cls.model_fields else f"{name}: no setting of that name; {why}"
+            ) from error

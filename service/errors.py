@@ -5,6 +5,8 @@ Each error is also the builtin kind that a caller would expect to catch.
 
 from typing import TYPE_CHECKING
 
+from denseface.errors import DensefaceError
+
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
@@ -19,7 +21,7 @@ __all__ = [
 ]
 
 
-class ServiceError(Exception):
+class ServiceError(DensefaceError):
     """Base of every error raised by `service`."""
 
 

@@ -1,7 +1,7 @@
 """What subscribers get: outcomes, previews and hints."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,32 +11,56 @@ from denseface.recon.face import Face
 from denseface.service.errors import CaptureFailedError, RemoteProtocolError
 from denseface.service.protocol.messages import CaptureFailed, FaceDone, Hint, Hints, Preview
 from denseface.service.protocol.wire import Packet
+from denseface.short_repr import short_repr
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PublishedFace:
-    """A finished capture."""
+    """A finished capture.
+
+    Attributes
+    ----------
+    epoch : one life of the hub's database; another one counts anew
+    sequence : number of the outcome within it
+    capture_id : the capture
+    face : its face
+    """
 
     epoch: str
     sequence: int
     capture_id: str
     face: Face
 
+    def __repr__(self) -> str:
+        return short_repr(self, f"number {self.sequence}", self.capture_id,
+                          f"{len(self.face.dense):,} dense points", self.face.report.sensor,
+                          self.face.report.captured_at)
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class PublishedFailure:
-    """A capture that ended without a face."""
+    """A capture that ended without a face.
+
+    Attributes
+    ----------
+    epoch, sequence, capture_id : as of `PublishedFace`
+    error : why; not raised
+    """
 
     epoch: str
     sequence: int
     capture_id: str
     error: CaptureFailedError
 
+    def __repr__(self) -> str:
+        return short_repr(self, f"number {self.sequence}", self.capture_id, self.error.error,
+                          "given up" if self.error.dead else "")
+
 
 Published = PublishedFace | PublishedFailure
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PublishedHint:
     """What a person in front of a sensor could do better.
 
@@ -55,13 +79,16 @@ class PublishedHint:
     text: str
     measures: Mapping[str, float]
 
+    def __repr__(self) -> str:
+        return short_repr(self, self.sensor, self.text or "ready", *self.codes)
+
     @property
     def ok(self) -> bool:
         """Nothing is wrong: a press now is worth it."""
         return not self.codes
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PublishedPreview:
     """A small picture of what a sensor sees.
 
@@ -83,7 +110,12 @@ class PublishedPreview:
     size: tuple[int, int]
     jpeg: bytes | None
     hint: PublishedHint | None
-    _pixels: NDArray[np.uint8] | None = field(repr=False)
+    _pixels: NDArray[np.uint8] | None
+
+    def __repr__(self) -> str:
+        width, height = self.size
+        return short_repr(self, f"number {self.sequence}", self.sensor, f"{width}x{height}",
+                          self.hint.text or "ready" if self.hint else "")
 
     @cached_property
     def image(self) -> NDArray[np.uint8]:

@@ -30,6 +30,6 @@ def write_small_frame(path: Path) -> None:
         depth=frame.calibration.depth.scaled(1 / _DEPTH_SHRINK),
         color=frame.calibration.color.scaled(1 / _COLOR_SHRINK),
         depth_to_color=frame.calibration.depth_to_color)
-    save_frame(path, RgbdFrame(
+    save_frame(RgbdFrame(
         depth, color.astype(np.uint8), frame.depth_timestamp_us, frame.color_timestamp_us,
-        calibration))
+        calibration), path)

@@ -123,7 +123,7 @@ def test_a_sensor_that_mirrors_without_a_word_is_turned_back(tmp_path):
 
 def test_a_recording_on_its_side_is_turned(tmp_path):
     upright = frames_of("wall_close")[0]
-    save_frame(tmp_path / "lying.npz", rotate_frame(upright, 270))
+    save_frame(rotate_frame(upright, 270), tmp_path / "lying.npz")
     done = denseface("reconstruct", tmp_path / "lying.npz")
     assert done.returncode == 1
     assert "--rotate 90" in done.stderr
@@ -135,8 +135,9 @@ def test_a_recording_on_its_side_is_turned(tmp_path):
 
 def test_a_frame_that_fits_in_no_way_is_refused_by_name(tmp_path):
     room = frames_of("empty_room")[0]
-    save_frame(tmp_path / "odd.npz", replace(
-        frames_of("two_people")[0], color=np.ascontiguousarray(room.color[::-1])))
+    save_frame(replace(
+        frames_of("two_people")[0], color=np.ascontiguousarray(room.color[::-1])),
+        tmp_path / "odd.npz")
     done = denseface("reconstruct", tmp_path / "odd.npz")
     assert (done.returncode, done.stdout) == (2, "")
     (line,) = done.stderr.splitlines()

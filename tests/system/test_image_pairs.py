@@ -89,7 +89,7 @@ def test_registered_depth_of_vga_and_a_colour_of_1280x1024(tmp_path, frame):
                      "--registered", "yes", "--unit", "mm", "-o", tmp_path / "f.npz")
     assert (done.returncode, done.stderr) == (0, "")
     small = RgbdFrame(registered, frame.color, 0, 0, both, registered=True)
-    save_frame(tmp_path / "small.npz", small)
+    save_frame(small, tmp_path / "small.npz")
     (tmp_path / "d.calibration.json").unlink()
     assert denseface("reconstruct", tmp_path / "small.npz", "-o", tmp_path / "s.npz"
                      ).returncode == 0

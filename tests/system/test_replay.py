@@ -15,7 +15,7 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("frames") / "take"
     folder.mkdir()
     for number, frame in enumerate(play(RECORDINGS / "frontal_700.oni")[0]):
-        save_frame(folder / f"{number}.npz", frame)
+        save_frame(frame, folder / f"{number}.npz")
     return folder
 
 

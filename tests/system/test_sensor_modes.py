@@ -26,7 +26,7 @@ from denseface.capture.openni2 import LiveSource
 for uri in sys.argv[2:]:
     with LiveSource(uri) as source:
         for frame in islice(source, 2): pass
-        save_frame(f"{sys.argv[1]}/{uri}.npz", frame)
+        save_frame(frame, f"{sys.argv[1]}/{uri}.npz")
         print(json.dumps([source.streams.notes, source.wrong_size, frame.calibration_origin]))
 """
 _RECORD = """

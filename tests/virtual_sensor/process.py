@@ -39,7 +39,7 @@ from denseface.capture import open_source
 from denseface.capture.npz import save_frame
 with open_source(sys.argv[1]) as source:
     for number, frame in enumerate(islice(source, int(sys.argv[3]))):
-        save_frame(f"{sys.argv[2]}/{number}.npz", frame)
+        save_frame(frame, f"{sys.argv[2]}/{number}.npz")
         print(frame.calibration_origin)
 """
 RECORD = """

@@ -42,7 +42,7 @@ def write(path, **changes):
 def test_what_is_saved_is_loaded(tmp_path, depth, color, stamps, registered, pose):
     calibration = CALIBRATION.model_copy(update={"depth_to_color": pose})
     frame = RgbdFrame(depth, color, *stamps, calibration, registered)
-    save_frame(tmp_path / "f.npz", frame)
+    save_frame(frame, tmp_path / "f.npz")
     with open_source(tmp_path / "f.npz") as source:
         (loaded,) = source
         assert source.frame_count == 1
@@ -59,7 +59,7 @@ def test_what_a_depth_means_and_where_it_comes_from_is_kept(tmp_path):
     meaning = DepthMeaning(100, DepthRounding.NONE, 4000)
     frame = RgbdFrame(good()["depth"], None, 5, 5, CALIBRATION, depth_meaning=meaning,
                       origin=FrameOrigin("B00366600000000A", "2026-11-29T12:00:00Z"))
-    save_frame(tmp_path / "f.npz", frame)
+    save_frame(frame, tmp_path / "f.npz")
     loaded = load_frame(tmp_path / "f.npz")
     assert loaded.color is None
     assert loaded.depth_meaning == meaning
@@ -231,8 +231,8 @@ def test_a_failed_save_leaves_the_old_file(tmp_path, monkeypatch):
 
     monkeypatch.setattr(np, "savez_compressed", fail)
     with pytest.raises(OSError, match="No space"):
-        save_frame(path, frames.frame(np.zeros((H, W), np.uint16), np.zeros((H, W, 3), np.uint8),
-                                      CALIBRATION))
+        save_frame(frames.frame(np.zeros((H, W), np.uint16), np.zeros((H, W, 3), np.uint8),
+                                CALIBRATION), path)
     assert path.read_bytes() == old
     assert list(tmp_path.iterdir()) == [path]
 

@@ -32,7 +32,7 @@ def folder(tmp_path):
     path = tmp_path / "take"
     path.mkdir()
     for number in range(4):
-        save_frame(path / f"{number:06}.npz", frame(number))
+        save_frame(frame(number), path / f"{number:06}.npz")
     return path
 
 
@@ -62,7 +62,7 @@ def test_options_that_are_none(text):
 
 def test_a_file_with_a_question_mark_in_its_name(tmp_path):
     path = tmp_path / "take?rate=what.npz"
-    save_frame(path, frame(3))
+    save_frame(frame(3), path)
     with open_source(path) as source:
         assert numbers(source) == [3]
     with open_source(f"{path}?end=stop") as source:

@@ -17,8 +17,8 @@ ARGUMENT, BESIDE, OWN = (frames.calibration(color=frames.camera(f=f)) for f in (
 @pytest.fixture
 def saved(tmp_path):
     path = tmp_path / "take.1.npz"
-    save_frame(path, frames.frame(
-        np.zeros((120, 160), np.uint16), np.zeros((120, 160, 3), np.uint8), OWN))
+    save_frame(frames.frame(
+        np.zeros((120, 160), np.uint16), np.zeros((120, 160, 3), np.uint8), OWN), path)
     return path
 
 
@@ -81,8 +81,9 @@ def test_a_folder_of_frames_in_the_order_of_their_names(saved):
     folder.mkdir()
     for name, f in (("b.npz", 2), ("a.npz", 1), ("c.NPZ", 3)):
         (folder / name).write_bytes(saved.read_bytes())
-        save_frame(folder / name, frames.frame(
-            np.full((120, 160), f, np.uint16), np.zeros((120, 160, 3), np.uint8), OWN))
+        save_frame(frames.frame(
+            np.full((120, 160), f, np.uint16), np.zeros((120, 160, 3), np.uint8), OWN),
+            folder / name)
     (folder / "notes.txt").write_text("none")
     with open_source(folder) as source:
         assert (source.uri, source.frame_count) == (str(folder), 3)
@@ -96,7 +97,7 @@ def test_a_folder_of_frames_in_the_order_of_their_names(saved):
 @pytest.mark.parametrize("said", [True, False])
 def test_a_calibration_file_says_whether_depth_is_registered(saved, said):
     frame = next(iter(open_source(saved)))
-    save_frame(saved, replace(frame, registered=not said))
+    save_frame(replace(frame, registered=not said), saved)
     assert next(iter(open_source(saved, raw=True))).registered is not said
     beside = saved.with_name("take.1.calibration.json")
     beside.write_text(json.dumps(json.loads(OWN.to_json()) | {"registered": said}))

@@ -3,7 +3,8 @@
 import pytest
 from pydantic import ValidationError
 
-from denseface.recon.settings import Neighbors, Preset, Settings
+from denseface.recon.errors import ImpossibleSettingsError
+from denseface.recon.settings import Changes, Neighbors, Preset, Settings
 
 
 def test_best_is_the_default():
@@ -96,6 +97,20 @@ def test_a_list_is_no_settings():
         Settings.model_validate([1, 2])
 
 
-def test_an_unknown_preset_is_named():
-    with pytest.raises(ValueError, match="'fastest' is not a valid Preset"):
-        Settings.of("fastest")
+@pytest.mark.parametrize(("given", "line"), [
+    ({"preset": "fast"}, "preset: Input should be 'paper', 'faithful' or 'best', found 'fast'"),
+    ({"preset": None}, "preset: Input should be 'paper', 'faithful' or 'best', found 'None'"),
+    ({"smooting": 3}, "smooting: no setting of that name; expected one of preset, r0_factor, "
+                      "smoothing, detail_factor, symmetry, shading, neighbors, ratio"),
+    ({"ratio": 1e9}, "ratio: Input should be less than or equal to 100, found '1000000000.0'"),
+    ({"preset": "paper", "neighbors": [1]},
+     "neighbors: Input should be 'randomized', 'exact' or 'lattice', found '[1]'"),
+])
+def test_a_wrong_change_is_one_line(given, line):
+    with pytest.raises(ImpossibleSettingsError) as caught:
+        Settings.of(**given)
+    assert str(caught.value) == line
+
+
+def test_type_checkers_know_the_names_that_can_be_changed():
+    assert Changes.__annotations__.keys() == Settings.model_fields.keys() - {"preset"}

@@ -21,8 +21,9 @@ from tests.waiting import LIMIT_S
 def room(tmp_path):
     """A frame with depth and without a face."""
     path = tmp_path / "room.npz"
-    save_frame(path, frame(
-        np.full((120, 160), 900, np.uint16), np.full((120, 160, 3), 90, np.uint8), calibration()))
+    save_frame(frame(
+        np.full((120, 160), 900, np.uint16), np.full((120, 160, 3), 90, np.uint8), calibration()),
+        path)
     return path
 
 

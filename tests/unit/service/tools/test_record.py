@@ -27,8 +27,9 @@ def folder(tmp_path):
     for number in range(4):
         one = frames.frame(np.full((120, 160), 700 + number, np.uint16),
                            np.zeros((120, 160, 3), np.uint8))
-        save_frame(folder / f"{number}.npz", replace(
-            one, depth_timestamp_us=number * 20_000, color_timestamp_us=number * 20_000))
+        save_frame(replace(
+            one, depth_timestamp_us=number * 20_000, color_timestamp_us=number * 20_000),
+            folder / f"{number}.npz")
     return folder
 
 
