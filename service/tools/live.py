@@ -12,9 +12,9 @@ from denseface.capture.errors import UnreadableSourceError
 from denseface.recon import Face, ReconstructionError, Settings, reconstruct, warm
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.terminal import complain, say
+from denseface.service.runtime.terminal.progress import Progress
 from denseface.service.tools._live_report import json_summary, status, text_summary
 from denseface.service.tools._live_statistics import Clock, LiveFrame, LiveStatistics
-from denseface.service.tools._status_line import StatusLine
 
 __all__ = ["reconstruct_frames", "run"]
 
@@ -39,7 +39,7 @@ def run(
         warm_ms = (time.perf_counter() - begun) * 1e3
         statistics = LiveStatistics()
         try:
-            with StatusLine() as line:
+            with Progress(f"reconstructing {uri}, Ctrl-C ends it") as line:
                 for done in reconstruct_frames(source, settings):
                     statistics.add(done)
                     line.show(partial(status, done, statistics))

@@ -19,8 +19,8 @@ from denseface.service.errors import UsageError
 from denseface.service.log.output import exit_now
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.terminal import complain, say
+from denseface.service.runtime.terminal.progress import Progress
 from denseface.service.tools._recording import FrameReader
-from denseface.service.tools._status_line import StatusLine
 
 __all__ = ["run"]
 
@@ -120,7 +120,7 @@ class _Limits:
 
 def _record(reader: FrameReader, writer: _Writer, stop: StopSignal, limits: _Limits) -> _End:
     notes: set[str] = set()
-    with StatusLine() as line:
+    with Progress(f"recording {writer.path}, Ctrl-C ends it") as line:
         while not stop:
             try:
                 frame = reader.next()

@@ -12,7 +12,7 @@ from denseface.service.runtime.terminal import printable, say
 from tests.waiting import LIMIT_S
 
 SERVICE = Path(runtime.__file__).parents[1]
-MAY_PRINT = {"runtime/terminal.py", "tools/_status_line.py", "tools/doctor/questions.py"}
+MAY_PRINT = {"runtime/terminal/_lines.py", "tools/doctor/questions.py"}
 """What escapes by itself; questions are answered in JSON, which is ASCII."""
 
 

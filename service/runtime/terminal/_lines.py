@@ -1,4 +1,4 @@
-"""Lines for a terminal or a file: what came from outside is escaped, what cannot be said is lost.
+"""Whole lines, on stdout or stderr.
 
 Whoever reads a line believes its colours and its line breaks, and a terminal obeys its escape
 sequences: names, reasons and file names may hold any of them.
@@ -7,14 +7,24 @@ sequences: names, reasons and file names may hold any of them.
 import os
 import select
 import sys
-from contextlib import suppress
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext, suppress
 from types import TracebackType
 from typing import TextIO
 
 __all__ = [
     "complain", "complain_of", "discard_unless_flushed", "fill_standard_descriptors", "printable",
-    "reader_left", "say",
+    "reader_left", "say", "step_aside_by",
 ]
+
+_aside: Callable[[], AbstractContextManager[object]] = nullcontext
+"""Clears the line that moves on the terminal, if any, while another is printed."""
+
+
+def step_aside_by(aside: Callable[[], AbstractContextManager[object]]) -> None:
+    """Print lines inside the `with` block that this gives, from now on."""
+    global _aside
+    _aside = aside
 
 
 def printable(text: str) -> str:
@@ -26,15 +36,16 @@ def printable(text: str) -> str:
 
 def say(*lines: str, flush: bool = False) -> None:
     """Print lines on stdout, escaped; raises as `print` does."""
-    for line in lines:
-        print(printable(line), flush=flush)
+    with _aside():
+        for line in lines:
+            print(printable(line), flush=flush)
 
 
 def complain(line: str) -> None:
     """Print one line on stderr, escaped; it is lost where that cannot be written."""
     if sys.stderr is None:  # `print` would take stdout
         return
-    with suppress(OSError, ValueError):
+    with _aside(), suppress(OSError, ValueError):
         print(printable(line), file=sys.stderr)
     discard_unless_flushed(sys.stderr)
 

@@ -1,0 +1,16 @@
+"""Lines for people: what came from outside is escaped, what cannot be said is lost."""
+
+from denseface.service.runtime.terminal._lines import (
+    complain,
+    complain_of,
+    discard_unless_flushed,
+    fill_standard_descriptors,
+    printable,
+    reader_left,
+    say,
+)
+
+__all__ = [
+    "complain", "complain_of", "discard_unless_flushed", "fill_standard_descriptors", "printable",
+    "reader_left", "say",
+]
