@@ -14,6 +14,7 @@ from typing import Self, TypeVar
 
 import zmq
 
+from denseface.capture import RgbdFrame
 from denseface.recon.face import Consent, Face
 from denseface.service.client._base import BaseClient
 from denseface.service.client.events import (
@@ -100,6 +101,10 @@ class AsyncClient(BaseClient):
     async def get(self, capture_id: str, *, timeout: float = 60.0) -> Face:
         """Wait for a capture's face; see `Client.get`."""
         return await self._run(self._exchanges.get(capture_id, timeout))
+
+    async def get_frame(self, capture_id: str, *, timeout: float = 15.0) -> RgbdFrame:
+        """Fetch the frame of a capture, whatever became of it; see `Client.get_frame`."""
+        return await self._run(self._exchanges.get_frame(capture_id, timeout))
 
     async def status(self, *, timeout: float = 5.0) -> Status:
         """Ask who is there and what was done; see `Client.status`."""

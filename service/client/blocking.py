@@ -11,6 +11,7 @@ from contextlib import closing
 from datetime import datetime
 from typing import TypeVar
 
+from denseface.capture import RgbdFrame
 from denseface.recon.face import Consent, Face
 from denseface.service.client._base import BaseClient
 from denseface.service.client.events import (
@@ -123,8 +124,24 @@ class Client(Closing, BaseClient):
             The capture ended without a face.
         UnknownCaptureError
             The hub has no such capture.
+        LocalProtocolError
+            The id is malformed.
         """
         return self._run(self._exchanges.get(capture_id, timeout))
+
+    def get_frame(self, capture_id: str, *, timeout: float = 15.0) -> RgbdFrame:
+        """Fetch the frame of a capture, whatever became of it: also where there is no face.
+
+        For the key that pressed it, an operator, and on the hub's own machine.
+
+        Raises
+        ------
+        UnknownCaptureError
+            The hub has no such capture.
+        RequestFailedError
+            The frame is damaged, or this key may not have it.
+        """
+        return self._run(self._exchanges.get_frame(capture_id, timeout))
 
     def faces(
         self, *, after: int | None = None, last: int | None = None, since: datetime | None = None,

@@ -16,6 +16,7 @@ from typing import TypeVar
 
 from pydantic import ValidationError
 
+from denseface.capture import RgbdFrame
 from denseface.recon.face import Consent, Face
 from denseface.service import errors
 from denseface.service.client.events import PublishedFailure, outcome_of
@@ -28,6 +29,7 @@ from denseface.service.runtime.bounded_dict import BoundedDict
 _T = TypeVar("_T")
 
 _BAD_ID = "capture id {!r}: expected letters, digits, - and _, at most 64"
+_UNKNOWN = ("capture {}: the hub has no such capture: it was never accepted, or is no longer kept")
 _MAX_WITHDRAWN = 1000
 """Ids that this client withdrew and does not press again."""
 _LONGEST_WAIT_S = 20.0
@@ -133,13 +135,16 @@ class Exchanges:
         until = time.monotonic() + timeout
         while True:
             left = until - time.monotonic()
-            answer = yield from send_request(messages.GetFace(
-                request=self.next_number(), capture_id=capture_id,
-                wait_s=min(max(left, 0.0), _LONGEST_WAIT_S)), left + self._resend_s)
+            try:
+                message = messages.GetFace(
+                    request=self.next_number(), capture_id=capture_id,
+                    wait_s=min(max(left, 0.0), _LONGEST_WAIT_S))
+            except ValidationError as error:
+                raise errors.LocalProtocolError(_BAD_ID.format(capture_id)) from error
+            answer = yield from send_request(message, left + self._resend_s)
             match answer.message:
                 case messages.CaptureUnknown():
-                    raise errors.UnknownCaptureError(
-                        f"capture {capture_id}: the hub has no such capture")
+                    raise errors.UnknownCaptureError(_UNKNOWN.format(capture_id))
                 case messages.CapturePending():
                     if time.monotonic() >= until:
                         raise errors.ClientTimeoutError(
@@ -149,6 +154,17 @@ class Exchanges:
                     if isinstance(outcome, PublishedFailure):
                         raise outcome.error
                     return outcome.face
+
+    def get_frame(self, capture_id: str, timeout: float) -> Exchange[RgbdFrame]:
+        """See `Client.get_frame`."""
+        try:
+            message = messages.GetFrame(request=self.next_number(), capture_id=capture_id)
+        except ValidationError as error:
+            raise errors.LocalProtocolError(_BAD_ID.format(capture_id)) from error
+        answer = yield from send_request(message, timeout)
+        if isinstance(answer.message, messages.CaptureUnknown):
+            raise errors.UnknownCaptureError(_UNKNOWN.format(capture_id))
+        return expect(answer.message, messages.FrameKept).frame.join(answer.arrays)
 
     def status(self, timeout: float) -> Exchange[messages.Status]:
         """See `Client.status`."""

@@ -17,6 +17,8 @@ COMMANDS = {
     "record": "record a sensor, or any source, to a file or folder",
     "up": "run the whole service on this machine",
     "press": "take a frame now and wait for its face",
+    "get": "fetch a capture that the hub keeps: its face, its frame",
+    "list": "list the captures that the hub keeps",
     "subscribe": "follow the faces as they are published",
     "dead": "list, retry or drop captures that were given up",
     "purge": "remove captures: frame, face, report and row",
@@ -29,7 +31,8 @@ COMMANDS = {
 }
 """What each does, by the name of its module, in the order of `denseface --help`."""
 
-_SUBROOMS = dict.fromkeys(("calibrate", "doctor", "record"), "sensor")
+_SUBROOMS = (dict.fromkeys(("calibrate", "doctor", "record"), "sensor")
+             | dict.fromkeys(("get", "list"), "captures"))
 """Where a command's module is, if not here."""
 
 

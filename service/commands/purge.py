@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from denseface.service.errors import UsageError
+    from denseface.service.errors import UnknownCaptureError, UsageError
 
     chosen = (f"capture {args.capture_id}" if args.capture_id is not None
               else f"all captures accepted before {args.before:%Y-%m-%d %H:%M:%S} UTC"
@@ -36,5 +36,8 @@ def run(args: argparse.Namespace) -> int:
     with _options.operator(args) as operator:
         removed = operator.purge(
             capture_id=args.capture_id, before=args.before, everything=args.all)
+    if not removed and args.capture_id is not None:
+        raise UnknownCaptureError(
+            f"capture {args.capture_id}: nothing removed, the hub keeps no such capture")
     say(f"{removed} {'capture' if removed == 1 else 'captures'} removed")
     return 0

@@ -26,7 +26,7 @@ from denseface.service.protocol.wire import Buffer, Packet, decode_to_hub, encod
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.supervisor_link import SupervisorLink
-from denseface.service.security.permissions import missing_role
+from denseface.service.security.permissions import OF_ITS_OWN, missing_role
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage import OpeningStore, WriterThreads
 from denseface.service.transport.listener import Incoming
@@ -152,7 +152,7 @@ class _EventLoop:
             self.rejections.note(error.reason, **who, detail=str(error))
             return
         message, sender = packet.message, incoming.sender
-        own = (incoming.key != "" and isinstance(message, messages.GetFace)
+        own = (incoming.key != "" and isinstance(message, OF_ITS_OWN)
                and self.hub.pressed_by(message.capture_id) == incoming.key)
         missing = missing_role(sender.roles, message, own=own)
         if missing:

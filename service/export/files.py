@@ -38,7 +38,9 @@ def check_outputs(*outputs: tuple[Path | None, str | None]) -> None:
 
 @dataclass(frozen=True)
 class FaceFiles:
-    """Where to write a face; None is not written. Checked here, before the face is made.
+    """Where to write a face; None is not written, and it is false where nothing is.
+
+    Checked here, before the face is made.
 
     Raises
     ------
@@ -61,6 +63,9 @@ class FaceFiles:
         if self.output:
             check_ending(self.output)
         check_outputs((self.output, None), (self.report, ".json"), (self.rendering, ".png"))
+
+    def __bool__(self) -> bool:
+        return bool(self.output or self.report or self.rendering)
 
     def write(self, face: "Face") -> None:
         """Write all; each file is whole or not there.

@@ -241,6 +241,8 @@ class Hub:
                 yield from self._presses.press(now, peer, message, self._jobs.queued, key)
             case messages.GetFace() as message:
                 yield from self._outcomes.get_face(now, peer, message, key)
+            case messages.GetFrame() as message:
+                yield from self._outcomes.get_frame(peer, message)
             case messages.GetNext() as message:
                 yield from self._outcomes.get_next(peer, message)
             case messages.FindStart() as message:

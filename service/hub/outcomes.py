@@ -87,6 +87,16 @@ class Outcomes:
         else:
             yield send(peer, messages.CapturePending(request=request, capture_id=capture_id))
 
+    def get_frame(self, peer: bytes, message: messages.GetFrame) -> Iterator[Output]:
+        """Send the frame of a capture; StoreError where it is damaged."""
+        capture_id, request = message.capture_id, message.request
+        if self._store.find(capture_id) is None:
+            yield send(peer, messages.CaptureUnknown(request=request, capture_id=capture_id))
+            return
+        record = self._store.kept_frame(capture_id)
+        yield Send(peer, Packet(messages.FrameKept(
+            request=request, capture_id=capture_id, frame=record.message.frame), record.arrays))
+
     def get_next(self, peer: bytes, message: messages.GetNext) -> Iterator[Output]:
         """Send the first undamaged outcome after a sequence number."""
         if packet := self._next(message.after):

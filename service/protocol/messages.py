@@ -11,6 +11,8 @@ from pydantic import FailFast, Field, model_validator
 
 from denseface.recon.face import Consent as Consent
 from denseface.recon.settings import Settings
+from denseface.service.protocol.frame_messages import FrameKept as FrameKept
+from denseface.service.protocol.frame_messages import GetFrame as GetFrame
 from denseface.service.protocol.hint import Hint as Hint
 from denseface.service.protocol.message_base import (
     BaseAnswer,
@@ -394,6 +396,7 @@ TO_HUB: dict[type[ToHub], frozenset[Role]] = {
     Press: frozenset({Role.PRESSER}),
     Withdraw: frozenset({Role.PRESSER, Role.OPERATOR}),
     GetFace: frozenset({Role.SUBSCRIBER}),  # also a presser, for what it pressed itself
+    GetFrame: frozenset({Role.OPERATOR}),  # so here
     GetNext: frozenset({Role.SUBSCRIBER}),
     FindStart: frozenset({Role.SUBSCRIBER}),
     GetStatus: frozenset(Role),
@@ -421,5 +424,5 @@ FROM_HUB: tuple[type[FromHub], ...] = (
     PressAccepted, PressRefused, CapturePending, CaptureUnknown, RequestFailed, NothingNewer,
     StartAt, DeadLetters, CaptureList, SensorRestarting, Removed, FaceDone, CaptureFailed, Status,
     Preview, Hints, Announce, Denied, Take, TakePreview, TakeHints, FrameAccepted, FrameRefused,
-    Restart, Job)
+    Restart, Job, FrameKept)
 """Every message that the hub sends."""

@@ -22,6 +22,10 @@ class FrameCache:
                 self._free_bytes -= size
                 self._frames[record.message.capture_id] = record
 
+    def get(self, capture_id: str) -> FrameRecord | None:
+        """Give a frame, which stays here; None where it is not here."""
+        return self._frames.get(capture_id)
+
     def pop(self, capture_id: str) -> FrameRecord | None:
         """Remove and give a frame; None where it is not here."""
         record = self._frames.pop(capture_id, None)

@@ -159,12 +159,18 @@ class FolderStore(CaptureRows, Closing):
             self.retention.discard(one)
 
     def frame(self, capture_id: str) -> FrameRecord:
-        """Give a frame; CorruptFileError where it is damaged, which quarantines it."""
+        """Give a frame to work on; CorruptFileError where it is damaged, which quarantines it."""
+        # Most go to a worker soon after they are accepted; a second time the file is read.
+        return self._frame(capture_id, self._frame_cache.pop(capture_id))
+
+    def kept_frame(self, capture_id: str) -> FrameRecord:
+        """Give a frame to whoever asks for it; otherwise as `frame`."""
+        return self._frame(capture_id, self._frame_cache.get(capture_id))
+
+    def _frame(self, capture_id: str, cached: FrameRecord | None) -> FrameRecord:
         row = self.find(capture_id)
         if row is None:
             raise StoreError(f"capture {capture_id} is not in the store")
-        # Most go to a worker soon after they are accepted; a second time the file is read.
-        cached = self._frame_cache.pop(capture_id)
         if cached and cached.checksum == row.frame_sha256:
             return cached
         path = self._layout.accepted_frame(capture_id)

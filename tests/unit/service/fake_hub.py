@@ -12,11 +12,11 @@ import zmq
 from denseface.service.protocol import messages
 from denseface.service.protocol.hint import Hint
 from denseface.service.protocol.message_base import BaseMessage, CaptureSummary, DeadLetter
-from denseface.service.protocol.payload import FaceHeader, PreviewHeader
+from denseface.service.protocol.payload import FaceHeader, FrameHeader, PreviewHeader
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet, decode_to_hub, encode
 from denseface.service.transport.addresses import publications_of
-from tests.unit.service.faces import small_face
+from tests.unit.service.faces import small_face, small_frame
 from tests.waiting import LIMIT_S
 
 
@@ -26,6 +26,8 @@ class FakeHub:
     def __init__(self, address: str) -> None:
         self.address = address
         self.outcomes: list[Packet] = []
+        self.frames: set[str] = set()
+        """Captures of which a frame is kept."""
         self.ignored: set[str] = set()
         self.refuse: str | None = None
         self.refuse_reason: messages.PressReason = "disk"
@@ -131,6 +133,12 @@ class FakeHub:
                 found = [one for one in self.outcomes if one.message.capture_id == capture_id]
                 yield _again(found[0], request) if found else Packet(messages.CaptureUnknown(
                     request=request, capture_id=capture_id))
+            case messages.GetFrame(capture_id=capture_id):
+                header, arrays = FrameHeader.of(small_frame())
+                yield Packet(messages.FrameKept(
+                    request=request, capture_id=capture_id, frame=header), arrays
+                    ) if capture_id in self.frames else Packet(messages.CaptureUnknown(
+                        request=request, capture_id=capture_id))
             case messages.ListCaptures(last=last):
                 yield Packet(messages.CaptureList(request=request, captures=[
                     CaptureSummary(capture_id=one, state="done", accepted_at="then", attempts=1)

@@ -24,7 +24,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.hint import Hint
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
-from tests.unit.service.faces import jpeg
+from tests.unit.service.faces import jpeg, small_frame
 from tests.unit.service.fake_hub import fake_hub
 from tests.waiting import LIMIT_S, until
 
@@ -65,6 +65,24 @@ def test_press_get_status(hub):
         awaited = run(main())
         assert client.press("a") == "a"
         np.testing.assert_array_equal(client.get("a").dense.points, awaited.dense.points)
+
+
+def test_a_frame_is_fetched(hub):
+    hub.frames = {"a"}
+
+    async def main():
+        async with AsyncClient(hub.address) as client:
+            with pytest.raises(UnknownCaptureError, match="b: the hub has no such capture"):
+                await client.get_frame("b")
+            return await client.get_frame("a")
+
+    with Client(hub.address) as client:
+        awaited, frame = run(main()), client.get_frame("a")
+        np.testing.assert_array_equal(frame.depth, awaited.depth)
+        np.testing.assert_array_equal(frame.rgb, small_frame().rgb)
+        for call in (client.get, client.get_frame):
+            with pytest.raises(LocalProtocolError, match=r"capture id '\.\./x'"):
+                call("../x")
 
 
 def test_errors_are_those_of_the_blocking_client(hub):

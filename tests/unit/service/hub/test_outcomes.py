@@ -1,7 +1,7 @@
 """Requests for a face that is there, and those that wait for one."""
 
 from denseface.service.protocol import messages
-from tests.unit.service.hub.bench import CLIENT, kinds
+from tests.unit.service.hub.bench import CLIENT, FRAME, FRAME_ARRAYS, WORKER, kinds
 
 
 def test_waiting_for_a_face_ends(bench):
@@ -57,3 +57,33 @@ def test_outcomes_can_be_asked_for_in_order(bench):
 
     assert [after(0).capture_id, after(1).capture_id] == ["a", "b"]
     assert (after(2).kind, after(2).sequence) == ("nothing_newer", 2)
+
+
+def test_a_frame_is_given_whatever_became_of_it_and_goes_to_a_worker_all_the_same(bench):
+    bench.accepted("a", "b")
+    for capture_id in ("a", "b", "a"):
+        ((peer, kept),) = bench.say(CLIENT, messages.GetFrame(request=5, capture_id=capture_id))
+        assert (peer, kept.kind, kept.request) == (CLIENT, "frame_kept", 5)
+        assert (kept.capture_id, kept.frame) == (capture_id, FRAME)
+    bench.worker()
+    assert bench.fail_job(capture_id="a", final=True) == []
+    assert kinds(bench.worker(credit=1)) == [(WORKER, "job")]
+    packet = bench.store.kept_frame("a")
+    assert {name: array.tobytes() for name, array in packet.arrays.items()} == {
+        name: array.tobytes() for name, array in FRAME_ARRAYS.items()}
+    assert kinds(bench.say(CLIENT, messages.GetFrame(request=6, capture_id="z"))) == [
+        (CLIENT, "capture_unknown")]
+    bench.say(b"operator", messages.Purge(request=1, capture_id="a"))
+    assert kinds(bench.say(CLIENT, messages.GetFrame(request=7, capture_id="a"))) == [
+        (CLIENT, "capture_unknown")]
+
+
+def test_a_damaged_frame_is_said_to_be(bench, tmp_path):
+    bench.accepted("a")
+    bench.worker()
+    bench.result()
+    (file,) = (tmp_path / "data/frames").iterdir()
+    file.write_bytes(file.read_bytes()[:-1])
+    ((_, failed),) = bench.say(CLIENT, messages.GetFrame(request=6, capture_id="a"))
+    assert (failed.kind, failed.request) == ("request_failed", 6)
+    assert "a.frame" in failed.message

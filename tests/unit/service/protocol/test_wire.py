@@ -73,6 +73,7 @@ to_hub = st.one_of(
     plain(messages.Press, request=numbers, capture_id=ids, sensor=peer_names, **GATED),
     plain(messages.Press, request=numbers, capture_id=ids, consent=consents),
     plain(messages.GetFace, request=numbers, capture_id=ids, wait_s=st.floats(0, 3600)),
+    plain(messages.GetFrame, request=numbers, capture_id=ids),
     plain(messages.GetNext, request=numbers, after=numbers),
     plain(messages.FindStart, request=numbers, last=st.integers(1, 2**31 - 1)),
     plain(messages.FindStart, request=numbers, since=times),
@@ -127,6 +128,8 @@ from_hub = st.one_of(
         attempts=numbers, accepted_at=texts, finished_at=texts), max_size=3).map(tuple)),
     plain(messages.CaptureFailed, request=numbers, epoch=hashes, sequence=numbers, capture_id=ids,
           error=texts, message=texts, dead=st.booleans()),
+    ids.map(lambda name: Packet(
+        messages.FrameKept(request=1, capture_id=name, frame=FRAME), FRAME_ARRAYS)),
     plain(messages.Status, request=numbers, epoch=hashes, sequence=numbers, hub_version=texts,
           obstacle=texts, retention_s=st.none() | st.floats(1e-3, 1e9),
           heartbeat_s=st.floats(1e-3, 3600),

@@ -27,6 +27,7 @@ SAID = [
     messages.Press(request=1, capture_id="a"),
     messages.Withdraw(request=1, capture_id="a"),
     messages.GetFace(request=1, capture_id="a"),
+    messages.GetFrame(request=1, capture_id="a"),
     messages.GetNext(request=1, after=0),
     messages.GetStatus(request=1),
     messages.FindStart(request=1, last=1),
@@ -49,7 +50,7 @@ MAY = {
     Role.PRESSER: {"get_status", "press", "withdraw"},
     Role.SUBSCRIBER: {"get_status", "get_face", "get_next", "find_start"},
     Role.OPERATOR: {"get_status", "list_dead", "retry_dead", "drop_dead", "purge",
-                    "withdraw", "list_captures", "restart_sensor"},
+                    "withdraw", "list_captures", "restart_sensor", "get_frame"},
 }
 
 
@@ -71,11 +72,13 @@ def test_no_worker_sensor_or_presser_reads_faces():
     for roles in (
             ROLES_BY_TOPIC[Topic.FACES], ROLES_BY_KIND["get_next"], ROLES_BY_KIND["get_face"]):
         assert not roles & {Role.WORKER, Role.SENSOR, Role.PRESSER}
+    assert ROLES_BY_KIND["get_frame"] == {Role.OPERATOR}
 
 
 def test_several_roles_add_up():
     both = frozenset({Role.PRESSER, Role.SUBSCRIBER})
-    assert [missing_role(both, one) for one in SAID[:4]] == [None] * 4
+    allowed = {one.kind for one in SAID if missing_role(both, one) is None}
+    assert allowed == MAY[Role.PRESSER] | MAY[Role.SUBSCRIBER]
 
 
 def test_what_the_hub_says_is_for_nobody_to_say():
@@ -85,13 +88,14 @@ def test_what_the_hub_says_is_for_nobody_to_say():
     assert missing_role(ALL_ROLES, job)
 
 
+@pytest.mark.parametrize("kind", [messages.GetFace, messages.GetFrame])
 @pytest.mark.parametrize(("role", "own", "may"), [
     (Role.PRESSER, True, True), (Role.PRESSER, False, False), (Role.WORKER, True, False)])
-def test_a_presser_gets_what_it_pressed(role, own, may):
-    asked = messages.GetFace(request=1, capture_id="a")
-    lacks = missing_role(frozenset({role}), asked, own=own)
+def test_a_presser_gets_what_it_pressed(role, own, may, kind):
+    lacks = missing_role(frozenset({role}), kind(request=1, capture_id="a"), own=own)
     assert (lacks is None) is may
-    assert may or lacks == "get_face needs the role subscriber"
+    assert may or lacks in ("get_face needs the role subscriber",
+                            "get_frame needs the role operator")
 
 
 def test_refusals_are_all_counted_and_not_all_logged(capfd, monkeypatch):

@@ -1,0 +1,1 @@
+"""Commands about captures that the hub keeps: fetch one, list them."""

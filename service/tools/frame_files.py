@@ -1,0 +1,62 @@
+"""All that may be written of one frame: the frame itself, and a photo."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+
+from denseface.capture import RgbdFrame
+from denseface.capture.npz import save_frame
+from denseface.service.errors import StoreError, UsageError, reason_of
+from denseface.service.export import check_outputs
+from denseface.service.runtime.files import write_atomically
+
+__all__ = ["FrameFiles"]
+
+
+@dataclass(frozen=True)
+class FrameFiles:
+    """Where to write a frame; None is not written, and it is false where neither is.
+
+    Raises
+    ------
+    UsageError
+        Where an ending is wrong or a folder does not exist.
+    """
+
+    frame: Path | None = None
+    """`.npz`"""
+    photo: Path | None = None
+    """`.png`, of the colour image"""
+    mode: int | None = None
+    """Of each file; None for 666 less the umask."""
+
+    def __post_init__(self) -> None:
+        check_outputs((self.frame, ".npz"), (self.photo, ".png"))
+
+    def __bool__(self) -> bool:
+        return bool(self.frame or self.photo)
+
+    def write(self, frame: RgbdFrame) -> None:
+        """Write all; each file is whole or not there.
+
+        Raises
+        ------
+        StoreError
+            Where a file cannot be written.
+        UsageError
+            Where a photo is asked for and the sensor has no colour camera.
+        """
+        if self.frame:
+            try:
+                save_frame(frame, self.frame, mode=self.mode)
+            except OSError as error:
+                raise StoreError(f"{self.frame}: {reason_of(error)}") from error
+        if self.photo:
+            if frame.color is None:
+                raise UsageError(f"--photo {self.photo}: the sensor has no colour camera")
+            _, png = cv2.imencode(".png", cv2.cvtColor(frame.color, cv2.COLOR_RGB2BGR))
+            try:
+                write_atomically(self.photo, [png.tobytes()], sync_name=False, mode=self.mode)
+            except OSError as error:
+                raise StoreError(f"{self.photo}: {reason_of(error)}") from error
