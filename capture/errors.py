@@ -5,7 +5,7 @@ Each error is also the builtin kind that a caller would expect to catch.
 
 from denseface.errors import DensefaceError
 
-__all__ = ["CalibrationError", "CaptureError", "FrameError", "MismatchedFrameError",
+__all__ = ["CalibrationError", "CaptureError", "DriverError", "FrameError", "MismatchedFrameError",
            "SensorError", "SensorTimeoutError", "UnreadableSourceError", "WrongSizeError"]
 
 
@@ -31,6 +31,10 @@ class UnreadableSourceError(CaptureError, OSError):
 
 class SensorError(CaptureError, RuntimeError):
     """The driver or the device refused: no device, no stream, or it went away."""
+
+
+class DriverError(SensorError):
+    """A sensor's library or its binding is missing or unusable: another try would end the same."""
 
 
 class SensorTimeoutError(SensorError, TimeoutError):

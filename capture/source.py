@@ -23,13 +23,13 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, runtime_checkable
 
 from denseface.capture.calibration import Calibration
 from denseface.capture.calibration_files import choose_calibration
-from denseface.capture.errors import MismatchedFrameError, UnreadableSourceError
+from denseface.capture.errors import DriverError, MismatchedFrameError, UnreadableSourceError
 from denseface.capture.frame import RgbdFrame
 
 if TYPE_CHECKING:
     from denseface.capture.preparation import FramePreparation
 
-__all__ = ["ReplayOptions", "Source", "is_folder_of_pairs", "open_source"]
+__all__ = ["ReplayOptions", "Source", "class_named", "is_folder_of_pairs", "open_source"]
 
 _SOURCES = {
     ".npz": "npz:NpzSource",
@@ -186,8 +186,10 @@ def open_source(
         A calibration cannot be read.
     FrameError
         A frame file's arrays are not as they should be.
+    DriverError
+        The OpenNI2 library or its binding is missing or cannot be used.
     SensorError
-        The OpenNI2 library, the device or one of its streams is missing.
+        The device or one of its streams is missing.
     """
     text, options = ReplayOptions.split(str(uri))
     scheme, colon, address = text.partition(":")
@@ -203,12 +205,12 @@ def open_source(
             found = ("is a folder, not a file" if path.is_dir() else
                      "is not a regular file" if path.exists() else "no such file")
             raise UnreadableSourceError(f"{text}: {found}")
-    source: Source = _class(_SOURCES[kind])(
+    source: Source = class_named(_SOURCES[kind])(
         path or address or None, choose_calibration(path, calibration))
     source.rotation, source.raw = rotation, raw
     if options is None:
         return source
-    replay: Source = _class("replay:Replay")(source, options)
+    replay: Source = class_named("replay:Replay")(source, options)
     return replay
 
 
@@ -217,9 +219,19 @@ def is_folder_of_pairs(path: Path) -> bool:
     return path.is_dir() and not any(path.glob("*.npz"))
 
 
-def _class(name: str) -> Any:
+def class_named(name: str) -> Any:
+    """Import a class of `capture` by its ``module:name``.
+
+    Raises
+    ------
+    DriverError
+        What the module needs is not there, or not for this Python.
+    """
     module, name = name.split(":")
-    return getattr(import_module(f"denseface.capture.{module}"), name)
+    try:
+        return getattr(import_module(f"denseface.capture.{module}"), name)
+    except ImportError as error:
+        raise DriverError(str(error)) from error
 
 
 def _accepted() -> str:

@@ -1,17 +1,19 @@
 """The command `denseface`: an error is one line on stderr and an exit status.
 
-0 done; 1 the job failed; 2 wrong usage or unreadable input; 130 after Ctrl-C; 141 where the reader
-of stdout left. The status is the same where stderr cannot be written.
+0 done; 1 the job failed; 2 wrong usage, unreadable input or no driver to read it with; 130 after
+Ctrl-C; 141 where the reader of stdout left. The status is the same where stderr cannot be written.
 """
 
 import argparse
+import os
 import signal
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
 from denseface.service.commands import COMMANDS, load
-from denseface.service.runtime.process import forbid_core_dumps
+from denseface.service.runtime.process import forbid_core_dumps, untried_python
+from denseface.service.runtime.signals import PARENT_VARIABLE
 from denseface.service.runtime.terminal import (
     complain,
     complain_of,
@@ -38,6 +40,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     fill_standard_descriptors()
     forbid_core_dumps()
     args = _parser().parse_args(arguments)
+    # Once: not by each process that `denseface up` starts.
+    if (doubt := untried_python()) and PARENT_VARIABLE not in os.environ:
+        complain(f"denseface: {doubt}")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))
     try:
         status: int = load(args.command).run(args)
@@ -94,10 +99,15 @@ class _Version(argparse.Action):
 
 
 def _exit_status(error: Exception) -> int:
-    from denseface.capture.errors import CalibrationError, FrameError, UnreadableSourceError
+    from denseface.capture.errors import (
+        CalibrationError,
+        DriverError,
+        FrameError,
+        UnreadableSourceError,
+    )
     from denseface.service import errors
 
-    wrong_input = (CalibrationError, FrameError, UnreadableSourceError, errors.FormatError,
-                   errors.FrameTooLargeError, errors.LocalProtocolError, errors.SettingsError,
-                   errors.UsageError)
+    wrong_input = (CalibrationError, DriverError, FrameError, UnreadableSourceError,
+                   errors.FormatError, errors.FrameTooLargeError, errors.LocalProtocolError,
+                   errors.SettingsError, errors.UsageError)
     return _USAGE if isinstance(error, wrong_input) else _FAILED

@@ -7,7 +7,6 @@ driver.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Protocol
 
@@ -15,7 +14,7 @@ from denseface.capture.calibration_files import choose_calibration
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.live.clock import TRANSPORT_S
 from denseface.capture.live.states import LiveFigures, LiveState
-from denseface.capture.source import ReplayOptions
+from denseface.capture.source import ReplayOptions, class_named
 
 __all__ = ["LiveSensor", "Shot", "open_sensor"]
 
@@ -121,21 +120,21 @@ def open_sensor(
     ------
     CalibrationError
         The calibration cannot be read.
+    DriverError
+        What the sensor needs is not installed.
     CaptureError
         The recording cannot be read.
     """
     _, options = ReplayOptions.split(uri)
     if options is not None and options.real_time:
-        replay: LiveSensor = import_module("denseface.capture.replay").ReplaySensor(
+        replay: LiveSensor = class_named("replay:ReplaySensor")(
             uri, calibration, rotation, raw=raw)
         return replay
     scheme, colon, address = uri.partition(":")
     name = _SENSORS.get(scheme.lower() + colon)
     if name is None:
         return None
-    module, kind = name.split(":")
-    maker = getattr(import_module(f"denseface.capture.{module}"), kind)
-    sensor: LiveSensor = maker(
+    sensor: LiveSensor = class_named(name)(
         address or None, choose_calibration(None, calibration), rotation, raw=raw,
         transport_s=transport_s)
     return sensor

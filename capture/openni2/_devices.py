@@ -6,9 +6,6 @@ from collections.abc import Sequence
 from contextlib import closing, suppress
 from typing import Any
 
-from primesense import openni2
-from primesense.utils import OpenNIError
-
 from denseface.capture.errors import SensorError
 from denseface.capture.identity import (
     Identity,
@@ -17,6 +14,7 @@ from denseface.capture.identity import (
     known_as,
     usb_devices,
 )
+from denseface.capture.openni2._binding import OpenNIError, openni2
 from denseface.capture.openni2._library import binding_errors, load, open_device
 
 __all__ = ["available", "choose", "find", "identity_of", "why_absent"]

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from primesense.utils import OpenNIError
+
+from denseface.capture.openni2._binding import OpenNIError
 
 _AUTO_WHITE_BALANCE, _AUTO_EXPOSURE = 100, 101
 """OpenNI2's numbers of stream properties."""

@@ -11,11 +11,8 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakSet
 
-from primesense import _openni2 as c_api
-from primesense import openni2
-from primesense.utils import OpenNIError
-
-from denseface.capture.errors import CaptureError, SensorError
+from denseface.capture.errors import CaptureError, DriverError, SensorError
+from denseface.capture.openni2._binding import OpenNIError, c_api, openni2
 
 open_sources: WeakSet[Any] = WeakSet()
 """Sources that may be open: closed before the library is unloaded, where their owner forgets to."""
@@ -46,7 +43,7 @@ def find_library() -> Path:
 
     Raises
     ------
-    SensorError
+    DriverError
         It is not there; the message names the Debian package.
     """
     for variable in _VARIABLES:
@@ -54,14 +51,14 @@ def find_library() -> Path:
             folder = Path(value).absolute()
             if (folder / _NAME).is_file():
                 return folder
-            raise SensorError(f"{variable}={value}: no {_NAME} in that folder")
+            raise DriverError(f"{variable}={value}: no {_NAME} in that folder")
     multiarch = sysconfig.get_config_var("MULTIARCH")
     roots = [Path("/usr/lib"), Path("/usr/local/lib")]
     folders = [root / str(multiarch) for root in roots if multiarch] + roots
     for folder in folders:
         if (folder / _NAME).is_file():
             return folder
-    raise SensorError(
+    raise DriverError(
         f"{_NAME} not found in {', '.join(map(str, folders))}: install the Debian package "
         f"libopenni2-dev (apt install libopenni2-dev), or name the folder in OPENNI2_REDIST")
 
@@ -79,8 +76,10 @@ def load() -> None:
 
     Raises
     ------
+    DriverError
+        The library is missing or refuses.
     SensorError
-        The library is missing or refuses, or the process was forked after it was loaded.
+        The process was forked after it was loaded.
     """
     global _loaded_pid, _listener
     with _lock:
@@ -99,7 +98,7 @@ def load() -> None:
             _silence_logging()
             _listener = _Listener()
         except (OSError, AttributeError, ValueError, OpenNIError) as error:
-            raise SensorError(f"{folder / _NAME}: OpenNI2 cannot be loaded: "
+            raise DriverError(f"{folder / _NAME}: OpenNI2 cannot be loaded: "
                               f"{error_text(error)}") from error
         # Before the binding's own clean-up, which destroys streams in any order.
         atexit.register(_Leaving().leave)

@@ -7,9 +7,9 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from primesense import openni2
 
 from denseface.capture.errors import WrongSizeError
+from denseface.capture.openni2._binding import openni2
 
 __all__ = ["FORMATS", "Layout", "copy_raw", "format_name", "format_number", "image_of",
            "layout_of", "raw_bytes"]

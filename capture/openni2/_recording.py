@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from numpy.typing import NDArray
-from primesense import openni2
 
 from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.errors import SensorError, UnreadableSourceError
@@ -16,6 +15,7 @@ from denseface.capture.oni.mend import mended, what_is_missing
 from denseface.capture.oni.recorded import Recorded
 from denseface.capture.oni.records import DEPTH_NODE, IMAGE_NODE
 from denseface.capture.openni2._base import OpenNI2Source
+from denseface.capture.openni2._binding import openni2
 from denseface.capture.openni2._library import binding_errors, load, open_sources
 from denseface.capture.openni2._path import ascii_name
 from denseface.capture.openni2._streams import COLOR, DEPTH, Streams

@@ -13,7 +13,7 @@ from denseface.capture.live.sensor import LiveSensor, Shot
 from denseface.capture.live.states import HANG_S, LiveEvent, LiveFigures, LiveState, LiveStates
 from denseface.capture.live.usb import UsbWatch
 from denseface.capture.openni2._devices import find, why_absent
-from denseface.capture.openni2._library import watched_sensors
+from denseface.capture.openni2._library import find_library, watched_sensors
 from denseface.capture.openni2._live import LiveSource
 
 _SLICE_S = 0.1
@@ -37,12 +37,18 @@ class WatchedSensor(LiveSensor):
     rotation : degrees by which frames are turned, clockwise
     raw : give frames as they are, see `open_source`
     transport_s : longest time from a frame's exposure to its arrival
+
+    Raises
+    ------
+    DriverError
+        The library is not there.
     """
 
     def __init__(
         self, wanted: str | None = None, chosen: ChosenCalibration | None = None,
         rotation: int = 0, *, raw: bool = False, transport_s: float = TRANSPORT_S,
     ) -> None:
+        find_library()
         self.uri = f"openni2:{wanted or ''}"
         self.on_change: Callable[[], object] = lambda: None
         self._wanted, self._chosen = wanted, chosen

@@ -13,13 +13,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from primesense import openni2
-from primesense.utils import OpenNIError
 
 from denseface.capture.calibration import MAX_SIDE
 from denseface.capture.errors import SensorError, WrongSizeError
 from denseface.capture.modes import COLOR_FORMATS, DEPTH_FORMATS, Mode, listed, rank
 from denseface.capture.openni2 import _orbbec
+from denseface.capture.openni2._binding import OpenNIError, openni2
 from denseface.capture.openni2._calibration import SensorProperties
 from denseface.capture.openni2._exposure import Exposure
 from denseface.capture.openni2._library import binding_errors, close_handle

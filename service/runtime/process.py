@@ -1,11 +1,16 @@
-"""What a process asks of the kernel about itself: its name, and no core dumps."""
+"""A process's name, that it leaves no core dumps, and the Python that it runs on."""
 
 import ctypes
 import os
 import resource
+import sys
 from collections.abc import Mapping
 
-__all__ = ["CORE_DUMPS_VARIABLE", "forbid_core_dumps", "name_process"]
+__all__ = ["CORE_DUMPS_VARIABLE", "TRIED_PYTHONS", "forbid_core_dumps", "name_process",
+           "untried_python"]
+
+TRIED_PYTHONS = (3, 11), (3, 14)
+"""The first and the last minor version that the tests were run on."""
 
 CORE_DUMPS_VARIABLE = "DENSEFACE_CORE_DUMPS"
 """Environment variable that leaves core dumps as the system has them, where it is 1."""
@@ -32,6 +37,15 @@ def forbid_core_dumps(environment: Mapping[str, str] = os.environ) -> None:
 def name_process(name: bytes) -> None:
     """Set what `ps` and `top` show, at most 15 bytes."""
     _prctl(_PR_SET_NAME, name)
+
+
+def untried_python(version: tuple[int, int, int] = sys.version_info[:3]) -> str:
+    """Say so where this Python is newer than any that was tried; empty where it is not."""
+    (major, first), (_, last) = TRIED_PYTHONS
+    if version[:2] <= (major, last):
+        return ""
+    return (f"Python {'.'.join(map(str, version))} is newer than any that denseface was tried "
+            f"on ({major}.{first} to {major}.{last})")
 
 
 def _prctl(option: int, value: int | bytes) -> None:

@@ -192,7 +192,7 @@ def test_another_sensor_than_those_found(clip, uri):
 def test_a_missing_library(tmp_path):
     env = environment() | {"OPENNI2_REDIST": str(tmp_path)}
     _, error = failing("openni2:", env)
-    assert error == (f"denseface.capture.errors.SensorError: OPENNI2_REDIST={tmp_path}: "
+    assert error == (f"denseface.capture.errors.DriverError: OPENNI2_REDIST={tmp_path}: "
                      "no libOpenNI2.so in that folder")
 
 

@@ -11,15 +11,18 @@ from packaging.markers import default_environment
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from denseface.service.runtime.process import TRIED_PYTHONS
+
 _REPOSITORY = Path(__file__).resolve().parents[2]
 _FOLDER = _REPOSITORY / "requirements"
 _PROJECT = tomllib.loads((_REPOSITORY / "pyproject.toml").read_text())
+(_MAJOR, _FIRST), (_, _LAST) = TRIED_PYTHONS
+_PYTHONS = [f"{_MAJOR}.{minor}" for minor in range(_FIRST, _LAST + 1)]
 _PLATFORMS = [
     {"python_version": python, "python_full_version": f"{python}.0", "sys_platform": "linux",
      "platform_system": "Linux", "os_name": "posix", "platform_machine": machine,
      "implementation_name": "cpython", "platform_python_implementation": "CPython"}
-    for python, machine in itertools.product(
-        ("3.11", "3.12", "3.13", "3.14"), ("x86_64", "aarch64"))]
+    for python, machine in itertools.product(_PYTHONS, ("x86_64", "aarch64"))]
 
 
 def _lines(name: str) -> list[str]:
@@ -53,6 +56,13 @@ def _unmet(requirements: list[str], pins: dict[str, str], platform: dict[str, st
 
     return [str(one) for one in map(Requirement, requirements)
             if _applies(one, platform) and not is_met(one)]
+
+
+def test_the_package_is_for_the_pythons_that_were_tried():
+    assert _PROJECT["project"]["requires-python"] == f">={_MAJOR}.{_FIRST},<{_MAJOR}.{_LAST + 1}"
+    start = "Programming Language :: Python :: 3."
+    assert [one.removeprefix(start[:-2]) for one in _PROJECT["project"]["classifiers"]
+            if one.startswith(start)] == _PYTHONS
 
 
 _EXTRAS = _PROJECT["project"]["optional-dependencies"]

@@ -5,6 +5,7 @@ binding; `device`, once `open` was called; and the functions below; and answers 
 """
 
 import json
+import runpy
 import subprocess
 import sys
 import tempfile
@@ -85,8 +86,9 @@ class Raw:
 def _serve() -> None:
     import os
 
-    from primesense import _openni2 as c_api
-    from primesense import openni2
+    # The binding as denseface mends it, and nothing else of denseface.
+    binding = runpy.run_path(str(_ROOT / "capture" / "openni2" / "_binding.py"))
+    c_api, openni2 = binding["c_api"], binding["openni2"]
 
     from tests.virtual_sensor.marks import read_mark
 
@@ -99,7 +101,7 @@ def _serve() -> None:
     events: list[list[Any]] = []
     """Connected, disconnected and state events, each with the URI."""
 
-    class Listener(openni2.DeviceListener):  # type: ignore[misc]
+    class Listener(openni2.DeviceListener):  # type: ignore[misc, name-defined]
         def _on_connected(self, info: Any, _: Any) -> None:
             events.append(["connected", info[0].uri.decode()])
 

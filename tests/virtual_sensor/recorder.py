@@ -5,10 +5,9 @@ import time
 from contextlib import closing, suppress
 from pathlib import Path
 
-from primesense import openni2
-
 from denseface.capture.errors import CaptureError, SensorTimeoutError
 from denseface.capture.oni.file import read_oni
+from denseface.capture.openni2._binding import openni2
 from denseface.capture.openni2._library import load
 
 __all__ = ["record"]

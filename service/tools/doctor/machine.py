@@ -1,6 +1,8 @@
-"""The doctor's look at this machine: the library, its drivers, the USB devices. Opens nothing."""
+"""The doctor's look at this machine: Python, the library, its drivers, USB. Opens nothing."""
 
 import os
+import platform
+import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -8,9 +10,10 @@ from pathlib import Path
 from denseface.capture import CaptureError
 from denseface.capture.identity import UsbDevice
 from denseface.capture.openni2 import library_folder
+from denseface.service.runtime.process import untried_python
 from denseface.service.tools.doctor.findings import Finding, ok, problem, warning
 
-__all__ = ["look_at_library", "look_at_usb"]
+__all__ = ["look_at_library", "look_at_python", "look_at_usb"]
 
 _HIGH_SPEED_MBIT = 480
 """USB 2: 640x480 depth and colour at 30 frames a second are some 250 Mbit/s."""
@@ -23,6 +26,13 @@ _DRIVERS = {0x045E: "Freenect", 0x1D27: "PS1080", 0x2BC5: "orbbec", 0x2959: "PS1
 _FREENECT = ("build libfreenect with -DBUILD_OPENNI2_DRIVER=ON and copy libFreenectDriver.so to "
              "{folder}/libFreenectDriver.so.0 (docs/operating.md, Kinect v1)")
 _ORBBEC = "copy liborbbec.so of Orbbec's OpenNI2 SDK to {folder}"
+
+
+def look_at_python() -> Finding:
+    """Name the Python, and say where it is one that was not tried."""
+    if doubt := untried_python():
+        return warning("Python", doubt, "install denseface with one of those")
+    return ok("Python", f"{platform.python_version()}, {sys.executable}")
 
 
 def look_at_library(devices: Sequence[UsbDevice]) -> Iterator[Finding]:

@@ -19,7 +19,7 @@ from denseface.service.tools.doctor.findings import (
     warning,
     worst,
 )
-from denseface.service.tools.doctor.machine import look_at_library, look_at_usb
+from denseface.service.tools.doctor.machine import look_at_library, look_at_python, look_at_usb
 from denseface.service.tools.doctor.sensor import (
     LIMIT_S,
     ask,
@@ -63,6 +63,7 @@ def _look(
     source: str | None, connect: Callable[[], Client], usb_root: Path, root: Path, limit_s: float
 ) -> Iterator[Finding]:
     devices = usb_devices(usb_root)
+    yield look_at_python()
     yield from look_at_library(devices)
     yield from look_at_usb(devices, root)
     hub, status = _ask_hub(connect)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from denseface.capture import Source, open_source
-from denseface.capture.errors import CalibrationError, UnreadableSourceError
+from denseface.capture.errors import CalibrationError, DriverError, UnreadableSourceError
+from denseface.capture.live.sensor import open_sensor
 from denseface.capture.npz import save_frame
 from tests.unit import frames
 
@@ -67,6 +68,13 @@ def test_missing_files_and_folders(tmp_path, kind):
     (tmp_path / f"dir.{kind}").mkdir()
     with pytest.raises(UnreadableSourceError, match=rf"dir\.{kind}: is a folder"):
         open_source(tmp_path / f"dir.{kind}")
+
+
+@pytest.mark.parametrize("open_it", [open_source, open_sensor])
+def test_a_source_whose_library_is_not_installed(open_it, monkeypatch):
+    monkeypatch.setitem(sys.modules, "denseface.capture.openni2", None)
+    with pytest.raises(DriverError, match=r"denseface\.capture\.openni2"):
+        open_it("openni2:")
 
 
 def test_importing_capture_is_light():

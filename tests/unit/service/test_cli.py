@@ -127,6 +127,16 @@ def test_wrong_usage_is_one_line_and_status_2(room, capfd, arguments, message):
     assert message in text
 
 
+def test_an_untried_python_is_said_once(tmp_path, monkeypatch, capfd):
+    monkeypatch.setattr("denseface.service.cli.untried_python", lambda: "Python 3.15.0 is newer")
+    line = "denseface: Python 3.15.0 is newer"
+    assert main(["reconstruct", f"{tmp_path}/none.oni"]) == 2
+    assert capfd.readouterr().err.splitlines()[0] == line
+    monkeypatch.setenv("DENSEFACE_PARENT", "1")
+    assert main(["reconstruct", f"{tmp_path}/none.oni"]) == 2
+    assert line not in capfd.readouterr().err
+
+
 def test_a_frame_without_a_face_is_one_line_and_status_1(room, tmp_path, capfd):
     status, text = outcome(capfd, "reconstruct", room, "-o", tmp_path / "face.ply")
     assert (status, len(text.splitlines())) == (1, 1)

@@ -4,8 +4,8 @@ import ctypes
 
 import numpy as np
 import pytest
-from primesense.utils import OpenNIError
 
+from denseface.capture.openni2._binding import OpenNIError
 from denseface.capture.openni2._exposure import Exposure, Settling
 
 WHITE_BALANCE, EXPOSURE = 100, 101

@@ -1,6 +1,6 @@
 import pytest
 
-from denseface.capture.errors import SensorError
+from denseface.capture.errors import DriverError
 from denseface.capture.openni2 import _library as library
 from denseface.capture.openni2._path import ascii_name
 
@@ -14,7 +14,7 @@ def test_the_environment_names_the_folder(tmp_path, monkeypatch):
 
 def test_a_folder_without_the_library_is_named(tmp_path, monkeypatch):
     monkeypatch.setenv("OPENNI2_REDIST64", str(tmp_path))
-    with pytest.raises(SensorError, match=f"OPENNI2_REDIST64={tmp_path}: no libOpenNI2.so"):
+    with pytest.raises(DriverError, match=f"OPENNI2_REDIST64={tmp_path}: no libOpenNI2.so"):
         library.find_library()
 
 
@@ -22,7 +22,7 @@ def test_a_missing_library_names_the_debian_package(monkeypatch):
     for variable in ("OPENNI2_REDIST64", "OPENNI2_REDIST"):
         monkeypatch.delenv(variable, raising=False)
     monkeypatch.setattr(library, "_NAME", "libNotThere.so")
-    with pytest.raises(SensorError, match=r"libNotThere\.so not found in .*libopenni2-dev"):
+    with pytest.raises(DriverError, match=r"libNotThere\.so not found in .*libopenni2-dev"):
         library.find_library()
 
 

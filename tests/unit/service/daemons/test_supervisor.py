@@ -10,6 +10,7 @@ import pytest
 
 from denseface.service.daemons._watched_process import AttendedClock, ProcessSpec, WatchedProcess
 from denseface.service.daemons.supervisor import Supervisor, process_table
+from tests.system.running import RECORDINGS
 from tests.waiting import LIMIT_S, PATIENCE, until
 
 _WATCHED = "denseface.service.daemons._watched_process"
@@ -80,6 +81,17 @@ def test_an_old_restart_is_forgotten():
 
 def test_wrong_usage_of_a_child_ends_all_with_status_2():
     assert Supervisor([ProcessSpec("x", ("no-such-command",))]).run() == 2
+
+
+@pytest.mark.parametrize("source", ["openni2:", str(RECORDINGS / "frontal_700.oni")])
+def test_a_missing_library_ends_all_with_status_2_and_one_line(source, tmp_path, capfd):
+    capture = ProcessSpec(
+        "capture", ("capture", "--source", source, "--address", f"ipc://{tmp_path}/h"),
+        {"OPENNI2_REDIST64": str(tmp_path)}, vital=False)
+    assert Supervisor([capture]).run() == 2
+    said = [line for line in capfd.readouterr().err.splitlines() if "OPENNI2" in line]
+    assert said == [
+        f"denseface capture: OPENNI2_REDIST64={tmp_path}: no libOpenNI2.so in that folder"]
 
 
 def test_wrong_usage_of_a_child_that_is_not_needed_ends_nothing(tmp_path, monkeypatch):

@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from denseface.service.runtime.process import untried_python
+
 CRASH = """
 import os, resource, sys
 resource.setrlimit(resource.RLIMIT_CORE, (resource.getrlimit(resource.RLIMIT_CORE)[1],) * 2)
@@ -32,6 +34,12 @@ def crash(folder, **environment):
 def test_a_crash_leaves_no_pictures_in_a_core_file(tmp_path):
     assert not crash(tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_python_newer_than_those_that_were_tried_is_named():
+    assert [untried_python((3, minor, 0)) for minor in (11, 14)] == ["", ""]
+    assert untried_python((3, 15, 2)) == (
+        "Python 3.15.2 is newer than any that denseface was tried on (3.11 to 3.14)")
 
 
 def test_what_calls_the_command_may_allow_them_again():

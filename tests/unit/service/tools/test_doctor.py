@@ -1,6 +1,8 @@
 """What the doctor makes of a machine, and of what OpenNI2 answers; nothing is opened here."""
 
 import json
+import platform
+import sys
 
 import pytest
 
@@ -47,6 +49,14 @@ def library(tmp_path, monkeypatch):
         (folder / name).touch()
     monkeypatch.setenv("OPENNI2_REDIST64", str(folder.parents[1]))
     return folder
+
+
+def test_the_python_is_named_and_one_that_was_not_tried_is_a_warning(monkeypatch):
+    found = machine.look_at_python()
+    assert (found.level, found.text) == ("ok", f"{platform.python_version()}, {sys.executable}")
+    monkeypatch.setattr(machine, "untried_python", lambda: "Python 3.15.0 is newer")
+    assert machine.look_at_python() == warning(
+        "Python", "Python 3.15.0 is newer", "install denseface with one of those")
 
 
 def test_the_drivers_that_are_there(library):
