@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from denseface.capture.errors import (
         CalibrationError,
         CaptureError,
+        DriverError,
         FrameError,
         MismatchedFrameError,
         SensorError,
@@ -75,11 +76,11 @@ __all__ = [
     "CameraModel", "CaptureError", "CaptureFailedError", "CaptureSummary", "Client",
     "ClientClosedError", "ClientForkedError", "ClientTimeoutError", "CoarseDepthError", "Consent",
     "DeadLetter", "DenseCloud", "DensefaceError", "DepthMeaning", "DepthRounding", "DepthToColor",
-    "Face", "FaceCandidate", "FaceWithoutDepthError", "FormatError", "FrameError", "FrameOrigin",
-    "ImpossibleFrameError", "ImpossibleSettingsError", "KeyFileError", "KeyRefusedError",
-    "LocalProtocolError", "MismatchedFrameError", "Neighbors", "NoDepthError", "NoFaceError",
-    "Operator", "PointCloud", "Preset", "PressRefusedError", "ProtocolError", "Published",
-    "PublishedFace", "PublishedFailure", "PublishedHint", "PublishedPreview",
+    "DriverError", "Face", "FaceCandidate", "FaceWithoutDepthError", "FormatError", "FrameError",
+    "FrameOrigin", "ImpossibleFrameError", "ImpossibleSettingsError", "KeyFileError",
+    "KeyRefusedError", "LocalProtocolError", "MismatchedFrameError", "Neighbors", "NoDepthError",
+    "NoFaceError", "Operator", "PointCloud", "Preset", "PressRefusedError", "ProtocolError",
+    "Published", "PublishedFace", "PublishedFailure", "PublishedHint", "PublishedPreview",
     "ReconstructionError", "RemoteProtocolError", "Report", "RequestFailedError", "RgbdFrame",
     "SensorError", "SensorTimeoutError", "ServiceError", "Settings", "SettingsError", "Source",
     "Status", "TooLittleDepthError", "UnknownCaptureError", "UnreadableSourceError",
@@ -89,8 +90,8 @@ __all__ = [
 
 _NAMES = {
     "capture.calibration": "Calibration CameraModel DepthToColor",
-    "capture.errors": "CalibrationError CaptureError FrameError MismatchedFrameError SensorError "
-                      "SensorTimeoutError UnreadableSourceError WrongSizeError",
+    "capture.errors": "CalibrationError CaptureError DriverError FrameError MismatchedFrameError "
+                      "SensorError SensorTimeoutError UnreadableSourceError WrongSizeError",
     "capture.frame": "DepthMeaning DepthRounding FrameOrigin RgbdFrame",
     "capture.npz": "load_frame save_frame",
     "capture.source": "Source open_source",
