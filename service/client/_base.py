@@ -1,11 +1,12 @@
 """What both clients open; waiting is left to them."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import zmq
 
+from denseface.service.client._hub_wait import HubWait
 from denseface.service.client.exchanges import Exchanges
 from denseface.service.errors import (
     ClientClosedError,
@@ -30,7 +31,8 @@ class BaseClient:
     """The socket for requests, and how subscriptions are opened; see `Client`."""
 
     def __init__(
-        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None
+        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None,
+        connect_timeout: float | None = None, on_waiting: Callable[[str], None] | None = None,
     ) -> None:
         settings = ServiceSettings.of(os.environ, address=address, key=key, hub_key=hub_key)
         self._process = os.getpid()
@@ -40,6 +42,7 @@ class BaseClient:
         self._publications = publications_of(self.address)
         self._keys = Credentials.of(settings)
         self._exchanges = Exchanges(settings.resend_s)
+        self._hub_wait = HubWait(self.address, connect_timeout, on_waiting)
         self._context: Context = zmq.Context()
         self._socket, self._monitor = connect(self._context, zmq.DEALER, self.address, self._keys)
 
@@ -73,13 +76,21 @@ class BaseClient:
         """Send a request, and give how long to wait for its answer until the next try, seconds.
 
         KeyRefusedError where the hub refuses this key, for the subscription too: a key that was
-        revoked gets no answer.
+        revoked gets no answer. ClientTimeoutError where a first connection takes too long.
         """
         self._check_process()
         self._monitor.check()
         if subscription:
             subscription.monitor.check()
-        return self._resend_s if send_parts(self._socket, parts) else _SEND_RETRY_S
+        if send_parts(self._socket, parts):
+            return self._resend_s
+        self._hub_wait.look(self._monitor)
+        return _SEND_RETRY_S
+
+    def _check_subscription(self, subscription: Subscription) -> None:
+        """Look how a subscription's connection is while nothing comes; raises as `_send`."""
+        subscription.monitor.check()
+        self._hub_wait.look(subscription.monitor)
 
     def _checked(self, answer: Packet) -> Packet:
         """Give an answer back, unless the hub says that it cannot answer: RequestFailedError."""
@@ -87,11 +98,16 @@ class BaseClient:
             raise RequestFailedError(f"{self.address}: {answer.message.message}")
         return answer
 
-    def _nothing_published(self) -> ClientTimeoutError:
-        return ClientTimeoutError("nothing was published in the time allowed")
+    @staticmethod
+    def _nothing_published(subscription: Subscription) -> ClientTimeoutError:
+        monitor = subscription.monitor
+        why = "" if monitor.connected else f": {monitor.why_not()}"
+        return ClientTimeoutError(f"nothing was published in the time allowed{why}")
 
     def _no_answer(self, timeout: float) -> ClientTimeoutError:
-        hint = (
-            "is it running, or was this key revoked" if self._keys else "is `denseface up` running")
+        self._monitor.read()
+        why = self._monitor.why_not() if not self._monitor.connected else (
+            "it is there, and busy, or stopped"
+            + (", or this key was revoked" if self._keys else ""))
         return ClientTimeoutError(
-            f"{self.address}: no answer from the hub within {timeout:g} s, {hint}?")
+            f"{self.address}: no answer from the hub within {timeout:g} s: {why}")

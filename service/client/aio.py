@@ -48,9 +48,11 @@ class AsyncClient(BaseClient):
     """
 
     def __init__(
-        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None
+        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None,
+        connect_timeout: float | None = None, on_waiting: Callable[[str], None] | None = None,
     ) -> None:
-        super().__init__(address, key=key, hub_key=hub_key)
+        super().__init__(address, key=key, hub_key=hub_key, connect_timeout=connect_timeout,
+                         on_waiting=on_waiting)
         self._pending: dict[int, asyncio.Future[Packet]] = {}
         """Number of a request -> its answer."""
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -119,7 +121,7 @@ class AsyncClient(BaseClient):
                 self._check_open()
                 while (news := watch.look(time.monotonic())) is None:
                     if time.monotonic() >= until:
-                        raise self._nothing_published()
+                        raise self._nothing_published(subscription)
                     await self._readable(subscription.socket, LOOK_S)
                 yield news.status
 
@@ -243,9 +245,9 @@ class AsyncClient(BaseClient):
         until = time.monotonic() + timeout
         while not await self._readable(
                 subscription.socket, min(until - time.monotonic(), CHECK_INTERVAL_S)):
-            subscription.monitor.check()
+            self._check_subscription(subscription)
             if time.monotonic() >= until:
-                raise self._nothing_published()
+                raise self._nothing_published(subscription)
 
     async def _readable(self, socket: zmq.Socket[bytes], seconds: float) -> bool:
         """Wait until there is something to receive; False where there is nothing in this time."""

@@ -46,6 +46,10 @@ class Client(Closing, BaseClient):
     address : the hub's; where None, `DENSEFACE_ADDRESS` or this user's own hub
     key, hub_key : files of one's own secret key and of the hub's public one, for a hub elsewhere;
         where None, `DENSEFACE_KEY` and `DENSEFACE_HUB_KEY`
+    connect_timeout : longest wait of a call for the first connection to a hub, seconds; where None,
+        as long as the call may take. A hub that is started again is waited for in any case
+    on_waiting : is given one line, once, where there is no connection for a second: that the hub is
+        waited for, and why it is not there
 
     Every call raises `KeyRefusedError` where the hub refuses this key, and `ClientTimeoutError`
     where nothing came in `timeout` seconds. In a process that was forked after the client was made
@@ -54,8 +58,8 @@ class Client(Closing, BaseClient):
     Raises
     ------
     SettingsError
-        Where the address is malformed, the folder of the default one is someone else's, or a key
-        file cannot be used.
+        Where the address is malformed, its socket file or the folder of that is someone else's, or
+        a key file cannot be used.
     """
 
     def close(self) -> None:
@@ -233,7 +237,7 @@ class Client(Closing, BaseClient):
                 self._check_open()
                 while (news := watch.look(time.monotonic())) is None:
                     if time.monotonic() >= until:
-                        raise self._nothing_published()
+                        raise self._nothing_published(subscription)
                     subscription.socket.poll(int(LOOK_S * 1000))
                 yield news.status
 
@@ -268,9 +272,9 @@ class Client(Closing, BaseClient):
         until = time.monotonic() + timeout
         while not subscription.socket.poll(
                 max(0, math.ceil(min(until - time.monotonic(), CHECK_INTERVAL_S) * 1000))):
-            subscription.monitor.check()
+            self._check_subscription(subscription)
             if time.monotonic() >= until:
-                raise self._nothing_published()
+                raise self._nothing_published(subscription)
 
     def _send_request(
         self, message: BaseRequest, timeout: float, subscription: Subscription | None = None

@@ -1,6 +1,6 @@
 """What an operator asks of the hub: captures, dead letters, removal. Needs the role `operator`."""
 
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from datetime import datetime
 from pathlib import Path
 
@@ -14,9 +14,11 @@ class Operator(Client):
     """A `Client` that may also list, remove and restart."""
 
     def __init__(
-        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None
+        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None,
+        connect_timeout: float | None = None, on_waiting: Callable[[str], None] | None = None,
     ) -> None:
-        super().__init__(address, key=key, hub_key=hub_key)
+        super().__init__(address, key=key, hub_key=hub_key, connect_timeout=connect_timeout,
+                         on_waiting=on_waiting)
         self._asks = OperatorExchanges(self._exchanges)
 
     def captures(self, last: int = 20, *, timeout: float = 5.0) -> tuple[CaptureSummary, ...]:
@@ -83,9 +85,11 @@ class AsyncOperator(AsyncClient):
     """The calls of `Operator` for asyncio."""
 
     def __init__(
-        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None
+        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None,
+        connect_timeout: float | None = None, on_waiting: Callable[[str], None] | None = None,
     ) -> None:
-        super().__init__(address, key=key, hub_key=hub_key)
+        super().__init__(address, key=key, hub_key=hub_key, connect_timeout=connect_timeout,
+                         on_waiting=on_waiting)
         self._asks = OperatorExchanges(self._exchanges)
 
     async def captures(

@@ -11,7 +11,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--id", metavar="ID", dest="capture_id",
                         help="id of the capture; the same one again is the same capture")
     parser.add_argument("--timeout", type=_options.seconds, default=60.0, metavar="S",
-                        help="longest wait for the face, seconds (default: 60)")
+                        help="longest wait for the frame, and from then on for the face, seconds "
+                             "(default: 60); for a hub that is not there at most "
+                             f"{_options.CONNECT_S:g}")
     parser.add_argument("--sensor", metavar="NAME",
                         help="take the frame of this one; `denseface status` names them "
                              "(default: the one that is best off)")
@@ -30,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     from denseface.service.export import FaceFiles
 
     files = FaceFiles(args.output, args.report, args.rendering, args.mode)
-    with _options.client(args) as client:
+    with _options.client(args, _options.CONNECT_S) as client:
         capture_id = client.press(
             args.capture_id, timeout=args.timeout, sensor=args.sensor, gate=args.gate,
             gate_timeout=args.gate_timeout, frames=args.frames)

@@ -13,6 +13,7 @@ from urllib.parse import urlsplit
 from denseface.service.errors import AddressError, HubRunningError, reason_of
 from denseface.service.runtime.files import check_unwritable, socket_folder
 from denseface.service.settings import runtime_folder
+from denseface.service.transport.absence import check_openable
 
 _PUBLICATIONS = ".publications"
 """Ending of the socket file for publications."""
@@ -92,14 +93,17 @@ def _check_replaceable(path: Path) -> None:
 def check_connectable(address: str) -> None:
     """Refuse a malformed address, and one where anybody else might be the hub, and receive faces.
 
-    The folder of the default address is made if it is missing: in a shared temporary folder anyone
-    else could make it. SettingsError where it is not this user's, or anybody may write there.
+    So is a socket's file that this user may not open. The folder of the default address is made if
+    it is missing: in a shared temporary folder anyone else could make it. SettingsError where it is
+    not this user's, or anybody may write there.
     """
     path = socket_file(address)
     if path and path.parent == runtime_folder():
         socket_folder(path.parent)
-    elif path and path.parent.exists():
-        check_unwritable(path.parent, stat.S_IWOTH)
+    elif path:
+        check_openable(address, path)
+        if path.parent.exists():
+            check_unwritable(path.parent, stat.S_IWOTH)
 
 
 def _host_and_port(address: str) -> tuple[str, int]:

@@ -13,6 +13,8 @@ from denseface.service.errors import KeyFileError, KeyRefusedError
 from denseface.service.protocol.wire import Packet, decode_from_hub
 from denseface.service.security import KeyPair, read_pair, read_public
 from denseface.service.settings import ServiceSettings
+from denseface.service.transport.absence import why_absent
+from denseface.service.transport.addresses import socket_file
 from denseface.service.transport.sockets import Context, Socket, open_monitor, open_socket
 
 _MIN_BROKEN_OFF = 3
@@ -63,8 +65,10 @@ class ConnectionMonitor:
         self._monitor = open_monitor(socket, int(_EVENTS))
         self._broken_off = 0
         self._reconnect_at: float | None = None
+        self.connected = False
+        """The handshake was done and the connection is open, as of the last `read`."""
         self.lost = False
-        """There was a connection, and there is none now; as of the last `read`."""
+        """There was a connection, and there is none now."""
         self.refused: KeyRefusedError | None = None
         """Why the hub refuses this connection; None where it does not, or is not there."""
 
@@ -86,6 +90,10 @@ class ConnectionMonitor:
             self._reconnect()
             raise refused
 
+    def why_not(self) -> str:
+        """Say why there is no connection."""
+        return str(self.refused or why_absent(socket_file(self._address)))
+
     def close(self) -> None:
         """Stop reading; to be called before the socket is closed."""
         if not self._socket.closed:
@@ -94,11 +102,11 @@ class ConnectionMonitor:
 
     def _note(self, event: zmq.Event, value: int) -> None:
         if event is _E.DISCONNECTED:
-            self.lost = True
+            self.connected, self.lost = False, True
             return
         if event is _E.HANDSHAKE_SUCCEEDED:
             self.refused, self._broken_off, self._reconnect_at = None, 0, None
-            self.lost = False
+            self.connected, self.lost = True, False
             return
         if event is _E.HANDSHAKE_FAILED_AUTH:
             self.refused = KeyRefusedError(

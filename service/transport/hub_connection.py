@@ -23,6 +23,8 @@ from denseface.service.transport.sockets import Context, send_parts
 
 _RETRY_S = 0.1
 """Interval between heartbeats while the hub is not there, seconds."""
+_SAY_ALONE_S = 1.0
+"""Time without a connection until that is said, seconds."""
 
 
 class HubConnection:
@@ -39,6 +41,10 @@ class HubConnection:
         self._context: Context = zmq.Context()
         self._socket, self._monitor = connect(self._context, zmq.DEALER, settings.address, keys)
         self._denied = ""
+        self._address = settings.address
+        self._alone_since: float | None = time.monotonic()
+        """Since when there is no connection, seconds; None while there is one."""
+        self._said_alone = False
 
     def __enter__(self) -> Self:
         return self
@@ -71,6 +77,7 @@ class HubConnection:
                 due = now + (self._heartbeat_s if sent else min(_RETRY_S, self._heartbeat_s))
                 if self._monitor.read():
                     self._log.error("refused by the hub", reason=str(self._monitor.refused))
+                self._log_connection(now)
                 yield None
             ready = dict(poller.poll(max(0, math.ceil((due - time.monotonic()) * 1000))))
             if stop.fileno() in ready:
@@ -88,6 +95,20 @@ class HubConnection:
             elif wake.fileno() in ready:
                 wake.drain()
                 yield None
+
+    def _log_connection(self, now: float) -> None:
+        """Say once that the hub is waited for, and that it is there after that."""
+        if self._monitor.connected:
+            if self._said_alone:
+                self._log.info("connected to the hub", address=self._address)
+            self._alone_since, self._said_alone = None, False
+        elif self._alone_since is None:
+            self._alone_since = now
+        elif not self._said_alone and now - self._alone_since >= _SAY_ALONE_S:
+            self._said_alone = True
+            if not self._monitor.refused:  # that has been said
+                self._log.warning("waiting for the hub", address=self._address,
+                                  reason=self._monitor.why_not())
 
     def _log_denied(self, reason: str) -> None:
         if reason != self._denied:  # once, not at every heartbeat

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from denseface.recon.settings import Settings
     from denseface.service.client import Client, Operator
     from denseface.service.settings import ServiceSettings
+
+CONNECT_S = 10.0
+"""Longest wait of a command for a hub that is not there, seconds: one that starts takes a few."""
 
 
 def add_client(parser: argparse.ArgumentParser) -> None:
@@ -153,10 +157,12 @@ def service_settings(args: argparse.Namespace) -> "ServiceSettings":
     return ServiceSettings.of(os.environ, **{name: getattr(args, name, None) for name in names})
 
 
-def client(args: argparse.Namespace) -> "Client":
+def client(args: argparse.Namespace, connect_timeout: float | None = None) -> "Client":
+    """Give a client, which says on stderr that it waits for a hub, and why there is none."""
     from denseface.service.client import Client
 
-    return Client(args.address, key=args.key, hub_key=args.hub_key)
+    return Client(args.address, key=args.key, hub_key=args.hub_key,
+                  connect_timeout=connect_timeout, on_waiting=partial(_say_waiting, args))
 
 
 @contextmanager
@@ -168,11 +174,19 @@ def operator(args: argparse.Namespace) -> Iterator["Operator"]:
     from denseface.service.errors import LocalProtocolError
 
     try:
-        with Operator(args.address, key=args.key, hub_key=args.hub_key) as operator:
+        with Operator(args.address, key=args.key, hub_key=args.hub_key,
+                      connect_timeout=CONNECT_S, on_waiting=partial(_say_waiting, args)
+                      ) as operator:
             yield operator
     except ValidationError as error:
         raise LocalProtocolError(
             f"capture id {error.errors()[0]['input']!r}: malformed") from error
+
+
+def _say_waiting(args: argparse.Namespace, line: str) -> None:
+    from denseface.service.runtime.terminal import complain
+
+    complain(f"denseface {args.command}: {line}")
 
 
 def repeated(args: argparse.Namespace, *names: str) -> list[str]:
