@@ -16,7 +16,13 @@ from denseface.service.errors import KeyFileError, first_error, reason_of
 from denseface.service.protocol.roles import Role
 from denseface.service.runtime.files import private_folder, read_private_text
 from denseface.service.runtime.limits import OUT_OF_DESCRIPTORS
-from denseface.service.security._keys import check_key, check_name, fingerprint, write_key_file
+from denseface.service.security._keys import (
+    check_key,
+    check_name,
+    check_public,
+    fingerprint,
+    write_key_file,
+)
 
 _WRITABLE_BY_OTHERS = 0o022
 """Mode bits that a file of the list may not have."""
@@ -144,10 +150,12 @@ def allow(keys: Path, name: str, public: str, roles: frozenset[Role]) -> Allowed
     Raises
     ------
     KeyFileError, SettingsError
-        Where key or name is in use with another, or the file cannot be written.
+        Where key or name is in use with another, the file cannot be written, or the key is the
+        secret half of a pair that `keys` knows.
     """
     one = AllowedKey(check_name(name), public, roles)
     folder = private_folder(private_folder(keys) / "allowed")
+    check_public(keys, public)
     for other in AllowList(keys):
         if (other.public == public) != (other.name == name):
             raise KeyFileError(

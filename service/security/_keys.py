@@ -134,12 +134,37 @@ def read_public(given: Path | str) -> str:
     Raises
     ------
     KeyFileError
-        Where it is neither.
+        Where it is neither, or a file with a secret key: that one is given to nobody.
     """
     if _is_key(str(given)):
         return str(given)
     path = Path(given)
-    return check_key(path, _read(path, 0).public_key)
+    if not path.exists():
+        raise KeyFileError(f"{path}: no such file, nor a key: expected NAME.public, or the 40 "
+                           "characters in it")
+    file = _read(path, 0)
+    if file.secret_key is not None:
+        raise KeyFileError(f"{path}: holds a secret key, which stays where it is used: expected "
+                           f"the file {path.with_suffix('.public').name} beside it")
+    return check_key(path, file.public_key)
+
+
+def check_public(folder: Path, key: str) -> None:
+    """Refuse the secret half of a pair that has a file in `folder`: KeyFileError.
+
+    The halves look alike; of another pair it cannot be told.
+    """
+    half = zmq.curve_public(key.encode()).decode()
+    for path in sorted(folder.glob("*.public")) + sorted(folder.glob("*.secret")):
+        try:
+            known = _read(path, 0).public_key
+        except KeyFileError:
+            continue
+        if known == half:
+            raise KeyFileError(
+                f"that is the secret key of {path.stem}, which stays where it is used: expected "
+                f"its public one, {known}; who has seen the secret one may use it: "
+                "make a new pair")
 
 
 def _read(path: Path, forbidden: int) -> _File:

@@ -80,6 +80,34 @@ def test_the_halves_of_two_pairs_are_none(keys):
         read_pair(public)
 
 
+def test_a_secret_key_is_given_to_nobody(keys):
+    """Neither to the allow-list, which others read, nor in place of the hub's public one."""
+    secret, _ = new_pair(keys, "kiosk")
+    with pytest.raises(KeyFileError, match=r"kiosk\.secret: holds a secret key.*kiosk\.public"):
+        read_public(secret)
+    copied = secret.rename(keys / "mine")  # by its contents, whatever its name
+    with pytest.raises(KeyFileError, match="mine: holds a secret key"):
+        read_public(copied)
+
+
+@pytest.mark.parametrize("forgotten", ["kiosk.public", "kiosk.secret"])
+def test_a_secret_key_that_is_pasted_is_known_by_its_pair(keys, forgotten):
+    pair = read_pair(new_pair(keys, "kiosk")[0])
+    (keys / forgotten).unlink()
+    (keys / "a.public").write_text("no key")
+    with pytest.raises(KeyFileError, match=r"the secret key of kiosk, .*make a new pair") as caught:
+        allow(keys, "front", pair.secret, ROLES)
+    assert pair.public in str(caught.value)
+    assert pair.secret not in str(caught.value)
+    assert len(AllowList(keys)) == 0
+    allow(keys, "front", pair.public, ROLES)
+
+
+def test_what_is_neither_a_file_nor_a_key_is_named():
+    with pytest.raises(KeyFileError, match=r"abc: no such file, nor a key: expected NAME\.public"):
+        read_public("abc")
+
+
 def test_a_folder_is_no_key(tmp_path):
     with pytest.raises(KeyFileError):
         read_public(tmp_path)
