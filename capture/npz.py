@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.capture.calibration import MAX_SIDE, Calibration, ChosenCalibration
-from denseface.capture.calibration_files import doubts_of
+from denseface.capture.doubts import doubts_of
 from denseface.capture.errors import CalibrationError, FrameError, UnreadableSourceError
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
 from denseface.capture.source import Source

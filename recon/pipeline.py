@@ -13,6 +13,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from denseface.capture.doubts import doubts_of
 from denseface.capture.frame import FrameOrigin, RgbdFrame
 from denseface.capture.rotation import ROTATIONS, rotate_frame
 from denseface.recon.arrays import Floats
@@ -209,6 +210,9 @@ def _warnings(
     frame: RgbdFrame, seeds: int, coarse: str, *, colored: bool
 ) -> tuple[str, ...]:
     found = [*frame.origin.notes, *filter(None, [coarse])]
+    # Who read the frame from somewhere was told; who made it was not.
+    found += [doubt for doubt in doubts_of(frame.calibration, frame.registered or not colored)
+              if doubt not in found]
     if not colored:
         found.append("the sensor has no colour camera: the face is shaded grey")
     if seeds < _FEW_SEEDS:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.capture.calibration import Calibration, ChosenCalibration
-from denseface.capture.calibration_files import doubts_of
+from denseface.capture.doubts import doubts_of
 from denseface.capture.errors import CalibrationError, FrameError
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
 from denseface.capture.image_pair._defaults import default_calibration

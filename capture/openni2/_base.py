@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.capture.calibration import ChosenCalibration
-from denseface.capture.calibration_files import doubts_of
+from denseface.capture.doubts import doubts_of
 from denseface.capture.errors import FrameError
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
 from denseface.capture.openni2._calibration import Size, derive_calibration, fit

@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from denseface.capture.calibration_files import doubts_of
+    from denseface.capture.doubts import doubts_of
     from denseface.service.tools import calibration as tool
 
     outputs, board = _outputs(args), _board(args)

@@ -14,7 +14,8 @@ from denseface.capture.calibration import (
     _RayMaps,
     _rays,
 )
-from denseface.capture.calibration_files import doubts_of, read_calibration
+from denseface.capture.calibration_files import read_calibration
+from denseface.capture.doubts import doubts_of
 from denseface.capture.errors import CalibrationError
 from tests.unit.frames import calibration, camera, cameras, poses
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from denseface.capture.calibration import DepthToColor
+from denseface.capture.doubts import doubts_of
 from denseface.capture.frame import RgbdFrame
 from denseface.recon import (
     FaceWithoutDepthError,
@@ -249,6 +251,16 @@ def test_few_seeds_are_warned_of():
     assert len(one.initial) < 2000
     assert one.report.warnings == (
         f"only {len(one.initial)} seeds: the face is far away or mostly unmeasured",)
+
+
+def test_a_calibration_in_metres_is_warned_of_whoever_made_the_frame(shot):
+    metres = DepthToColor(translation_mm=(-0.025, 0, 0))
+    frame = replace(shot.frame, calibration=shot.frame.calibration.model_copy(
+        update={"depth_to_color": metres}))
+    doubt, = doubts_of(frame.calibration)
+    assert "metres in place of millimetres?" in doubt
+    assert reconstruct(frame).report.warnings == (doubt,)
+    assert reconstruct(frame.with_note(doubt)).report.warnings == (doubt,)  # once is enough
 
 
 def test_frames_far_apart_in_time_are_warned_of(shot):

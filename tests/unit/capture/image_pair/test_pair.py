@@ -6,7 +6,7 @@ import pytest
 from denseface.capture import Calibration, CameraModel, DepthToColor
 from denseface.capture.agreement import Agreement, Verdict
 from denseface.capture.calibration import ChosenCalibration
-from denseface.capture.calibration_files import doubts_of
+from denseface.capture.doubts import doubts_of
 from denseface.capture.errors import CalibrationError, FrameError
 from denseface.capture.image_pair import ImagePairSource, PairReading
 from denseface.capture.image_pair._defaults import default_calibration

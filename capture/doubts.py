@@ -24,6 +24,6 @@ def doubts_of(calibration: Calibration, registered: bool = False) -> tuple[str, 
     apart = math.hypot(*calibration.depth_to_color.translation_mm)
     if apart == 0 or _BASELINE_MM[0] <= apart <= _BASELINE_MM[1]:
         return ()
-    return (f"the calibration has its cameras {apart:.3g} mm apart, expected {_BASELINE_MM[0]:g} "
+    return (f"the calibration has its cameras {apart:.4g} mm apart, expected {_BASELINE_MM[0]:g} "
             f"to {_BASELINE_MM[1]:g}"
             + (": metres in place of millimetres?" if apart < 1 else ""),)
