@@ -181,6 +181,8 @@ class _Capture:
             return
         _log.info("taken", capture_id=capture_id, skew_us=frame.skew_us,
                   exposed_after_press_ms=frame.origin.exposed_after_press_ms)
+        for note in frame.origin.notes:  # whoever runs the sensor reads no report
+            _log.warning("doubtful", capture_id=capture_id, reason=note)
         self.sender.send(capture_id, frame)
 
     def _no_frame(
