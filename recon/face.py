@@ -109,6 +109,11 @@ class _Model(BaseModel):
     model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 
 
+MAX_STEP = 15.0
+"""Largest step in depth within a triangle of neighbours of the grid, in grid steps: more is a gap
+between two surfaces. A slope of ten, the steepest bridge that is kept, makes 14 along a diagonal.
+"""
+
 Box = tuple[int, int, int, int]
 """x, y, width, height; pixels."""
 

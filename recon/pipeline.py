@@ -29,6 +29,7 @@ from denseface.recon.errors import (
 from denseface.recon.face import Face, PointCloud, Report
 from denseface.recon.intermediate import ColorSampler, Registration, SurfaceGrid
 from denseface.recon.numerics.threads import one_blas_thread
+from denseface.recon.openings import Openings, openings
 from denseface.recon.plausibility import check_face, check_steps
 from denseface.recon.propagation import densify, noise_fraction
 from denseface.recon.registration import register, sample_colors, with_shaded_depth
@@ -118,6 +119,7 @@ def _reconstruct(frame: RgbdFrame, settings: Settings, clock: "_Stopwatch") -> F
     surface = surface_of(seeds.points, spacing, settings, sampler)
     clock.lap("rbf")
     dense = densify(seeds, surface, spacing, settings.ratio, noise_fraction(settings), sampler)
+    left_open = openings(dense)
     clock.lap("propagation")
     initial = PointCloud(seeds.points, seeds.colors)
     report = Report(
@@ -129,7 +131,8 @@ def _reconstruct(frame: RgbdFrame, settings: Settings, clock: "_Stopwatch") -> F
         colored=colored, registered=frame.registered and colored,
         depth_unit_um=frame.depth_meaning.unit_um,
         depth_rounding=frame.depth_meaning.rounding, **_of_origin(frame.origin),
-        version=_version(), warnings=_warnings(frame, len(initial), coarse, colored=colored),
+        version=_version(), warnings=_warnings(frame, len(initial), coarse, left_open,
+                                               colored=colored),
     )
     return Face(initial, dense, report)
 
@@ -207,7 +210,7 @@ def surface_of(
 
 
 def _warnings(
-    frame: RgbdFrame, seeds: int, coarse: str, *, colored: bool
+    frame: RgbdFrame, seeds: int, coarse: str, left_open: Openings, *, colored: bool
 ) -> tuple[str, ...]:
     found = [*frame.origin.notes, *filter(None, [coarse])]
     # Who read the frame from somewhere was told; who made it was not.
@@ -217,6 +220,11 @@ def _warnings(
         found.append("the sensor has no colour camera: the face is shaded grey")
     if seeds < _FEW_SEEDS:
         found.append(f"only {seeds} seeds: the face is far away or mostly unmeasured")
+    if left_open.holes:
+        width, height = left_open.largest_mm
+        found.append(f"{left_open.holes} hole{'s' * (left_open.holes > 1)} in the surface left "
+                     f"open, up to {width:.1f} x {height:.1f} mm: the depth around steps too far "
+                     "for one surface")
     if abs(frame.skew_us) > _MUCH_SKEW_US:
         found.append(f"depth and colour were taken {frame.skew_us / 1000:.1f} ms apart")
     return tuple(found)

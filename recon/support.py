@@ -77,7 +77,17 @@ class Support:
                                          math.sqrt(np.count_nonzero(around) / math.pi)))
         margin = _broadly_blurred(closed, even) - np.float32(least)
         most = cv2.dilate(closed, disc(_GROWTH * _FINENESS))
-        return cls(xs, ys, step, seeded, margin, pixels - least).without(most == 0)
+        grown = cls(xs, ys, step, seeded, margin, pixels - least).without(most == 0)
+        return grown._without_holes()
+
+    def _without_holes(self) -> Self:
+        """Give the support with what it encloses: bays, too, whose mouth is evened out."""
+        above = (self.margin > self.level).view(np.uint8)
+        enclosed = binary_fill_holes(above) > above
+        if not enclosed.any():
+            return self
+        # Twice the level: what lies between two points that are above it is so, too.
+        return replace(self, margin=np.where(enclosed, np.float32(2 * self.level), self.margin))
 
     @property
     def inside(self) -> Bools:
@@ -110,8 +120,12 @@ class Support:
         Returns xs, ys, (columns,), (rows,) float64, mm, and the support, (rows, columns) bool.
         """
         xs, ys = _axes((self.xs[0], self.xs[-1]), (self.ys[0], self.ys[-1]), step)
+        return xs, ys, self.sampled(xs, ys)
+
+    def sampled(self, xs: Doubles, ys: Doubles) -> Bools:
+        """Say which points of a grid are supported: (k,), (m,) mm, to (m, k)."""
         columns, rows = self.coordinates(xs, ys)
-        return xs, ys, exceeds(self.margin, rows, columns, self.level)
+        return exceeds(self.margin, rows, columns, self.level)
 
 
 def _broadly_blurred(image: Bytes, sigma: float) -> Floats:

@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.arrays import Bools, Bytes
+from denseface.recon.arrays import Bools, Bytes, Ints
 
-__all__ = ["binary_fill_holes", "disc", "large_components", "opened", "select_pixels"]
+__all__ = ["binary_fill_holes", "disc", "enclosed_parts", "large_components", "opened",
+           "select_pixels"]
 
 _Kind = TypeVar("_Kind", bound=np.generic)
 
@@ -30,6 +31,26 @@ def binary_fill_holes(image: Bytes) -> Bytes:
     outside = cv2.copyMakeBorder(image, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     cv2.floodFill(outside, None, (0, 0), 2)
     return np.asarray(outside[1:-1, 1:-1] != 2, np.uint8)
+
+
+def enclosed_parts(mask: Bools) -> tuple[Ints, Ints]:
+    """Number the components, connected at sides or corners, and find those off the border.
+
+    mask : (H, W)
+
+    Returns
+    -------
+    labels : (H, W), 0 where the mask is not
+    parts : (k, 5), of each component that does not reach the border its label, left, top, width
+        and height, pixels
+    """
+    _, labels, boxes, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
+    left, top, width, height = boxes[:, :4].T
+    off = ((left > 0) & (top > 0) & (left + width < mask.shape[1])
+           & (top + height < mask.shape[0]))
+    off[0] = False  # the background
+    parts = np.column_stack([np.flatnonzero(off), boxes[off, :4]])
+    return np.asarray(labels, np.int32), np.asarray(parts, np.int32)
 
 
 def opened(image: Bytes, radius: float) -> Bytes:

@@ -12,9 +12,9 @@ from denseface.recon.face import DenseCloud, Seeds
 from denseface.recon.intermediate import ColorSampler, SurfaceGrid
 from denseface.recon.numerics.push_pull import interpolate_colors
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, pixel_coordinates
+from denseface.recon.propagation._bridges import without_bridges
 from denseface.recon.propagation._grid_kernels import Resampling, gather_points, indices_of_zeros
 from denseface.recon.propagation.uncertainty import standard_error, variance_components
-from denseface.recon.support import Support
 
 _COLOR_RADIUS = 0.58
 """Standard deviation of the Gaussian that averages the seeds' colours, mean spacings."""
@@ -24,12 +24,6 @@ _MIN_RADIUS_PX = 0.4
 """Least standard deviation of that Gaussian, pixels."""
 _HOLE = 1.5
 """Farther than this from every seed, over (X, Y), a point is in a hole, mean spacings."""
-_STEEP = 4.0
-"""Slope from which on a fit without seeds bridges a step (docs/decisions/0018)."""
-_UNREAD = 0.7
-"""Farther than this from every seed nothing was read, mean spacings."""
-_SPECK_PX = 2
-"""Bridges narrower than this stay, points of the support's grid."""
 
 
 def densify(
@@ -48,8 +42,9 @@ def densify(
     sampler : tells the colours of points in holes; None, and their border's colours fill them
     """
     step = float(np.sqrt(surface.support.area / (ratio * len(seeds.points))))
-    support = _without_bridges(surface, spacing)
+    support = surface.support
     xs, ys, inside = support.on_grid(step)
+    inside = without_bridges(surface, inside, (xs, ys), spacing)
     origin = float(xs[0]), float(ys[0])
 
     components = variance_components(
@@ -73,19 +68,6 @@ def densify(
             colors[hole[seen]] = own[seen]
     return DenseCloud(points=points, colors=colors, normals=normals, sigma=sigma, cells=cells,
                       grid_shape=inside.shape, grid_step_mm=step)
-
-
-def _without_bridges(surface: SurfaceGrid, spacing: float) -> Support:
-    """Give the support without places where the fit bridges a step that nothing was read of."""
-    _, dz_dx, dz_dy = surface.values
-    bridge = dz_dx * dz_dx + dz_dy * dz_dy > np.float32(_STEEP**2)
-    if not bridge.any():
-        return surface.support
-    bridge &= surface.support.near_seeds(_UNREAD * spacing) == 0
-    # A surface riddled with pinholes is worse than a bridge.
-    kernel = np.ones((_SPECK_PX, _SPECK_PX), np.uint8)
-    opened = cv2.dilate(cv2.erode(bridge.view(np.uint8), kernel), kernel, anchor=(0, 0))
-    return surface.support.without(np.asarray(opened > 0))
 
 
 def _colors(

@@ -5,12 +5,9 @@ import struct
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.face import DenseCloud, Face
+from denseface.recon.face import MAX_STEP, DenseCloud, Face
 
 __all__ = ["to_obj", "to_stl", "triangulate"]
-
-_MAX_STEP = 10.0
-"""Largest step in depth between neighbours, in grid steps: more is a gap between two surfaces."""
 
 
 def triangulate(cloud: DenseCloud) -> NDArray[np.int32]:
@@ -24,7 +21,7 @@ def triangulate(cloud: DenseCloud) -> NDArray[np.int32]:
     -------
     (t, 3) int32, rows of `cloud.points`, counter-clockwise as the camera sees them, so that the
     front is toward the camera. A block with three points gives one triangle; triangles that span
-    more than ten grid steps in depth are left out.
+    more than `MAX_STEP` grid steps in depth are left out.
     """
     rows, columns = cloud.grid_shape
     index = np.full((rows, columns), -1, np.int32)
@@ -40,7 +37,7 @@ def triangulate(cloud: DenseCloud) -> NDArray[np.int32]:
         np.stack([b, c, d], axis=1)[(a < 0) & (b >= 0) & (c >= 0) & (d >= 0)],
     ])
     z = cloud.points[:, 2][triangles]
-    limit = _MAX_STEP * cloud.grid_step_mm
+    limit = MAX_STEP * cloud.grid_step_mm
     kept: NDArray[np.int32] = triangles[z.max(axis=1) - z.min(axis=1) <= limit]
     return kept
 

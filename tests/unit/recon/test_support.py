@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from denseface.recon.numerics.bilinear import exceeds
+from denseface.recon.numerics.morphology import binary_fill_holes
 from denseface.recon.support import Support
 from tests.unit.recon.shapes import disc_seeds
 
@@ -44,6 +45,17 @@ def test_a_bay_open_to_the_outside_is_no_hole():
     bay = (points[:, 0] > 0) & (np.abs(points[:, 1]) < 6)
     inside, _ = supported(points[~bay], 1.0)
     assert not ((inside[:, 0] > 5) & (np.abs(inside[:, 1]) < 4.5)).any()
+
+
+@pytest.mark.parametrize("mouth", [3, 4, 5])
+def test_a_bay_whose_mouth_closes_leaves_no_hole(mouth):
+    """Evened out, a narrow mouth closes, and the bay behind it is enclosed."""
+    points = disc_seeds(1.0, 30)
+    bay = ((np.hypot(points[:, 0] - 14, points[:, 1]) < 6)
+           | ((points[:, 0] > 14) & (np.abs(points[:, 1]) < mouth / 2)))
+    for step in (0.5, 0.32):
+        support = Support.of(points[~bay], 1.0).on_grid(step)[2].astype(np.uint8)
+        np.testing.assert_array_equal(support, binary_fill_holes(support))
 
 
 def test_two_parts_are_not_joined():

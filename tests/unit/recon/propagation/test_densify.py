@@ -6,8 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
+from denseface.recon.openings import openings
 from denseface.recon.propagation import densify
 from denseface.recon.surface import exact_spacing
+from denseface.service.export.mesh import triangulate
+from tests.mesh_holes import mesh_faults
 from tests.unit.recon.shapes import disc_seeds, fitted, seeds
 
 
@@ -164,6 +167,21 @@ def test_a_step_is_not_bridged_where_nothing_was_read():
     for side, depth in ((x < -3, 700), (x > 3, 740)):
         assert side.sum() == pytest.approx(10 * (np.abs(points[:, 0]) > 3).sum() / 2, rel=0.1)
         assert np.abs(z[side] - depth).mean() < 2
+
+
+@pytest.mark.parametrize(("step_mm", "stays_open"), [(20, False), (60, True)])
+def test_an_enclosed_bridge_closes_a_nose_s_side_but_joins_no_two_surfaces(step_mm, stays_open):
+    """A plateau before a plane, nothing read for 3.6 mm on one side; it slopes down elsewhere."""
+    points = disc_seeds(1.0, 30)
+    x, y, _ = points.T
+    points = points[~((np.abs(x) < 1.8) & (np.abs(y) < 8))]
+    x, y, _ = points.T
+    steep = np.clip(x / 2 + 0.5, 0, 1) * np.clip(1.5 - np.abs(y) / 12, 0, 1)
+    points[:, 2] = 700 + step_mm * np.where(x > 0, steep * np.clip(1.5 - x / 14, 0, 1), 0)
+    dense = densify(seeds(points), fitted(points, 1.0, 4, 0.1), 1.0, 10, 0.5)
+    found = openings(dense)
+    assert (found.holes > 0) == stays_open
+    assert mesh_faults(dense.points, triangulate(dense)).holes == found.holes
 
 
 def test_a_gap_without_a_step_is_filled():
