@@ -3,8 +3,8 @@
 Everything is imported when first used, so that `import denseface` costs nothing.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+TYPE_CHECKING = False
+"""As that of `typing`, whose import takes longer than all that is here."""
 
 if TYPE_CHECKING:
     from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
@@ -117,12 +117,14 @@ _NAMES = {
 _MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name == "__version__":
         from importlib.metadata import version
 
-        value: Any = version("denseface")
+        value: object = version("denseface")
     elif name in _MODULES:
+        from importlib import import_module
+
         value = getattr(import_module(f"denseface.{_MODULES[name]}"), name)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

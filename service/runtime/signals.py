@@ -1,4 +1,4 @@
-"""SIGINT and SIGTERM for a poll, and a process that ends with its parent."""
+"""SIGINT, SIGTERM and SIGHUP for a poll, and a process that ends with its parent."""
 
 import ctypes
 import os
@@ -16,7 +16,7 @@ PARENT_VARIABLE = "DENSEFACE_PARENT"
 
 _PR_SET_PDEATHSIG = 1
 """See prctl(2)."""
-_STOPPING = (signal.SIGINT, signal.SIGTERM)
+_STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class StopSignal(WakePipe):
@@ -37,6 +37,8 @@ class StopSignal(WakePipe):
         self._before.callback(signal.set_wakeup_fd, signal.set_wakeup_fd(
             self.writer, warn_on_full_buffer=False))
         for number in self._handled:
+            if number is signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN:
+                continue  # after `nohup`
             self._before.callback(signal.signal, number, signal.signal(number, self._note))
         return self
 
@@ -52,6 +54,11 @@ class StopSignal(WakePipe):
     def exit_status(self) -> int:
         """130 after Ctrl-C, else 0."""
         return 130 if self.received is signal.SIGINT else 0
+
+    @property
+    def reason(self) -> str:
+        """What was received, in the words of whoever sent it; empty before."""
+        return "Ctrl-C" if self.received is signal.SIGINT else getattr(self.received, "name", "")
 
     def _note(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002
         if number in _STOPPING and self.received is None:

@@ -1,7 +1,6 @@
 """Record a source, so that whatever ends it what was recorded can be played."""
 
 import shutil
-import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -148,8 +147,7 @@ def _record(reader: FrameReader, writer: _Writer, stop: StopSignal, limits: _Lim
             line.show(lambda: f"{writer.frames} frames, {seconds:.1f} s, {reader.lost} lost")  # noqa: B023
             if limits.reached(writer.frames, seconds):
                 return _End("as long as asked for")
-    by = "Ctrl-C" if stop.received is signal.SIGINT else "SIGTERM"
-    return _End(f"stopped by {by}", stop.exit_status)
+    return _End(f"stopped by {stop.reason}", stop.exit_status)
 
 
 @contextmanager

@@ -45,8 +45,7 @@ def outcome(capfd, *arguments):
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
-    ([], "required: COMMAND"),
-    (["fly"], "invalid choice: 'fly'"),
+    (["fly"], "unknown command 'fly', expected reconstruct, doctor, "),
     (["reconstruct"], "expected INPUT or --depth, found neither"),
     (["reconstruct", "{tmp}/no.npz"], "no.npz"),
     (["reconstruct", "{tmp}/no.oni"], "no.oni"),
@@ -80,13 +79,14 @@ def outcome(capfd, *arguments):
     (["worker", "--hub", "tcp://10.0.0.1:5", "--hub-key", "{tmp}/no"], "expected --key FILE"),
     (["keys", "new", "../hub", "--keys", "{tmp}/keys"], "key name '../hub'"),
     (["keys", "allow", "a", "b"], "required: ROLE"),
-    (["keys", "allow", "a", "b", "king"], "invalid choice: 'king'"),
+    (["keys", "allow", "a", "b", "king"],
+     "ROLE: expected sensor, worker, presser, subscriber or operator, found 'king'"),
     (["press", "--timeout", "never"], "expected seconds"),
     (["press", "--id", "../x", "--address", "ipc:///tmp/none/hub"], "capture id '../x'"),
     (["press", "--id", "", "--address", "ipc:///tmp/none/hub"], "capture id ''"),
     (["press", "--address", "nowhere"], "expected ipc://PATH or tcp://HOST:PORT"),
     (["press", "--save", "face"], "ending missing"),
-    (["press", "--gate", "maybe"], "invalid choice: 'maybe'"),
+    (["press", "--gate", "maybe"], "--gate: expected off, wait, refuse or best, found 'maybe'"),
     (["press", "--frames", "33", "--address", "ipc:///tmp/none/hub"], "frames: "),
     (["press", "--sensor", "a b", "--address", "ipc:///tmp/none/hub"], "sensor: "),
     (["subscribe", "--hints", "--last", "3"], "not allowed with"),
@@ -96,7 +96,7 @@ def outcome(capfd, *arguments):
     (["up", "--source", "a.oni", "--source", "b.oni", "--calibration", "c.json"],
      "--calibration: 1 given for 2 sources"),
     (["up", "--source", "a.oni", *2 * ("--rotate", "90")], "--rotate: 2 given for 1 sources"),
-    (["up", "--rotate", "45"], "invalid choice: 45"),
+    (["up", "--rotate", "45"], "--rotate: expected 0, 90, 180 or 270, found '45'"),
     (["subscribe", "--save", "{tmp}/none"], "no such folder"),
     (["press", "--mode", "688"], "'688': expected three octal digits"),
     (["subscribe", "--mode", "040"], "'040': expected three octal digits"),
@@ -108,7 +108,7 @@ def outcome(capfd, *arguments):
     (["hub", "--metrics", "0.0.0.0:9400"], "this machine alone"),
     (["up", "--metrics", "http"], "--metrics: "),
     (["up", "--retention", "soon"], "24h, 90m or 7d, or off"),
-    (["dead", "bury"], "invalid choice: 'bury'"),
+    (["dead", "bury"], "action: expected list, retry or drop, found 'bury'"),
     (["dead", "list", "a"], "takes neither"),
     (["dead", "retry"], "expected ids, or --all"),
     (["dead", "drop", "a", "--all"], "expected ids, or --all"),
@@ -128,7 +128,8 @@ def test_wrong_usage_is_one_line_and_status_2(room, capfd, arguments, message):
 
 
 def test_an_untried_python_is_said_once(tmp_path, monkeypatch, capfd):
-    monkeypatch.setattr("denseface.service.cli.untried_python", lambda: "Python 3.15.0 is newer")
+    monkeypatch.setattr(
+        "denseface.service.cli._main.untried_python", lambda: "Python 3.15.0 is newer")
     line = "denseface: Python 3.15.0 is newer"
     assert main(["reconstruct", f"{tmp_path}/none.oni"]) == 2
     assert capfd.readouterr().err.splitlines()[0] == line

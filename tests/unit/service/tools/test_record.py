@@ -101,7 +101,7 @@ def test_frames_that_come_faster_than_they_can_be_written_are_counted(
     assert "were lost; as long as asked for" in said
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_before_the_first_frame(folder, tmp_path, monkeypatch, capsys, number):
     (folder / "0.npz").rename(folder / "late")
     asked = threading.Event()
@@ -119,7 +119,7 @@ def test_a_signal_before_the_first_frame(folder, tmp_path, monkeypatch, capsys, 
     status = record.run(str(folder), None, out)
     assert status == (130 if number == signal.SIGINT else 0)
     assert ended == [status], "a driver that hangs does not keep the process"
-    by = "Ctrl-C" if number == signal.SIGINT else "SIGTERM"
+    by = "Ctrl-C" if number == signal.SIGINT else number.name
     assert capsys.readouterr().out == f"{out}: nothing was recorded; stopped by {by}\n"
     assert not out.exists()
 

@@ -1,0 +1,42 @@
+"""What the help shows at its end. Each example is read by a test as it stands."""
+
+__all__ = ["EXAMPLES", "EXIT_STATUSES", "FIRST"]
+
+FIRST = """\
+what people do first:
+  denseface reconstruct recording.oni -o face.ply   a face of a recording or a frame
+  denseface doctor                                  is everything here that a sensor needs?
+  denseface up                                      run the service; then, beside it:
+  denseface press --save face.ply                   take a picture now"""
+
+EXIT_STATUSES = """\
+exit status:
+  0 done; 1 failed, also where there is no face; 2 wrong usage, or a file that cannot be read;
+  129, 130 and 143 after SIGHUP, Ctrl-C and SIGTERM; 141 where the reader of stdout left"""
+
+EXAMPLES = {
+    "reconstruct": "reconstruct recording.oni --frame 3 -o face.ply --preview face.png",
+    "doctor": "doctor --source openni2:",
+    "calibrate": "calibrate --infrared ir/ --color rgb/ --board 9x6 --square 24.5 "
+                 "-o sensor.calibration.json",
+    "live": "live --source openni2: --seconds 30",
+    "record": "record take.oni --seconds 10",
+    "up": "up --source openni2: --workers 2 --retention 7d",
+    "press": "press --save face.ply --report report.json",
+    "get": "get 3f2a --save face.ply",
+    "subscribe": "subscribe --save faces/ --last 10",
+    "dead": "dead list",
+    "dead list": "dead list",
+    "dead retry": "dead retry 3f2a",
+    "dead drop": "dead drop 3f2a",
+    "purge": "purge --before 2026-01-31T14:30",
+    "status": "status --wait 60",
+    "keys": "keys new kiosk",
+    "keys new": "keys new kiosk",
+    "hub": "hub --listen tcp://0.0.0.0:5555 --metrics 9100",
+    "capture": "capture --source openni2: --name entrance",
+    "worker": "worker --address ipc:///run/denseface/hub",
+    "kiosk": "kiosk --kiosk-address 8080",
+    "help": "help press",
+}
+"""Command -> arguments of `denseface`."""

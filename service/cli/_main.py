@@ -1,0 +1,78 @@
+"""One command: its exit status, and one line on stderr for what went wrong.
+
+0 done; 1 the job failed; 2 wrong usage, unreadable input or no driver to read it with; 129, 130 and
+143 after SIGHUP, Ctrl-C and SIGTERM; 141 where the reader of stdout left. The same where stderr
+cannot be written.
+"""
+
+import os
+import sys
+from collections.abc import Sequence
+
+from denseface.service.cli._parser import USAGE, parse
+from denseface.service.commands import load
+from denseface.service.runtime.interruption import Interruption, interrupted
+from denseface.service.runtime.process import forbid_core_dumps, untried_python
+from denseface.service.runtime.signals import PARENT_VARIABLE
+from denseface.service.runtime.terminal import (
+    complain,
+    complain_of,
+    discard_unless_flushed,
+    fill_standard_descriptors,
+    reader_left,
+)
+
+_FAILED, _CTRL_C, _BROKEN_PIPE = 1, 130, 141
+"""Exit statuses; above 128, 128 and the number of the signal, as a shell has it."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and give its exit status."""
+    fill_standard_descriptors()
+    forbid_core_dumps()
+    args = parse(arguments)
+    # Once: not by each process that `denseface up` starts.
+    if (doubt := untried_python()) and PARENT_VARIABLE not in os.environ:
+        complain(f"denseface: {doubt}")
+    try:
+        with Interruption():
+            status: int = load(args.command).run(args)
+            if sys.stdout is not None:
+                sys.stdout.flush()
+    except KeyboardInterrupt:
+        return _CTRL_C
+    except Exception as error:
+        if status := interrupted():  # whatever became of the signal on its way
+            return status
+        if isinstance(error, BrokenPipeError) and reader_left(sys.stdout):
+            return _BROKEN_PIPE
+        if args.debug:
+            if sys.excepthook is sys.__excepthook__:
+                sys.excepthook = complain_of
+            raise
+        line = " ".join(str(error).split()) or type(error).__name__
+        if getattr(args, "log", "text") == "json":
+            import structlog
+
+            structlog.get_logger(args.command).critical("ended", reason=line)
+        else:
+            complain(f"denseface {args.command}: {line}")
+        return _exit_status(error)
+    finally:
+        discard_unless_flushed(sys.stdout)
+    return status
+
+
+def _exit_status(error: Exception) -> int:
+    from denseface.capture.errors import (
+        CalibrationError,
+        DriverError,
+        FrameError,
+        UnreadableSourceError,
+    )
+    from denseface.service import errors
+
+    wrong_input = (CalibrationError, DriverError, FrameError, UnreadableSourceError,
+                   errors.FormatError, errors.FrameTooLargeError, errors.LocalProtocolError,
+                   errors.SettingsError, errors.UsageError)
+    return USAGE if isinstance(error, wrong_input) else _FAILED

@@ -1,0 +1,133 @@
+"""Flags and commands of the command line, what is said of a wrong one, and the help."""
+
+import argparse
+import itertools
+import re
+import sys
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+from typing import Any, NoReturn
+
+from denseface.service.cli._examples import EXAMPLES, EXIT_STATUSES, FIRST
+from denseface.service.commands import COMMANDS, load
+from denseface.service.runtime.terminal import complain, say
+
+__all__ = ["USAGE", "parse"]
+
+USAGE = 2
+"""Exit status of wrong usage."""
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """Read the arguments of a process, or these; exits where they are wrong or ask for help."""
+    parser = _parser()
+    args = parser.parse_args(arguments)
+    if args.command is None:
+        parser.print_help()
+        parser.exit()
+    if args.command == "help":
+        parser.parse_args([*args.words, "--help"])
+    return args
+
+
+class _Formatter(argparse.RawDescriptionHelpFormatter):
+    """Shows commands as it shows flags: no line for what stands for them, names in one column."""
+
+    def add_argument(self, action: argparse.Action) -> None:
+        super().add_argument(action)
+        if isinstance(action, argparse._SubParsersAction):
+            self._action_max_length += self._indent_increment  # argparse forgets it
+
+    def _format_action(self, action: argparse.Action) -> str:
+        text = super()._format_action(action)
+        if isinstance(action, argparse._SubParsersAction):
+            return text.partition("\n")[2]
+        return text
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, by the help of the very command that was meant."""
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__(allow_abbrev=False, formatter_class=_Formatter, **given)
+        if self.epilog is None:
+            self.epilog = _example(self.prog)
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None,
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """Refuse here what is unknown, not where the outermost parser finds it left over."""
+        given = sys.argv[1:] if args is None else list(args)
+        if self._subparsers is None:  # else it may be a flag of one of them
+            # First: what is said to be missing may well be what was meant.
+            for one in itertools.takewhile("--".__ne__, given):
+                if re.fullmatch("--[^ =]+(=.*)?", one) and (
+                        one.partition("=")[0] not in self._option_string_actions):
+                    self.error(self._unknown(one))
+        parsed, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(self._unknown(unknown[0]))
+        return parsed, []
+
+    def error(self, message: str) -> NoReturn:
+        complain(f"{self.prog}: {message.removeprefix('argument ')} (see {self.prog} --help)")
+        self.exit(USAGE)
+
+    def _unknown(self, argument: str) -> str:
+        if not argument.startswith("-"):
+            return f"{argument!r}: expected nothing more"
+        flag = argument.partition("=")[0]
+        return f"unknown flag {flag}{_suggestion(flag, self._option_string_actions)}"
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is None or value in action.choices:
+            return
+        if isinstance(action, argparse._SubParsersAction):
+            suggestion = _suggestion(str(value), action.choices)
+            known = "" if suggestion else f", expected {_listed(action.choices)}"
+            raise argparse.ArgumentError(None, f"unknown command {str(value)!r}{suggestion}{known}")
+        raise argparse.ArgumentError(
+            action, f"expected {_listed(action.choices)}, found {str(value)!r}")
+
+
+def _parser() -> _Parser:
+    parser = _Parser(
+        prog="denseface", description="One press, one depth frame, one dense coloured 3D face.",
+        epilog=f"{FIRST}\n\n{EXIT_STATUSES}")
+    parser.add_argument("--version", action=_Version)
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
+    for name, text in COMMANDS.items():
+        command = commands.add_parser(
+            name, help=text, description=text[0].upper() + text[1:] + ".")
+        command.add_argument(
+            "--debug", action="store_true", help="show a traceback where something goes wrong")
+        load(name).add_arguments(command)
+    helping = commands.add_parser("help", help="show the help of a command")
+    helping.add_argument("words", nargs="*", metavar="COMMAND")
+    return parser
+
+
+class _Version(argparse.Action):
+    def __init__(self, option_strings: Sequence[str], dest: str) -> None:
+        super().__init__(option_strings, dest, nargs=0, help="show the version and exit")
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from importlib.metadata import version
+
+        say(version("denseface"))
+        parser.exit()
+
+
+def _example(prog: str) -> str | None:
+    example = EXAMPLES.get(prog.removeprefix("denseface "))
+    return f"example:\n  denseface {example}" if example else None
+
+
+def _suggestion(given: str, known: Iterable[str]) -> str:
+    near = get_close_matches(given, list(known), n=1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def _listed(choices: Iterable[object]) -> str:
+    *others, last = map(str, choices)
+    return f"{', '.join(others)} or {last}" if others else last
