@@ -23,7 +23,7 @@ RUN apt-get update \
     && rm -rf /var/lib/apt/lists/* \
     && ln -s libOpenNI2.so.0 "$(dirname "$(dpkg -L libopenni2-0 | grep '/libOpenNI2\.so\.0$')")/libOpenNI2.so" \
     && useradd --create-home --uid 1000 --groups plugdev,video denseface \
-    && install -d -o denseface -g denseface -m 0700 /data
+    && install -d -o denseface -g denseface -m 0700 /data /faces
 COPY --from=build /opt/denseface /opt/denseface
 # The metrics' port is inside the container alone; the health check asks there.
 ENV PATH=/opt/denseface/bin:$PATH \
@@ -34,8 +34,9 @@ EXPOSE 8080
 USER denseface
 # Compiled for this processor into the user's cache: else the first start would wait for it.
 RUN python3 -c 'from denseface.service.daemons.worker import warm; warm()'
-WORKDIR /data
-VOLUME /data
+# What users have written, apart from the hub's own: nothing there is removed.
+WORKDIR /faces
+VOLUME /data /faces
 # Healthy where a press now would become a face.
 HEALTHCHECK --interval=30s --timeout=10s --start-period=60s --retries=3 CMD ["python3", "-IS", "-c", "import http.client, os; hub = http.client.HTTPConnection(os.environ['DENSEFACE_METRICS'], timeout=5); hub.request('GET', '/healthz'); raise SystemExit(hub.getresponse().status != 200)"]
 ENTRYPOINT ["denseface"]

@@ -82,6 +82,8 @@ class FrameOrigin:
     skew_known_by : what the skew rests on: `stamps`, `arrival` or `record order`
     fused : of how many frames the depth is the average
     notes : doubts and corrections, in plain English; they become warnings of the report
+    source : what it was read from, without the folders of this machine: `NAME.oni#0` (file or
+        folder, and number of the frame), `openni2:SERIAL`; empty where not known
     """
 
     sensor: str = ""
@@ -91,10 +93,14 @@ class FrameOrigin:
     skew_known_by: str = ""
     fused: int = 1
     notes: tuple[str, ...] = ()
+    source: str = ""
 
     def __post_init__(self) -> None:
         if not 1 <= self.fused <= MAX_BURST:
             raise FrameError(f"fused must be 1 to {MAX_BURST}, found {self.fused}")
+        if not self.source.isprintable():  # the name of a file may be any bytes
+            line = "".join(one if one.isprintable() else "?" for one in self.source)
+            object.__setattr__(self, "source", line)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -187,6 +193,10 @@ class RgbdFrame:
     def with_calibration(self, calibration: Calibration, origin: str) -> Self:
         """Give the same images under another calibration."""
         return replace(self, calibration=calibration, calibration_origin=origin)
+
+    def with_source(self, source: str) -> Self:
+        """Give the same frame under the name of what it was read from."""
+        return replace(self, origin=replace(self.origin, source=source))
 
     def with_note(self, *notes: str) -> Self:
         """Give the same frame with more notes of its origin."""

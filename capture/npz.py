@@ -1,7 +1,7 @@
 """The frame file: one `RgbdFrame` in a `.npz`, without pickles; and folders of such files."""
 
 import errno
-import os
+import io
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -16,7 +16,7 @@ from denseface.capture.errors import CalibrationError, FrameError, UnreadableSou
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
 from denseface.capture.source import Source
 from denseface.capture.zipped_arrays import ArrayKind, read_arrays
-from denseface.files import replacing
+from denseface.files import write_whole
 
 __all__ = ["FolderSource", "FolderWriter", "NpzSource", "load_frame", "save_frame"]
 
@@ -32,12 +32,13 @@ _KINDS = {
     "depth_max_mm": ArrayKind("int64"),
     "sensor": ArrayKind("str"),
     "captured_at": ArrayKind("str"),
+    "source": ArrayKind("str"),
 }
 _COLOR = frozenset({"color", "color_timestamp_us"})
 """Keys that are absent, both, where the sensor has no colour camera."""
 _OPTIONAL = frozenset(_KINDS) - {"depth", "depth_timestamp_us", "calibration"}
 _MAX_LINE = 256
-"""Characters of `sensor` and of `captured_at`."""
+"""Characters of `sensor`, `captured_at` and `source`."""
 
 
 class NpzSource(Source):
@@ -169,7 +170,8 @@ def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> Rgb
                 _rounding(_text(path, arrays, "depth_rounding", DepthRounding.ROUND)),
                 int(arrays["depth_max_mm"]) if "depth_max_mm" in arrays else None),
             origin=FrameOrigin(_text(path, arrays, "sensor"), _text(path, arrays, "captured_at"),
-                               notes=notes),
+                               notes=notes,
+                               source=_text(path, arrays, "source", Path(path).name)),
         )
     except (FrameError, CalibrationError) as error:
         raise type(error)(f"{path}: {error} (calibration: {origin})") from error
@@ -201,16 +203,12 @@ def save_frame(
         arrays["depth_max_mm"] = np.int64(frame.depth_meaning.max_mm)
     if frame.color is not None:
         arrays |= {"color": frame.color, "color_timestamp_us": np.int64(frame.color_timestamp_us)}
-    for name, text in (("sensor", frame.origin.sensor), ("captured_at", frame.origin.captured_at)):
-        if text:
+    for name in ("sensor", "captured_at", "source"):
+        if text := getattr(frame.origin, name):
             arrays[name] = np.array(text[:_MAX_LINE])
-    with replacing(Path(path), mode) as file:
-        if quickly:
-            np.savez(file, allow_pickle=False, **arrays)
-            return
-        np.savez_compressed(file, allow_pickle=False, **arrays)
-        file.flush()
-        os.fsync(file.fileno())
+    data = io.BytesIO()
+    (np.savez if quickly else np.savez_compressed)(data, allow_pickle=False, **arrays)
+    write_whole(Path(path), [data.getbuffer()], mode=mode, synced=not quickly)
 
 
 def _rounding(text: str) -> DepthRounding:

@@ -8,14 +8,12 @@ import errno
 import os
 import secrets
 import stat
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
 
-__all__ = ["open_regular", "read_bounded", "replacing", "replacing_by_name"]
+__all__ = ["check_place", "make_folder", "open_regular", "read_bounded", "write_whole"]
 
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 """Fails where the name is taken, by whatever it is."""
@@ -57,47 +55,136 @@ def read_bounded(path: str | Path, max_bytes: int) -> bytes:
     return data
 
 
-@contextmanager
-def replacing(path: Path, mode: int | None = None) -> Iterator[BinaryIO]:
-    """Give a new file, which takes the place of `path` at the end of the block.
+def write_whole(
+    path: Path, chunks: Sequence[bytes | memoryview], *, mode: int | None = None,
+    synced: bool = True,
+) -> None:
+    """Write a file so that `path` has either its old contents or all of the new.
 
-    Where the block raises, nothing of it is left and `path` is as it was. Whether the file is
-    synced is left to the caller.
+    That all of it was taken is asked of the system: each write, the sync, the size and the closing
+    may say that it was not. Where one does, nothing of the new contents is left. Folders that are
+    missing are made, for those who may read the file.
 
     Parameters
     ----------
     mode : of the file, exactly; None for 666 less the umask
+    synced : wait until the contents are on the disk; the name may follow later
+
+    Raises
+    ------
+    OSError
+        As from the system, and it names `path`.
+    """
+    temporary = path.with_name(f".{secrets.token_hex(8)}.tmp")
+    try:
+        make_folder(path.absolute().parent, mode)
+        descriptor = os.open(temporary, _NEW, 0o666 if mode is None else mode)
+        try:
+            _fill(descriptor, chunks, mode, synced=synced)
+            temporary.replace(path)
+        except BaseException:
+            with suppress(OSError):
+                temporary.unlink()
+            raise
+    except OSError as error:
+        raise _named(error, path) from error
+
+
+def _fill(
+    descriptor: int, chunks: Sequence[bytes | memoryview], mode: int | None, *, synced: bool
+) -> None:
+    """Write all of a new file and close it; OSError where any of that is not so."""
+    size = 0
+    try:
+        if mode is not None:
+            with suppress(PermissionError):  # a file system without modes
+                os.fchmod(descriptor, mode)  # whatever the umask
+        for chunk in chunks:
+            rest = memoryview(chunk).cast("B")
+            size += len(rest)
+            while rest:
+                rest = rest[os.write(descriptor, rest):]
+        if synced:
+            os.fsync(descriptor)
+        _check_size(descriptor, size)
+    except BaseException:
+        with suppress(OSError):
+            os.close(descriptor)
+        raise
+    os.close(descriptor)  # where it fails, the descriptor is closed all the same
+
+
+def _check_size(descriptor: int, expected: int) -> None:
+    size = os.fstat(descriptor).st_size
+    if size != expected:
+        raise OSError(errno.EIO, f"Has {size} of {expected} bytes after they were written")
+
+
+def make_folder(folder: Path, mode: int | None = None) -> None:
+    """Make a folder, and those above it, where they are missing.
+
+    Parameters
+    ----------
+    mode : of the files that are to be in it: who may read these may enter it; None for 777 less the
+        umask
 
     Raises
     ------
     OSError
         As from the system.
     """
-    temporary = path.with_name(f".{secrets.token_hex(8)}.tmp")
-    descriptor = os.open(temporary, _NEW, 0o666 if mode is None else mode)
+    if folder.is_dir():
+        return
+    make_folder(folder.parent, mode)
     try:
-        with os.fdopen(descriptor, "wb") as file:
-            if mode is not None:
-                with suppress(PermissionError):  # a file system without modes
-                    os.fchmod(descriptor, mode)  # whatever the umask
-            yield file
-        temporary.replace(path)
-    except BaseException:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
-        raise
+        folder.mkdir(0o777 if mode is None else mode | (mode & 0o444) >> 2)
+    except FileExistsError:
+        if not folder.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, f"{folder} is no folder") from None
 
 
-@contextmanager
-def replacing_by_name(path: Path) -> Iterator[Path]:
-    """As `replacing`, for a library that makes its file itself: give the name for it.
+def check_place(path: Path, least_bytes: int = 0) -> None:
+    """Check that a file can be written, before there is anything to write; leaves nothing behind.
 
-    It is in a new folder that only this user may enter. The file is synced: a library may not have
-    been told that it could not be written.
+    Parameters
+    ----------
+    path : its folder may be missing: then it must be possible to make one
+    least_bytes : for which there must be room
+
+    Raises
+    ------
+    OSError
+        As from the system, and it names `path`.
     """
-    with tempfile.TemporaryDirectory(prefix=".", suffix=".tmp", dir=path.parent) as folder:
-        temporary = Path(folder) / f"file{path.suffix}"
-        yield temporary
-        with open_regular(temporary) as file:
-            os.fsync(file.fileno())
-        temporary.replace(path)
+    try:
+        folder = path.absolute().parent
+        while not os.path.lexists(folder):
+            folder = folder.parent
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        if not folder.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, f"{folder} is no folder")
+        temporary = folder / f".{secrets.token_hex(8)}.tmp"
+        descriptor = os.open(temporary, _NEW, 0o600)
+        try:
+            temporary.unlink()
+            _reserve(descriptor, least_bytes)
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        raise _named(error, path) from error
+
+
+def _reserve(descriptor: int, size: int) -> None:
+    """Take room for a file; OSError where there is none."""
+    try:
+        if size:
+            os.posix_fallocate(descriptor, 0, size)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.EOPNOTSUPP):  # not on this file system
+            raise
+
+
+def _named(error: OSError, path: Path) -> OSError:
+    """Give the same error of the file that was asked for, not of one with another name."""
+    return OSError(error.errno or errno.EIO, error.strerror or str(error), str(path))

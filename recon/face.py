@@ -187,7 +187,10 @@ class Report(_Model):
     sensor: str = ""
     """Identity of the sensor: serial number, USB port or URI."""
     captured_at: str = ""
-    """ISO 8601, UTC."""
+    """When the frame was exposed, ISO 8601, UTC; empty where that is not known."""
+    source: str = ""
+    """What the frame was read from: `NAME.oni#0` (file and number of the frame),
+    `openni2:SERIAL`."""
     exposed_after_press_ms: float | None = None
     """From the press's arrival at the sensor to the estimated exposure; None without a press."""
     exposure_known_by: str = ""

@@ -163,7 +163,7 @@ class FormatError(ServiceError, ValueError):
 
 
 class UsageError(ServiceError, ValueError):
-    """The command line asks for something that does not exist."""
+    """What is asked for does not exist, or is not to be had there."""
 
 
 def first_error(error: "ValidationError", *, found: bool = False) -> tuple[str, str]:

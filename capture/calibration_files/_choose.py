@@ -34,7 +34,7 @@ def choose_calibration(
     if isinstance(argument, Calibration):
         return ChosenCalibration(argument, "argument")
     if argument is not None:
-        return read_calibration(argument)._replace(origin=f"argument {argument}")
+        return read_calibration(argument)._replace(origin=f"argument {Path(argument).name}")
     beside = path and path.with_name(f"{path.stem}.calibration.json")
     if beside and beside.exists():
         return read_calibration(beside)._replace(origin=f"beside: {beside.name}")
@@ -88,8 +88,8 @@ def _of_one(path: str | Path, parse: Any, text: str) -> ChosenCalibration:
         raise CalibrationError(f"{path}: {error}") from error
     return ChosenCalibration(
         Calibration(depth=camera, color=camera), str(path),
-        (f"{path} describes one camera, which is taken for depth and colour alike: right where "
-         "the depth is registered to the colour",))
+        (f"{Path(path).name} describes one camera, which is taken for depth and colour alike: "
+         "right where the depth is registered to the colour",))
 
 
 def _with_five(camera: Any, name: str) -> Any:

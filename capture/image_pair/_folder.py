@@ -26,6 +26,7 @@ class FolderSource(PairSource):
         reading : what it says wins over what the layout says; `chosen` wins over its own
         """
         self.uri = str(folder)
+        self._name = Path(folder).absolute().name
         layout = recognised(Path(folder))
         own, chosen = layout.reading, chosen or reading.chosen
         self._pairs = layout.pairs
@@ -41,7 +42,9 @@ class FolderSource(PairSource):
 
     def frames_from(self, number: int) -> Iterator[RgbdFrame]:
         """Read the frames from a number on, from 0, without those before it."""
-        return (self.settled(read_pair(pair, self._reading)) for pair in self._pairs[number:])
+        for at, pair in enumerate(self._pairs[number:], number):
+            frame = read_pair(pair, self._reading).with_source(f"{self._name}#{at}")
+            yield self.settled(frame)
 
     def close(self) -> None:
         """Nothing is held open."""

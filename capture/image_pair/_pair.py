@@ -106,12 +106,14 @@ def read_pair(pair: ImagePair, reading: PairReading) -> RgbdFrame:
             raise FrameError(f"{pair.depth}: {error}") from error
         notes.append(f"the depth image does not say its unit: 1 is taken for {_length(unit_mm)}")
     depth, unit_um = counts_of(values, unit_mm)
+    source = " + ".join(path.name for path in (pair.depth, pair.color) if path)
     cameras = _cameras(pair, _size(depth), None if color is None else _size(color), reading)
     return RgbdFrame(
         depth, color, pair.depth_us, pair.color_us, cameras.calibration, cameras.registered,
         calibration_origin=cameras.origin,
         depth_meaning=DepthMeaning(unit_um=unit_um, rounding=reading.rounding),
-        origin=FrameOrigin(captured_at=pair.captured_at, notes=(*notes, *cameras.notes)))
+        origin=FrameOrigin(captured_at=pair.captured_at, notes=(*notes, *cameras.notes),
+                           source=source))
 
 
 class _Cameras(NamedTuple):

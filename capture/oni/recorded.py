@@ -91,8 +91,8 @@ class Recorded:
         rounding = self._described.depth_rounding if self._described else DepthRounding.CUT
         return replace(known, rounding=rounding)
 
-    def origin(self, depth_us: int) -> FrameOrigin:
-        """Give the origin of the frame whose depth has that stamp, shifted."""
+    def origin(self, depth_us: int, number: int) -> FrameOrigin:
+        """Give the origin of a frame by its depth's stamp, shifted, and its number, from 0."""
         captured_at = self._described.captured_at if self._described else ""
         if captured_at:
             first = self._first_us[DEPTH_NODE] + self.shift_us[DEPTH_NODE]
@@ -100,7 +100,7 @@ class Recorded:
             captured_at = (datetime.fromisoformat(captured_at) + after).isoformat(
                 timespec="milliseconds")
         return FrameOrigin(self._sensor, captured_at, skew_known_by=self._skew_known_by,
-                           notes=self.notes)
+                           notes=self.notes, source=f"{self.path.name}#{number}")
 
     @cached_property
     def notes(self) -> tuple[str, ...]:

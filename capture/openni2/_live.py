@@ -174,6 +174,7 @@ class LiveSource(OpenNI2Source):
         taken = datetime.now(UTC) - timedelta(seconds=time.monotonic() - middle_s)
         origin = FrameOrigin(
             sensor=self.identity, captured_at=taken.isoformat(timespec="milliseconds"),
+            source=f"openni2:{self.identity}",
             exposure_known_by=pair.exposure_known_by, skew_known_by=pair.skew_known_by,
             notes=pair.notes + ((doubt,) if doubt else ()))
         frame = self._make_frame(streams, streams.image(DEPTH, pair.depth.memory), color,

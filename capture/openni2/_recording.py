@@ -68,6 +68,7 @@ class RecordingSource(OpenNI2Source):
             streams = self._open()
         self._unread = False
         self._pairer.clear()
+        given = 0
         streams.start()
         left = dict(self._expected)
         while max(left.values()) > 0 and self._streams is streams:
@@ -85,7 +86,8 @@ class RecordingSource(OpenNI2Source):
                 # At the end the player's thread would busy-wait.
                 streams.stop()
             if pair := self._paired(kind, self._expected[kind] - left[kind], *image):
-                yield self._frame(pair)
+                yield self._frame(pair, given)
+                given += 1
 
     def _paired(
         self, kind: str, number: int, stamp_us: int, pixels: NDArray[Any]
@@ -119,12 +121,12 @@ class RecordingSource(OpenNI2Source):
             time.sleep(_SETTLE_S)
         super().close()
 
-    def _frame(self, pair: Pair[Any, Any]) -> RgbdFrame:
+    def _frame(self, pair: Pair[Any, Any], number: int) -> RgbdFrame:
         if self._streams is None:
             raise SensorError(f"{self._name}: is closed")
         return self._make_frame(self._streams, pair.depth, pair.color,
                                 (pair.depth_us, pair.color_us),
-                                self._recorded.origin(pair.depth_us))
+                                self._recorded.origin(pair.depth_us, number))
 
     def _meaning(self, streams: Streams) -> DepthMeaning:
         return self._recorded.meaning(super()._meaning(streams))

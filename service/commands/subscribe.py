@@ -5,13 +5,17 @@ from itertools import islice
 from pathlib import Path
 
 from denseface.service.commands import _options
-from denseface.service.runtime.terminal import say
+from denseface.service.export import FORMATS
+from denseface.service.runtime.terminal import complain, say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     _options.add_client(parser)
     parser.add_argument("--save", type=Path, metavar="DIR",
-                        help="write each face as DIR/ID.ply with its report, DIR/ID.json")
+                        help="write each face as DIR/ID.ply with its report, DIR/ID.json; the "
+                             "folder is made")
+    parser.add_argument("--format", action="append", choices=[one[1:] for one in FORMATS],
+                        help="of the files that --save writes; may be repeated (default: ply)")
     _options.add_mode(parser)
     parser.add_argument("--count", type=int, metavar="N", help="end after N captures")
     parser.add_argument("--sensor", metavar="NAME", help="with --hints: of this sensor alone")
@@ -31,24 +35,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from denseface.service.errors import UsageError
-    from denseface.service.tools.follow import changes, follow
+    from denseface.service.tools.follow import FaceFolder, changes, follow
 
     for name in ("count", "after", "last"):
         value = getattr(args, name)
         if value is not None and value < (name != "after"):
             raise UsageError(f"--{name} {value}: expected a number that is not negative, or zero")
-    if args.save and not args.save.is_dir():
-        raise UsageError(f"--save {args.save}: no such folder")
+    if args.format and not args.save:
+        raise UsageError("--format: expected with --save DIR, which writes the files")
     if args.hints and args.save:
         raise UsageError("--save: expected without --hints, which gives no faces")
     if args.sensor and not args.hints:
         raise UsageError("--sensor: expected with --hints; faces are of all sensors")
+    endings = [f".{one}" for one in dict.fromkeys(args.format or ["ply"])]
+    folder = FaceFolder(args.save, endings, args.mode) if args.save else None
+    lost = 0
     with _options.client(args) as client:
         if args.hints:
             for line in islice(changes(client.hints(sensor=args.sensor)), args.count):
                 say(line, flush=True)
             return 0
         published = client.published(after=args.after, last=args.last, since=args.since)
-        for line in islice(follow(published, args.save, args.mode), args.count):
-            say(line, flush=True)
-    return 0
+        for told in islice(follow(published, folder), args.count):
+            if told.lost:
+                lost += 1
+                complain(f"denseface subscribe: {told.line}")
+            else:
+                say(told.line, flush=True)
+    return 1 if lost else 0

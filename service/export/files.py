@@ -6,34 +6,50 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from denseface.files import check_place, write_whole
 from denseface.service.errors import StoreError, UsageError, reason_of
 from denseface.service.export.formats import check_ending, save_face
 
 if TYPE_CHECKING:
     from denseface.recon.face import Face
 
-__all__ = ["FaceFiles", "check_outputs"]
+__all__ = ["FaceFiles", "check_outputs", "save_report"]
+
+_LEAST_BYTES = 2**16
+"""For which there must be room: smaller than any face's file."""
 
 
 def check_outputs(*outputs: tuple[Path | None, str | None]) -> None:
-    """Check where files are to go, before there is anything to write.
+    """Check that files can be written, before there is anything to write.
 
     Parameters
     ----------
     outputs : each a path, or None where it is not asked for, and the ending that it must have, or
-        None for any
+        None for any; its folder may be missing, but there must be a place for it
 
     Raises
     ------
     UsageError
-        An ending is wrong or a folder does not exist.
+        An ending is wrong, or the place is in a hub's data folder.
+    StoreError
+        There may nothing be written, or there is no room.
     """
+    from denseface.service.runtime.files import check_outside_hub
+
     for path, ending in outputs:
         if path and ending and path.suffix.lower() != ending:
             raise UsageError(f"{path}: expected a name that ends in {ending}")
     for path, _ in outputs:
-        if path and not path.absolute().parent.is_dir():
-            raise UsageError(f"{path}: no such folder: {path.parent}")
+        if path:
+            check_outside_hub(path)
+            with _naming(path):
+                check_place(path, _LEAST_BYTES)
+
+
+def save_report(face: "Face", path: Path, *, mode: int | None = None) -> None:
+    """Write a face's report as JSON, as `save_face` writes the face; OSError likewise."""
+    text = face.report.model_dump_json(indent=2) + "\n"
+    write_whole(path, [text.encode()], mode=mode)
 
 
 @dataclass(frozen=True)
@@ -46,8 +62,8 @@ class FaceFiles:
     ------
     FormatError
         Where an ending is not known.
-    UsageError
-        Where an ending is wrong or a folder does not exist.
+    UsageError, StoreError
+        As `check_outputs`.
     """
 
     output: Path | None = None
@@ -75,20 +91,17 @@ class FaceFiles:
         StoreError
             Where a file cannot be written.
         """
-        from denseface.service.runtime.files import write_atomically
-
         if self.output:
             with _naming(self.output):
                 save_face(face, self.output, mode=self.mode)
         if self.report:
-            text = face.report.model_dump_json(indent=2) + "\n"
             with _naming(self.report):
-                write_atomically(self.report, [text.encode()], sync_name=False, mode=self.mode)
+                save_report(face, self.report, mode=self.mode)
         if self.rendering:
             from denseface.service.export.render import render
 
             with _naming(self.rendering):
-                write_atomically(self.rendering, [render(face)], sync_name=False, mode=self.mode)
+                write_whole(self.rendering, [render(face)], mode=self.mode)
 
 
 @contextmanager

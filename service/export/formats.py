@@ -19,19 +19,25 @@ __all__ = ["FORMATS", "check_ending", "face_bytes", "load_face", "save_face"]
 def save_face(face: "Face", path: str | Path, *, mode: int | None = None) -> None:
     """Write a face in the format that the path's ending names.
 
-    The file is either whole or not there. Its mode is `mode`, or 666 less the umask.
+    The file is either whole or not there, what was of that name before is left then; folders that
+    are missing are made. Its mode is `mode`, or 666 less the umask.
 
     Raises
     ------
     FormatError
         Where the ending is not known.
+    UsageError
+        Where the file would be in a hub's data folder.
     OSError
-        Where the file cannot be written.
+        Where the file cannot be written: it names the file.
     """
-    from denseface.service.runtime.files import write_atomically
+    from denseface.files import write_whole
+    from denseface.service.runtime.files import check_outside_hub
 
     path = Path(path)
-    write_atomically(path, [face_bytes(face, check_ending(path))], sync_name=False, mode=mode)
+    ending = check_ending(path)
+    check_outside_hub(path)
+    write_whole(path, [face_bytes(face, ending)], mode=mode)
 
 
 def face_bytes(face: "Face", ending: str) -> bytes:
@@ -82,5 +88,5 @@ FORMATS = {
 `.ply`, `.pcd`: the dense cloud, binary, mm, camera frame: x y z, nx ny nz (float), red green blue
 (uchar), sigma (float: standard error along the viewing ray). `.npz`: the whole face, read back by
 `load_face`. `.obj`, `.stl`: the dense mesh, mm, camera frame. `.glb`: the same as glTF 2.0: metres,
-y up.
+y up. Each says where the face comes from, as far as it can (`service.export.provenance`).
 """

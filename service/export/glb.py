@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from denseface.recon.face import Face
 from denseface.service.export.mesh import triangulate
+from denseface.service.export.provenance import provenance
 
 __all__ = ["to_glb"]
 
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 """Types of chunks, glTF 2.0, section 4.4.3."""
-_FLOAT, _USHORT, _UINT = 5126, 5123, 5125
+_FLOAT, _UINT = 5126, 5125
 """Component types, glTF 2.0, section 3.6.2.2."""
 _VERTICES, _INDICES = 34962, 34963
 """Targets of buffer views: ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER."""
@@ -31,9 +32,9 @@ def to_glb(face: Face) -> bytes:
     cloud = face.dense
     triangles = triangulate(cloud)
     positions = cloud.points * (_FLIP / np.float32(_MM_PER_M))
-    # 16 bits a channel: 8 are too coarse for linear light in the shadows.
-    colors = np.full((len(cloud), 4), 65535, "<u2")
-    colors[:, :3] = np.round(_linear(cloud.colors) * 65535)
+    # Not in 8 bits, too coarse for linear light in the shadows; nor in 16: MeshLab takes the lower
+    # byte of each for the colour.
+    colors = _linear(cloud.colors).astype("<f4")
     views: list[dict[str, Any]] = []
     arrays: list[bytes] = []
     for array, target in ((positions.astype("<f4"), _VERTICES),
@@ -42,9 +43,9 @@ def to_glb(face: Face) -> bytes:
         views.append({"buffer": 0, "byteOffset": sum(map(len, arrays)),
                       "byteLength": array.nbytes, "target": target})
         arrays.append(array.tobytes())
-    n = len(cloud)
+    n, told = len(cloud), provenance(face.report)
     document = {
-        "asset": {"version": "2.0", "generator": "denseface"},
+        "asset": {"version": "2.0", "generator": told.pop("generator"), "extras": told},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0, "name": "face"}],
@@ -56,8 +57,7 @@ def to_glb(face: Face) -> bytes:
             {"bufferView": 0, "componentType": _FLOAT, "count": n, "type": "VEC3",
              "min": positions.min(axis=0).tolist(), "max": positions.max(axis=0).tolist()},
             {"bufferView": 1, "componentType": _FLOAT, "count": n, "type": "VEC3"},
-            {"bufferView": 2, "componentType": _USHORT, "normalized": True, "count": n,
-             "type": "VEC4"},
+            {"bufferView": 2, "componentType": _FLOAT, "count": n, "type": "VEC3"},
             {"bufferView": 3, "componentType": _UINT, "count": triangles.size, "type": "SCALAR"},
         ],
         "bufferViews": views,

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.face import MAX_STEP, DenseCloud, Face
+from denseface.service.export.provenance import comments, stl_header
 
 __all__ = ["to_obj", "to_stl", "triangulate"]
 
@@ -50,6 +51,7 @@ def to_obj(face: Face) -> bytes:
     faces = np.repeat(triangulate(cloud) + 1, 2, axis=1)
     return "".join([
         f"# by denseface, mm: {len(cloud)} vertices\n",
+        *(f"# {line}\n" for line in comments(face.report)),
         _lines("v %.4f %.4f %.4f %.6g %.6g %.6g\n", vertices),
         _lines("vn %.6g %.6g %.6g\n", cloud.normals),
         _lines("f %d//%d %d//%d %d//%d\n", faces)]).encode()
@@ -65,7 +67,7 @@ def to_stl(face: Face) -> bytes:
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     table["normal"] = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
     table["corners"] = corners
-    return b"by denseface, mm".ljust(80, b"\0") + struct.pack("<I", len(table)) + table.tobytes()
+    return stl_header(face.report) + struct.pack("<I", len(table)) + table.tobytes()
 
 
 def _lines(line: str, rows: NDArray[np.floating | np.integer]) -> str:

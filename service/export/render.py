@@ -3,15 +3,18 @@
 Points are splatted into a z-buffer by NumPy and OpenCV: no window, no GPU.
 """
 
+import struct
+import zlib
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.face import DenseCloud, Face
+from denseface.recon.face import DenseCloud, Face, Report
 from denseface.service.export._lighting import shade
 from denseface.service.export.mesh import triangulate
+from denseface.service.export.provenance import provenance
 
 __all__ = ["portrait", "render"]
 
@@ -36,6 +39,8 @@ _SEED_SHARE = 0.75
 """Side of the square of a measured point, in mean spacings: the gaps between points show."""
 _SUBDIVISIONS = 2
 """Parts of each edge of a triangle; points are drawn where they meet."""
+_PNG_BEGINNING = 8 + 25
+"""Bytes of signature and IHDR, after which chunks of text may stand."""
 
 
 def render(face: Face) -> bytes:
@@ -62,7 +67,7 @@ def render(face: Face) -> bytes:
             left = _MARGIN + column * (_PANEL + _MARGIN)
             canvas[top:top + _PANEL, left:left + _PANEL] = _panel(pixels, shown[rows])
     _captions(canvas, titles, scale)
-    return _png(canvas)
+    return _png(canvas, face.report)
 
 
 def portrait(face: Face, side: int) -> bytes:
@@ -79,7 +84,7 @@ def portrait(face: Face, side: int) -> bytes:
     if scale * _OVERSAMPLING * dense.grid_step_mm > 1:  # else neighbours share a pixel
         points, colors, _ = _subdivided(dense)
     pixels, rows = _visible(points - center, scale, 0.0, dense.grid_step_mm, side)
-    return _png(_panel(pixels, colors[rows], side))
+    return _png(_panel(pixels, colors[rows], side), face.report)
 
 
 def _subdivided(
@@ -147,11 +152,21 @@ def _panel(
         image.reshape(size, size, 3), (panel, panel), interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _png(image: NDArray[np.uint8]) -> bytes:
+def _png(image: NDArray[np.uint8], report: Report) -> bytes:
+    """Give a PNG file that says where the face comes from, in a chunk of text for each fact."""
     encoded, png = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
     if not encoded:
         raise RuntimeError("OpenCV could not write the PNG")
-    return png.tobytes()
+    data = png.tobytes()
+    return data[:_PNG_BEGINNING] + b"".join(
+        _text_chunk(name, text) for name, text in provenance(report).items()
+    ) + data[_PNG_BEGINNING:]
+
+
+def _text_chunk(name: str, text: str) -> bytes:
+    """Give a text in UTF-8, of no language, not compressed (PNG, section 11.3.3.4)."""
+    chunk = b"iTXt" + name.encode() + bytes(5) + text.encode("utf-8", "replace")
+    return struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
 
 
 def _captions(canvas: NDArray[np.uint8], titles: tuple[str, ...], scale: float) -> None:

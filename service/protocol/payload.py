@@ -117,6 +117,7 @@ class FrameHeader(_PayloadHeader):
     depth_max_mm: Annotated[int, Field(ge=1)] | None = None
     sensor: _Line = ""
     captured_at: _Line = ""
+    source: _Line = ""
     exposed_after_press_ms: float | None = None
     exposure_known_by: _Line = ""
     skew_known_by: _Line = ""
@@ -142,7 +143,7 @@ class FrameHeader(_PayloadHeader):
             calibration_origin=frame.calibration_origin[:4096], has_color=frame.color is not None,
             depth_unit_um=meaning.unit_um, depth_rounding=meaning.rounding,
             depth_max_mm=meaning.max_mm, sensor=origin.sensor[:_MAX_LINE],
-            captured_at=origin.captured_at, fused=origin.fused,
+            captured_at=origin.captured_at, source=origin.source[:_MAX_LINE], fused=origin.fused,
             exposed_after_press_ms=origin.exposed_after_press_ms,
             exposure_known_by=origin.exposure_known_by, skew_known_by=origin.skew_known_by,
             notes=tuple(note[:_MAX_NOTE] for note in origin.notes[:32]))
@@ -162,7 +163,8 @@ class FrameHeader(_PayloadHeader):
                     self.depth_unit_um, self.depth_rounding, self.depth_max_mm),
                 origin=FrameOrigin(
                     self.sensor, self.captured_at, self.exposed_after_press_ms,
-                    self.exposure_known_by, self.skew_known_by, self.fused, self.notes))
+                    self.exposure_known_by, self.skew_known_by, self.fused, self.notes,
+                    self.source))
         except (CaptureError, KeyError) as error:
             raise RemoteProtocolError(f"frame: {error}") from error
 

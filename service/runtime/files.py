@@ -6,16 +6,18 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from denseface.files import open_regular, replacing
-from denseface.service.errors import KeyFileError, SettingsError, reason_of
+from denseface.files import open_regular, write_whole
+from denseface.service.errors import KeyFileError, SettingsError, UsageError, reason_of
 from denseface.service.runtime._direct_io import write_direct
 from denseface.service.runtime.failpoints import failpoint
 
-__all__ = ["check_unwritable", "private_folder", "read_private_text", "socket_folder",
-           "sync_folder", "write_atomically", "write_synced"]
+__all__ = ["check_outside_hub", "check_unwritable", "private_folder", "read_private_text",
+           "socket_folder", "sync_folder", "write_atomically", "write_synced"]
 
 _MAX_TEXT_BYTES = 4096
 """Of a private text; longer than any key file."""
+_OF_A_HUB = "frames", "faces", "quarantine", "lock"
+"""What every data folder has in it."""
 _OTHERS = 0o077
 """Mode bits that a folder for this user alone may not have."""
 _WRITABLE = 0o022
@@ -26,7 +28,7 @@ def write_atomically(
     path: Path, chunks: Sequence[bytes | memoryview], *, sync_name: bool = True,
     mode: int | None = None,
 ) -> None:
-    """Write a file so that `path` always has either its old contents or all of the new, synced.
+    """Write a file as `write_whole` does, synced.
 
     Parameters
     ----------
@@ -36,13 +38,9 @@ def write_atomically(
     Raises
     ------
     OSError
-        As from the system. The old contents, or all of the new, are left.
+        As from the system, and it names `path`. The old contents, or all of the new, are left.
     """
-    with replacing(path, mode) as file:
-        for chunk in chunks:
-            file.write(chunk)
-        file.flush()
-        os.fsync(file.fileno())
+    write_whole(path, chunks, mode=mode)
     if sync_name:
         sync_folder(path.parent)
 
@@ -86,6 +84,24 @@ def sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def check_outside_hub(path: Path) -> None:
+    """Check that a file for a user is not to be written into a hub's data folder.
+
+    Nothing would ever remove it from there: the hub leaves alone what is not its own.
+
+    Raises
+    ------
+    UsageError
+        It is.
+    """
+    for folder in path.resolve().parents:
+        with suppress(OSError):
+            if all((folder / name).exists() for name in _OF_A_HUB):
+                raise UsageError(
+                    f"{path}: {folder} is a hub's data folder, and what others put there is never "
+                    "removed, whatever the retention: name a file in another folder")
 
 
 def private_folder(path: Path) -> Path:

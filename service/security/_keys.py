@@ -6,6 +6,7 @@
 
 import re
 import struct
+from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -98,7 +99,12 @@ def new_pair(folder: Path, name: str) -> tuple[Path, Path]:
             raise KeyFileError(f"{path}: exists; remove it or choose another name")
     pair = KeyPair.generate()
     write_key_file(secret, _File(name=name, public_key=pair.public, secret_key=pair.secret))
-    write_key_file(public, _File(name=name, public_key=pair.public))
+    try:
+        write_key_file(public, _File(name=name, public_key=pair.public))
+    except BaseException:
+        with suppress(OSError):
+            secret.unlink()  # else the name would be in use
+        raise
     return secret, public
 
 

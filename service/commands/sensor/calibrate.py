@@ -126,7 +126,6 @@ def _write(path: Path, data: bytes) -> None:
     from denseface.service.runtime.files import write_atomically
 
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, [data], sync_name=False)
     except OSError as error:
         raise StoreError(f"{path}: {reason_of(error)}") from error

@@ -58,7 +58,8 @@ def test_what_is_saved_is_loaded(tmp_path, depth, color, stamps, registered, pos
 def test_what_a_depth_means_and_where_it_comes_from_is_kept(tmp_path):
     meaning = DepthMeaning(100, DepthRounding.NONE, 4000)
     frame = RgbdFrame(good()["depth"], None, 5, 5, CALIBRATION, depth_meaning=meaning,
-                      origin=FrameOrigin("B00366600000000A", "2026-11-29T12:00:00Z"))
+                      origin=FrameOrigin("B00366600000000A", "2026-11-29T12:00:00Z",
+                                         source="take.oni#3"))
     save_frame(frame, tmp_path / "f.npz")
     loaded = load_frame(tmp_path / "f.npz")
     assert loaded.color is None

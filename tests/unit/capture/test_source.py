@@ -38,8 +38,8 @@ def test_precedence_of_calibrations(saved):
     assert opened(saved) == (102, "beside: take.1.calibration.json")
     argument = saved.with_name("mine.json")
     argument.write_text(ARGUMENT.to_json())
-    assert opened(saved, argument) == (101, f"argument {argument}")
-    assert opened(str(saved), str(argument)) == (101, f"argument {argument}")
+    assert opened(saved, argument) == (101, "argument mine.json")
+    assert opened(str(saved), str(argument)) == (101, "argument mine.json")
     assert opened(saved, ARGUMENT) == (101, "argument")
 
 

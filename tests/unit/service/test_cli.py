@@ -55,7 +55,8 @@ def outcome(capfd, *arguments):
     (["reconstruct", "{tmp}/room.npz", "--frame", "1"], "1 frames (0 to 0), --frame asks for 1"),
     (["reconstruct", "{tmp}/room.npz", "--frame", "-1"], "--frame asks for -1"),
     (["reconstruct", "{tmp}/room.npz", "-o", "face.xyz"], ".ply .pcd .npz .obj .glb .stl"),
-    (["reconstruct", "{tmp}/room.npz", "-o", "{tmp}/none/face.ply"], "no such folder"),
+    (["reconstruct", "{tmp}/room.npz", "-o", "{tmp}/hub/faces/face.ply"], "a hub's data folder"),
+    (["reconstruct", "{tmp}/room.npz", "--report", "{tmp}/hub/r.json"], "a hub's data folder"),
     (["reconstruct", "{tmp}/room.npz", "--report", "r.txt"], "ends in .json"),
     (["reconstruct", "{tmp}/room.npz", "--preview", "p.jpg"], "ends in .png"),
     (["reconstruct", "{tmp}/room.npz", "--preset", "fast"], "--preset: "),
@@ -97,7 +98,10 @@ def outcome(capfd, *arguments):
      "--calibration: 1 given for 2 sources"),
     (["up", "--source", "a.oni", *2 * ("--rotate", "90")], "--rotate: 2 given for 1 sources"),
     (["up", "--rotate", "45"], "--rotate: expected 0, 90, 180 or 270, found '45'"),
-    (["subscribe", "--save", "{tmp}/none"], "no such folder"),
+    (["press", "--save", "{tmp}/hub/face.ply"], "never removed, whatever the retention: name a"),
+    (["subscribe", "--save", "{tmp}/hub/faces"], "a hub's data folder"),
+    (["subscribe", "--format", "glb"], "--format: expected with --save"),
+    (["subscribe", "--save", "{tmp}", "--format", "xyz"], "invalid choice: 'xyz'"),
     (["press", "--mode", "688"], "'688': expected three octal digits"),
     (["subscribe", "--mode", "040"], "'040': expected three octal digits"),
     (["subscribe", "--count", "0"], "--count 0"),
@@ -122,6 +126,8 @@ def outcome(capfd, *arguments):
 def test_wrong_usage_is_one_line_and_status_2(room, capfd, arguments, message):
     for name in ("garbage.npz", "garbage.oni", "garbage.xyz"):
         (room.parent / name).write_bytes(b"garbage" * 100)
+    for name in ("frames", "faces", "quarantine", "lock"):
+        (room.parent / "hub" / name).mkdir(parents=True)
     status, text = outcome(capfd, *[one.replace("{tmp}", str(room.parent)) for one in arguments])
     assert (status, len(text.splitlines())) == (2, 1)
     assert message in text

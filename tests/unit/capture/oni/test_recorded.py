@@ -21,7 +21,8 @@ def test_nothing_is_changed_about_a_good_recording(path):
     assert not recorded.in_pairs
     assert recorded.calibration is None
     assert recorded.meaning(DepthMeaning()) == DepthMeaning(1000, DepthRounding.CUT)
-    assert recorded.origin(0) == FrameOrigin(skew_known_by="record order")
+    assert recorded.origin(0, 2) == FrameOrigin(
+        skew_known_by="record order", source=f"{path.name}#2")
 
 
 def test_a_real_kinect():
@@ -33,7 +34,8 @@ def test_a_real_kinect():
     recorded = Recorded(path)
     assert (recorded.pairs, recorded.notes) == (12, ())
     assert recorded.shift_us == {DEPTH_NODE: 0, IMAGE_NODE: 0}
-    assert recorded.origin(0) == FrameOrigin("SensorKinect", skew_known_by="stamps")
+    assert recorded.origin(0, 0) == FrameOrigin(
+        "SensorKinect", skew_known_by="stamps", source="kinect_v1_room_no_face.oni#0")
 
 
 @pytest.mark.parametrize(("node", "other"), [(1, IMAGE_NODE), (2, DEPTH_NODE)])

@@ -94,8 +94,9 @@ def test_what_the_frames_mean_is_kept(writer):
         frames.calibration(), "recording: unspecified")
     assert recorded.meaning(DepthMeaning()) == DepthMeaning(1000, DepthRounding.CUT)
     assert recorded.shift_us == {DEPTH_NODE: 0, IMAGE_NODE: 0}
-    assert recorded.origin(DEPTH_US + PERIOD_US) == FrameOrigin(
-        "A00365", "2026-11-29T12:00:00.033+00:00", skew_known_by="stamps")
+    assert recorded.origin(DEPTH_US + PERIOD_US, 1) == FrameOrigin(
+        "A00365", "2026-11-29T12:00:00.033+00:00", skew_known_by="stamps",
+        source=f"{writer.path.name}#1")
 
 
 @pytest.mark.parametrize("skew_us", [25_000, -40_000, 900_000])
@@ -124,7 +125,7 @@ def test_a_sensor_without_color(writer):
     writer.close()
     recorded = Recorded(writer.path)
     assert (recorded.color, recorded.pairs) == (None, 1)
-    assert recorded.origin(DEPTH_US).skew_known_by == ""
+    assert recorded.origin(DEPTH_US, 0).skew_known_by == ""
 
 
 def test_no_frame_leaves_no_file(writer):

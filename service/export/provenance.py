@@ -1,0 +1,54 @@
+"""Where a face comes from, as its files say it: short texts, in each format as it can have them."""
+
+from denseface.recon.face import Report
+
+__all__ = ["comments", "provenance", "stl_header"]
+
+_MAX_COMMENT = 400
+"""Characters of a value in a comment: readers of PLY take lines of up to 1023 (rply), 512 (VCG)."""
+_STL_HEADER_BYTES = 80
+
+
+def provenance(report: Report) -> dict[str, str]:
+    """Give what is known of a face's making, in the order in which files tell it.
+
+    Of `generator` (this program and its version), `capture_id`, `captured_at` (ISO 8601, UTC),
+    `sensor`, `source` (file and number of the frame, or sensor), `calibration` (which one was used)
+    and `settings` (of the reconstruction, JSON). No folder of the machine is named.
+    """
+    told = {
+        "generator": f"denseface {report.version}",
+        "capture_id": report.capture_id,
+        "captured_at": report.captured_at,
+        "sensor": report.sensor,
+        "source": report.source,
+        "calibration": report.calibration,
+        "settings": report.settings.model_dump_json(),
+    }
+    return {name: text for name, text in told.items() if text}
+
+
+def comments(report: Report) -> list[str]:
+    """Give `provenance` as lines of ASCII, `NAME VALUE`, that a file's header can have."""
+    # A line that ends in a backslash would go on in the next one, in an OBJ.
+    return [f"{name} {_ascii(text)[:_MAX_COMMENT]}".rstrip("\\ ")
+            for name, text in provenance(report).items()]
+
+
+def stl_header(report: Report) -> bytes:
+    """Give the 80 bytes at the start of a binary STL: unit, and as much of the rest as they take.
+
+    It never begins with `solid`, by which readers know an STL that is text.
+    """
+    header = "by denseface, mm"
+    told = provenance(report)
+    for name in ("captured_at", "source", "sensor", "capture_id"):
+        if name in told and len(longer := f"{header}; {_ascii(told[name])}") <= _STL_HEADER_BYTES:
+            header = longer
+    return header.encode().ljust(_STL_HEADER_BYTES, b"\0")
+
+
+def _ascii(text: str) -> str:
+    """Give a line of printable ASCII; other characters as Python escapes them."""
+    line = "".join(one if one.isprintable() else " " for one in text)
+    return line.encode("ascii", "backslashreplace").decode()
