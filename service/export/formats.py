@@ -26,7 +26,7 @@ def save_face(face: "Face", path: str | Path, *, mode: int | None = None) -> Non
     ------
     FormatError
         Where the ending is not known.
-    UsageError
+    ServiceError
         Where the file would be in a hub's data folder.
     OSError
         Where the file cannot be written: it names the file.
