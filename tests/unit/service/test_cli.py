@@ -101,7 +101,7 @@ def outcome(capfd, *arguments):
     (["press", "--save", "{tmp}/hub/face.ply"], "never removed, whatever the retention: name a"),
     (["subscribe", "--save", "{tmp}/hub/faces"], "a hub's data folder"),
     (["subscribe", "--format", "glb"], "--format: expected with --save"),
-    (["subscribe", "--save", "{tmp}", "--format", "xyz"], "invalid choice: 'xyz'"),
+    (["subscribe", "--save", "{tmp}", "--format", "xyz"], "--format: expected "),
     (["press", "--mode", "688"], "'688': expected three octal digits"),
     (["subscribe", "--mode", "040"], "'040': expected three octal digits"),
     (["subscribe", "--count", "0"], "--count 0"),
