@@ -21,6 +21,11 @@ _HEIGHT = ("image_height", "image_Height", "height")
 _STEREO = ("M1", "K1", "camera_matrix_1", "cameraMatrix1")
 _MODELS = ("", "plumb_bob", "rational_polynomial", "radtan", "brown_conrady")
 """Distortion models that OpenCV's coefficients stand for."""
+_FISHEYE = "fisheye_model"
+"""OpenCV's calibration program says so of its four coefficients, which stand for others then."""
+_POSE = ("T", "translation", "T_cn_cnm1")
+"""Names of a translation to another camera. R alone rectifies one."""
+_HEAD_LINES = 2
 _MATRIX_NUMBERS = 9
 _MOST_NUMBERS = 64
 """Of a list that is read; a matrix of 4 x 4 has 16."""
@@ -41,7 +46,7 @@ def parse_storage(text: str) -> Fields:
 
     text = text.lstrip()
     if not text.startswith(("%YAML", "<?xml")):
-        text = f"%YAML:1.0\n---\n{text}"  # ROS leaves out what OpenCV knows YAML by
+        text = _as_opencv_has_it(text)
     log = cv2.utils.logging
     before = log.setLogLevel(log.LOG_LEVEL_SILENT)
     try:
@@ -53,6 +58,27 @@ def parse_storage(text: str) -> Fields:
                                "XML") from error
     finally:
         log.setLogLevel(before)
+
+
+def _as_opencv_has_it(text: str) -> str:
+    """Give YAML of others in the part of YAML that OpenCV reads.
+
+    It knows YAML by its first line, one document, and lists whose dashes stand farther right than
+    their name: PyYAML and `ros2 topic echo` put them below it.
+    """
+    lines, name_at = ["%YAML:1.0", "---"], -1
+    for line in text.splitlines():
+        bare = line.strip()
+        if bare in ("---", "..."):
+            if len(lines) > _HEAD_LINES:
+                break  # `topic echo` goes on with the next message
+            continue
+        at = len(line) - len(line.lstrip())
+        is_item = bare == "-" or bare.startswith("- ")
+        lines.append(f"  {line}" if is_item and at == name_at else line)
+        if bare and not is_item and not bare.startswith("#"):
+            name_at = at if bare.endswith(":") else -1
+    return "\n".join([*lines, ""])
 
 
 def one_camera(fields: Fields) -> CameraModel:
@@ -68,6 +94,10 @@ def one_camera(fields: Fields) -> CameraModel:
         raise CalibrationError(f"has two cameras ({stereo} and the other) and not which is the "
                                "depth camera; expected depth, color and depth_to_color in JSON")
     matrix_name = _required(fields, _MATRIX)
+    pose = _named(fields, _POSE)
+    if pose:
+        raise CalibrationError(f"has a pose ({pose}) and one camera ({matrix_name}); expected "
+                               "depth, color and depth_to_color in JSON")
     matrix = _numbers(fields[matrix_name], matrix_name)
     if len(matrix) != _MATRIX_NUMBERS:
         raise CalibrationError(f"{matrix_name} has {len(matrix)} numbers, expected 9")
@@ -76,7 +106,7 @@ def one_camera(fields: Fields) -> CameraModel:
     fx, skew, cx, zero, fy, cy, *last = matrix
     if skew or zero or last != [0, 0, 1]:
         raise CalibrationError(f"{matrix_name} is {matrix}, expected fx 0 cx, 0 fy cy, 0 0 1")
-    model = str(fields.get("distortion_model") or "").lower()
+    model = "fisheye" if fields.get(_FISHEYE) else str(fields.get("distortion_model") or "").lower()
     if model not in _MODELS:
         raise CalibrationError(f"distortion_model is {model!r}, expected plumb_bob or "
                                "rational_polynomial")

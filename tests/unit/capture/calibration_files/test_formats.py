@@ -53,7 +53,47 @@ def opencv(kind, coefficients=FIVE, **more):
     return storage.releaseAndGetString()
 
 
+# As PyYAML's safe_dump writes a camera_info of ROS, and as `ros2 topic echo` prints the message.
+PYYAML = f"""\
+camera_matrix:
+  cols: 3
+  data:
+  - 526.7
+  - 0.0
+  - 312.3
+  - 0.0
+  - 525.8
+  - 246.2
+  - 0.0
+  - 0.0
+  - 1.0
+  rows: 3
+distortion_coefficients:
+  cols: 5
+  data: {list(FIVE)}
+  rows: 1
+distortion_model: plumb_bob
+image_height: 480
+image_width: 640
+"""
+ECHO = f"""\
+header:
+  stamp:
+    sec: 1
+  frame_id: x
+height: 480
+width: 640
+distortion_model: plumb_bob
+d:
+{"".join(f"- {value}" + chr(10) for value in FIVE)}k:
+{"".join(f"- {value}" + chr(10) for value in K.ravel())}roi:
+  do_rectify: false
+---
+"""
+
+
 @pytest.mark.parametrize("text", [
+    PYYAML, f"---\n# ours\n{PYYAML}...\n", ECHO, ECHO + ECHO, f"{ECHO}height: 1\n",
     ROS, f"\n# ours\n{ROS}", opencv("yml"), opencv("xml"), opencv("json")])
 def test_one_camera_of_other_programs(tmp_path, text):
     (tmp_path / "camera.yaml").write_text(text)
@@ -120,6 +160,9 @@ def test_eight_coefficients_are_replaced_by_the_closest_five(tmp_path, eight):
     (opencv("yml", (*FIVE, 0, 0, 0, 0.01, 0, 0, 0)), "thin prism"),
     (opencv("yml", (-3.0, 40, 0, 0, 0, 8, 1, 0)), "8 coefficients"),
     (opencv("yml", FIVE, distortion_model="equidistant"), "'equidistant', expected plumb_bob"),
+    (opencv("yml", FIVE[:4], fisheye_model=1), "'fisheye', expected plumb_bob"),
+    (opencv("yml", FIVE, R=np.eye(3), T=np.zeros((3, 1))), "has a pose (T) and one camera"),
+    ("cam0:\n  intrinsics: [1.0]\n", "camera_matrix is missing, found cam0"),
     (opencv("yml", FIVE, camera_matrix=np.eye(4)), "camera_matrix has 16 numbers, expected 9"),
     (opencv("yml", FIVE, camera_matrix=np.ones((3, 3))), "expected fx 0 cx, 0 fy cy, 0 0 1"),
     (opencv("yml", FIVE, camera_matrix=K / 1000 + np.diag([0, 0, 0.999])), "fx is 0.5267 pixels"),
