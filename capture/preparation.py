@@ -86,7 +86,8 @@ class FramePreparation:
             strict, self._strict = self._strict, False
             now = self._measure(frame)
             if now.verdict is Verdict.REFUSED and strict and self._is_sure:
-                raise MismatchedFrameError(now.note)
+                # What was odd before may be why.
+                raise MismatchedFrameError("; ".join((now.note, *frame.origin.notes)))
             if now.verdict in (Verdict.DOUBTFUL, Verdict.REFUSED):
                 notes.append(now.note)
         notes += [note for note in (self._found.lasting_note,) if note and note not in notes]

@@ -113,6 +113,14 @@ def test_what_nothing_fits_is_refused_where_that_is_asked_for(monkeypatch):
     assert notes(prepared) == [()]
 
 
+def test_a_refusal_says_what_was_odd_about_the_frame(monkeypatch):
+    monkeypatch.setattr(preparation, "measure_agreement", lambda _: REFUSED)
+    prepared = FramePreparation(clock=lambda: 0.0)
+    prepared.look_closely(refuse=True)
+    with pytest.raises(MismatchedFrameError, match="^nothing fits; the calibration has no pose$"):
+        prepared.of(FRAME.with_note("the calibration has no pose"))
+
+
 def test_one_frame_of_a_source_that_agreed_is_not_refused_and_a_second_is(monkeypatch):
     """Somebody who moves, or a curtain, is no reason to send a person away."""
     measured = Measured(monkeypatch, AGREES, REFUSED, AGREES, REFUSED)
