@@ -117,7 +117,7 @@ def test_a_refusal_says_what_was_odd_about_the_frame(monkeypatch):
     monkeypatch.setattr(preparation, "measure_agreement", lambda _: REFUSED)
     prepared = FramePreparation(clock=lambda: 0.0)
     prepared.look_closely(refuse=True)
-    with pytest.raises(MismatchedFrameError, match="^nothing fits; the calibration has no pose$"):
+    with pytest.raises(MismatchedFrameError, match=r"^nothing fits; the calibration has no pose$"):
         prepared.of(FRAME.with_note("the calibration has no pose"))
 
 
