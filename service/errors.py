@@ -34,12 +34,15 @@ class LocalProtocolError(ProtocolError):
 
 
 class RemoteProtocolError(ProtocolError):
-    """The other side sent something that is no message: drop it, do not answer it.
+    """The other side sent something that is no message: drop it.
 
     Attributes
     ----------
     reason : `malformed`, `oversized`, `truncated` or `version`
+    request : number of the request that it would have answered; None where that is not known
     """
+
+    request: int | None = None
 
     def __init__(self, message: str, reason: str = "malformed") -> None:
         super().__init__(message)

@@ -12,6 +12,7 @@ from denseface.service.errors import (
     ClientClosedError,
     ClientForkedError,
     ClientTimeoutError,
+    RemoteProtocolError,
     RequestFailedError,
 )
 from denseface.service.protocol.messages import RequestFailed
@@ -97,6 +98,10 @@ class BaseClient:
         if isinstance(answer.message, RequestFailed):
             raise RequestFailedError(f"{self.address}: {answer.message.message}")
         return answer
+
+    def _unreadable(self, error: RemoteProtocolError) -> RemoteProtocolError:
+        return RemoteProtocolError(
+            f"{self.address}: the hub's answer cannot be read: {error}", error.reason)
 
     @staticmethod
     def _nothing_published(subscription: Subscription) -> ClientTimeoutError:

@@ -28,7 +28,7 @@ from denseface.service.client.events import (
 from denseface.service.client.exchanges import Exchange, SendRequest, Step, deadline
 from denseface.service.client.follower import TOPICS, Follower
 from denseface.service.client.statuses import LOOK_S, StatusWatch
-from denseface.service.errors import ClientClosedError, ClientTimeoutError, ProtocolError
+from denseface.service.errors import ClientClosedError, ClientTimeoutError, RemoteProtocolError
 from denseface.service.protocol.message_base import BaseRequest
 from denseface.service.protocol.messages import Status
 from denseface.service.protocol.sensor_messages import DEFAULT_GATE_S, Gate
@@ -235,7 +235,10 @@ class AsyncClient(BaseClient):
                 packet = receive_packet(self._socket, zmq.DONTWAIT)
             except zmq.Again:
                 return
-            except ProtocolError:
+            except RemoteProtocolError as error:
+                answer = self._pending.get(error.request) if error.request is not None else None
+                if answer is not None and not answer.done():
+                    answer.set_exception(self._unreadable(error))
                 continue
             answer = self._pending.get(getattr(packet.message, "request", 0))
             if answer is not None and not answer.done():

@@ -25,7 +25,7 @@ from denseface.service.client.events import (
 from denseface.service.client.exchanges import Exchange, SendRequest, Step, deadline
 from denseface.service.client.follower import TOPICS, Follower
 from denseface.service.client.statuses import LOOK_S, StatusWatch
-from denseface.service.errors import ClientTimeoutError, ProtocolError
+from denseface.service.errors import ClientTimeoutError, RemoteProtocolError
 from denseface.service.protocol.message_base import BaseRequest
 from denseface.service.protocol.messages import Status
 from denseface.service.protocol.sensor_messages import DEFAULT_GATE_S, Gate
@@ -51,9 +51,11 @@ class Client(Closing, BaseClient):
     on_waiting : is given one line, once, where there is no connection for a second: that the hub is
         waited for, and why it is not there
 
-    Every call raises `KeyRefusedError` where the hub refuses this key, and `ClientTimeoutError`
-    where nothing came in `timeout` seconds. In a process that was forked after the client was made
-    every call but `close` raises `ClientForkedError`.
+    Every call raises `KeyRefusedError` where the hub refuses this key, `ClientTimeoutError` where
+    nothing came in `timeout` seconds, `RequestFailedError` where the hub cannot answer or does not
+    understand, and `RemoteProtocolError` where its answer cannot be read, as of another release. In
+    a process that was forked after the client was made every call but `close` raises
+    `ClientForkedError`.
 
     Raises
     ------
@@ -298,7 +300,9 @@ class Client(Closing, BaseClient):
                 return None
             try:
                 packet = receive_packet(self._socket)
-            except ProtocolError:
+            except RemoteProtocolError as error:
+                if error.request == request:
+                    raise self._unreadable(error) from error
                 continue
             if getattr(packet.message, "request", None) == request:
                 return packet

@@ -3,7 +3,7 @@
 import math
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass
 from typing import Any
@@ -22,7 +22,7 @@ from denseface.service.protocol.message_base import BaseMessage
 from denseface.service.protocol.outgoing import Output, Publish, send, steps
 from denseface.service.protocol.status import Restarts
 from denseface.service.protocol.topics import Topic
-from denseface.service.protocol.wire import Buffer, Packet, decode_to_hub, encode
+from denseface.service.protocol.wire import Buffer, Packet, encode
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.supervisor_link import SupervisorLink
@@ -69,8 +69,9 @@ def run(settings: ServiceSettings, recon: Settings,
             if store := before.wait(stop):
                 hub = Hub(store, settings, recon, observer.figures, rejections, writer,
                           time.monotonic())
-                _EventLoop(listeners, hub, rejections, observer, writer, supervisor).serve(
-                    stop, before.waiting())
+                _EventLoop(
+                    listeners, hub, rejections, observer, writer, supervisor, before.refuse
+                ).serve(stop, before.waiting())
         _log.info("stopped")
         return stop.exit_status
 
@@ -99,6 +100,8 @@ class _EventLoop:
     observer: Observer
     writer: WriterThreads
     supervisor: SupervisorLink
+    refuse: Callable[[Incoming, RemoteProtocolError], None]
+    """Tells the sender of a malformed message what is wrong with it."""
 
     def serve(self, stop: StopSignal, waiting: Sequence[Incoming]) -> None:
         """Serve until told to stop, first what has come before there was a hub."""
@@ -145,18 +148,18 @@ class _EventLoop:
                 self._send_all(self.hub.unreachable(peer, "its key or its roles changed"))
 
     def _receive(self, incoming: Incoming) -> None:
-        who = {"key": incoming.sender.name, "address": incoming.address}
         try:
-            packet = decode_to_hub(incoming.parts)
+            packet = incoming.packet()
         except RemoteProtocolError as error:
-            self.rejections.note(error.reason, **who, detail=str(error))
+            self.refuse(incoming, error)
             return
         message, sender = packet.message, incoming.sender
         own = (incoming.key != "" and isinstance(message, OF_ITS_OWN)
                and self.hub.pressed_by(message.capture_id) == incoming.key)
         missing = missing_role(sender.roles, message, own=own)
         if missing:
-            self.rejections.note("role", **who, detail=missing)
+            self.rejections.note(
+                "role", key=sender.name, address=incoming.address, detail=missing)
             self._send_all([_denied(incoming, message, missing)])
             return
         self._send_all(self.hub.receive(

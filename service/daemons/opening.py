@@ -8,11 +8,12 @@ import structlog
 from denseface.service.errors import RemoteProtocolError
 from denseface.service.monitoring import Rejections
 from denseface.service.protocol import messages
-from denseface.service.protocol.wire import Packet, decode_to_hub, encode
+from denseface.service.protocol.wire import Packet, encode
 from denseface.service.runtime.bounded_dict import BoundedDict
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.supervisor_link import SupervisorLink
 from denseface.service.security.permissions import missing_role
+from denseface.service.security.refusals import Refusals
 from denseface.service.storage import FolderStore, OpeningStore
 from denseface.service.transport.listener import Incoming
 from denseface.service.transport.listeners import Listeners
@@ -44,6 +45,7 @@ class Opening:
         self._progress = opening.progress
         self._rejections = rejections
         self._supervisor = supervisor
+        self._refusals = Refusals()
         self._waiting: BoundedDict[tuple[bytes, str, object], Incoming] = BoundedDict(_MAX_WAITING)
         """By peer, kind and request: the last of what is said again and again."""
 
@@ -73,12 +75,19 @@ class Opening:
         """Give what was said meanwhile by peers that may still say it."""
         return [one for one in self._waiting.values() if self._listeners.is_allowed(one.peer)]
 
+    def refuse(self, incoming: Incoming, error: RemoteProtocolError) -> None:
+        """Count a malformed message and tell its sender what is wrong with it."""
+        self._rejections.note(error.reason, key=incoming.sender.name, address=incoming.address,
+                              detail=str(error))
+        if answer := self._refusals.answer(
+                incoming.key or incoming.peer, incoming.parts, error):
+            self._listeners.send(incoming.peer, encode(Packet(answer)))
+
     def _receive(self, incoming: Incoming) -> None:
         try:
-            packet = decode_to_hub(incoming.parts)
+            packet = incoming.packet()
         except RemoteProtocolError as error:
-            self._rejections.note(error.reason, key=incoming.sender.name, address=incoming.address,
-                                  detail=str(error))
+            self.refuse(incoming, error)
             return
         message = packet.message
         if isinstance(message, messages.GetStatus) and not missing_role(

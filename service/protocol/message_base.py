@@ -27,6 +27,8 @@ Number = Annotated[int, Field(ge=0, lt=2**63)]
 """A count or a number in a sequence; SQLite and other languages have it in 64 bits."""
 Seconds = Annotated[float, Field(ge=0, le=3600)]
 """How long a request may wait."""
+VERSION: Literal[2] = 2
+"""Of the messages; a message of another one is refused."""
 MAX_JOBS = 2
 """Jobs that a worker has at once: the one under way and the one that follows it."""
 
@@ -50,7 +52,7 @@ class BaseMessage(BaseModel):
     newer: ClassVar[frozenset[str]] = frozenset()
     """Fields that an older release refuses: not written where they say what they did not yet."""
 
-    version: Literal[2] = 2
+    version: Literal[2] = VERSION
     if TYPE_CHECKING:  # a field of each kind, behind those that it inherits
         kind: str
 

@@ -163,7 +163,7 @@ class CaptureUnknown(BaseAnswer):
 
 
 class RequestFailed(BaseAnswer):
-    """The hub could not answer."""
+    """The hub could not answer, or the request is malformed; 0 where its number is unreadable."""
 
     kind: Literal["request_failed"] = "request_failed"
     message: Text
@@ -373,7 +373,7 @@ class Announce(FromHub):
 
 
 class Denied(FromHub):
-    """The key has not the role for the message, which was no request."""
+    """The key has not the role for the message, or it is malformed; it was no request."""
 
     kind: Literal["denied"] = "denied"
     message: Text

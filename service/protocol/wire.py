@@ -6,15 +6,17 @@ describes the format.
 """
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Annotated, Any, TypeVar, Union
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError
+from pydantic_core import from_json
 
-from denseface.service.errors import LocalProtocolError, RemoteProtocolError, first_error
-from denseface.service.protocol.message_base import BaseMessage, FromHub, ToHub
+from denseface.service.errors import LocalProtocolError, RemoteProtocolError
+from denseface.service.protocol.message_base import VERSION, BaseMessage, FromHub, ToHub
 from denseface.service.protocol.messages import FROM_HUB, TO_HUB
 from denseface.service.protocol.payload import Arrays
 from denseface.service.runtime.terminal import printable
@@ -26,6 +28,8 @@ MAX_HEADER_BYTES_TO_HUB = 64 * 1024
 bytes."""
 MAX_PARTS = 1 + 16
 """Header and arrays of one message."""
+_MOST_SHOWN = 60
+"""Characters of a value that a refusal shows."""
 
 Buffer = bytes | memoryview
 """One part of a message."""
@@ -40,6 +44,8 @@ def _reader(kinds: Iterable[type[_MessageT]]) -> TypeAdapter[_MessageT]:
 
 _TO_HUB = _reader(TO_HUB)
 _FROM_HUB = _reader(FROM_HUB)
+_KINDS_TO_HUB = {kind.model_fields["kind"].default for kind in TO_HUB}
+_KINDS_FROM_HUB = {kind.model_fields["kind"].default for kind in FROM_HUB}
 
 
 @dataclass(frozen=True)
@@ -134,6 +140,9 @@ def _message(
     if len(header) > most:
         raise RemoteProtocolError(
             f"header has {len(header)} bytes, at most {most} allowed", "oversized")
+    if not len(header) and sizes:
+        raise RemoteProtocolError(
+            "header: empty, as a REQ socket begins: expected a DEALER's, with the header first")
     message = _header(bytes(header), reader)
     infos = payload.arrays if (payload := message.payload) else ()
     if len(sizes) != len(infos):
@@ -152,10 +161,62 @@ def _header(header: bytes, reader: TypeAdapter[_MessageT]) -> _MessageT:
         with np.errstate(all="ignore"):  # absurd calibrations overflow before they are refused
             message = reader.validate_json(header)
     except ValidationError as error:
-        field, complaint = first_error(error)
-        reason = "version" if field.rpartition(".")[2] == "version" else "malformed"
-        raise RemoteProtocolError(
-            printable(f"{field or 'header'}: {complaint}"[:500]), reason) from error
+        version = readable(header).get("version", VERSION)
+        if version != VERSION:  # first: of another release's message nothing else need be right
+            raise RemoteProtocolError(
+                printable(f"version: found {_shown(version)}, expected {VERSION}"), "version"
+                ) from error
+        raise RemoteProtocolError(printable(_complaint(error)[:500])) from error
     if "version" not in message.model_fields_set:
-        raise RemoteProtocolError(f"{message.kind}: no version given", "version")
+        raise RemoteProtocolError(
+            f"{message.kind}: no version given, expected {VERSION}", "version")
     return message
+
+
+def _complaint(error: ValidationError) -> str:
+    """Say which field of a header is wrong first, and what was found in it."""
+    first = error.errors(include_url=False)[0]
+    field, found = ".".join(map(str, first["loc"])), f", found {_shown(first['input'])}"
+    match first["type"]:
+        case "union_tag_not_found":
+            return "kind: missing"
+        case "union_tag_invalid":
+            kind = first["ctx"]["tag"]
+            why = ("only the hub says that" if kind in _KINDS_FROM_HUB else
+                   "not one that is said to the hub" if kind in _KINDS_TO_HUB else
+                   "no such kind of message")
+            return f"kind: found {_shown(kind)}, {why}"
+        case "json_invalid":
+            return f"header: {first['msg']}"
+        case _ if not field:
+            return f"header: expected a JSON object{found}"
+        case "extra_forbidden":
+            return f"{field}: no such field{found}"
+        case "missing" | "value_error" | "assertion_error":
+            return f"{field}: {first['msg']}"
+    return f"{field}: {first['msg']}{found}"
+
+
+def _shown(value: object) -> str:
+    if value is None or isinstance(value, bool):
+        return str(value).lower().replace("none", "null")
+    if isinstance(value, str | int | float):
+        return repr(value[:_MOST_SHOWN] if isinstance(value, str) else value)[:_MOST_SHOWN + 2]
+    return "an object" if isinstance(value, dict) else "an array"
+
+
+def readable(header: Buffer) -> dict[str, Any]:
+    """Give what can be read of a header that is malformed or cut off; empty where that is nothing.
+
+    Its values are believed by nobody.
+    """
+    text = bytes(header[:MAX_HEADER_BYTES_TO_HUB]).decode(errors="replace")
+    for cut in (False, True):
+        with suppress(ValueError):
+            found = from_json(text, allow_partial=cut)
+            if not isinstance(found, dict):
+                break
+            if cut and found:
+                found.popitem()  # its end may be missing
+            return found
+    return {}

@@ -9,8 +9,8 @@ from typing import Self
 import zmq
 from zmq.utils.monitor import recv_monitor_message
 
-from denseface.service.errors import KeyFileError, KeyRefusedError
-from denseface.service.protocol.wire import Packet, decode_from_hub
+from denseface.service.errors import KeyFileError, KeyRefusedError, RemoteProtocolError
+from denseface.service.protocol.wire import Packet, decode_from_hub, readable
 from denseface.service.security import KeyPair, read_pair, read_public
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.absence import why_absent
@@ -156,5 +156,15 @@ def connect(
 
 
 def receive_packet(socket: Socket, flags: int = 0) -> Packet:
-    """Receive what the hub sends to a DEALER; RemoteProtocolError where it is malformed."""
-    return decode_from_hub([part.buffer for part in socket.recv_multipart(flags, copy=False)])
+    """Receive what the hub sends to a DEALER; RemoteProtocolError where it is malformed.
+
+    The error's `request` is the number of the request that was to be answered, as far as it can be
+    read.
+    """
+    parts = [part.buffer for part in socket.recv_multipart(flags, copy=False)]
+    try:
+        return decode_from_hub(parts)
+    except RemoteProtocolError as error:
+        number = readable(parts[0]).get("request")
+        error.request = number if isinstance(number, int) else None
+        raise

@@ -12,11 +12,17 @@ from dataclasses import dataclass
 import structlog
 import zmq
 
-from denseface.service.errors import AddressError
+from denseface.service.errors import AddressError, RemoteProtocolError
 from denseface.service.monitoring import Rejections
 from denseface.service.protocol.payload import MAX_PAYLOAD_BYTES
 from denseface.service.protocol.topics import Topic
-from denseface.service.protocol.wire import MAX_HEADER_BYTES, MAX_PARTS, Buffer
+from denseface.service.protocol.wire import (
+    MAX_HEADER_BYTES,
+    MAX_PARTS,
+    Buffer,
+    Packet,
+    decode_to_hub,
+)
 from denseface.service.security import AllowedKey
 from denseface.service.security.permissions import ALL_ROLES, ROLES_BY_TOPIC
 from denseface.service.security.zap import MESSAGES_DOMAIN, PUBLICATIONS_DOMAIN
@@ -60,6 +66,14 @@ class Incoming:
     key: str
     """Fingerprint of the sender's key; empty where it needed none."""
     address: str
+    fault: RemoteProtocolError | None = None
+    """The message was too long: of its parts there is the first at most."""
+
+    def packet(self) -> Packet:
+        """Read the message; RemoteProtocolError where it is malformed."""
+        if self.fault:
+            raise self.fault
+        return decode_to_hub(self.parts)
 
 
 class Listener:
@@ -123,20 +137,18 @@ class Listener:
         # First, so that a descriptor used again is not taken for the one that closed.
         self._router.monitor.read()
         for _ in range(_BURST):
+            fault = None
             try:
                 first, parts = sockets.receive_parts(
                     self._router.socket, MAX_PARTS, MAX_HEADER_BYTES + MAX_PAYLOAD_BYTES)
             except zmq.Again:
                 return
             except sockets.TooLongError as error:
-                user = self._user(error.first)
-                self._rejections.note("oversized", key=user.name if user else None,
-                                      address=_address(error.first), detail=str(error))
-                continue
+                first, parts, fault = error.first, error.next_parts, error
             if user := self._allowed_user(first):
                 token, key = (user.token, user.fingerprint) if self._credentials else (_LOCAL, "")
                 incoming = Incoming(token + first.bytes, [part.buffer for part in parts], user, key,
-                                    _address(first))
+                                    _address(first), fault)
                 if self._has_its_own_id(incoming, first):
                     yield incoming
 

@@ -23,12 +23,14 @@ _RECONNECT_MS, _RECONNECT_MAX_MS = 50, 500
 
 
 class TooLongError(RemoteProtocolError):
-    """A message had more parts or bytes than it may; all of it was dropped."""
+    """A message had more parts or bytes than it may; what is not named here was dropped."""
 
-    def __init__(self, message: str, first: zmq.Frame) -> None:
+    def __init__(self, message: str, first: zmq.Frame, next_parts: list[zmq.Frame]) -> None:
         super().__init__(message, "oversized")
         self.first = first
         """Its first part, which carries what libzmq knows of the sender."""
+        self.next_parts = next_parts
+        """The part that followed, where it was within the limits."""
 
 
 def open_socket(context: Context, kind: int, address: str) -> Socket:
@@ -99,7 +101,7 @@ def receive_parts(socket: Socket, most: int, most_bytes: int) -> tuple[zmq.Frame
     """Receive without waiting: the first part with its properties, and those that follow it.
 
     zmq.Again where there is none, TooLongError where more than `most` parts or `most_bytes` bytes
-    follow the first: all of them are received and dropped.
+    follow the first: all of them are received, and most are dropped.
     """
     first = frame = socket.recv(zmq.DONTWAIT, copy=False, track=False)
     parts: list[zmq.Frame] = []
@@ -112,5 +114,6 @@ def receive_parts(socket: Socket, most: int, most_bytes: int) -> tuple[zmq.Frame
             parts.append(frame)
     if count > most or size > most_bytes:
         raise TooLongError(
-            f"{count} parts with {size} bytes, at most {most} with {most_bytes} allowed", first)
+            f"{count} parts with {size} bytes, at most {most} with {most_bytes} allowed",
+            first, parts[:1])
     return first, parts

@@ -29,6 +29,8 @@ class FakeHub:
         self.frames: set[str] = set()
         """Captures of which a frame is kept."""
         self.ignored: set[str] = set()
+        self.garble_header: Callable[[bytes], bytes] = bytes
+        """What becomes of the header of an answer."""
         self.refuse: str | None = None
         self.refuse_reason: messages.PressReason = "disk"
         self.hint: Hint | None = None
@@ -113,7 +115,8 @@ class FakeHub:
                     self.received.append(message.kind)
                     if message.kind not in self.ignored:
                         for answer in self._answers(message):
-                            self._router.send_multipart([peer, *encode(answer)])
+                            header, *arrays = encode(answer)
+                            self._router.send_multipart([peer, self.garble_header(header), *arrays])
                 self._changed.notify_all()
 
     def _answers(self, message: BaseMessage) -> Iterator[Packet]:

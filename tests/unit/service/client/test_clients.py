@@ -103,6 +103,23 @@ def test_errors_are_those_of_the_blocking_client(hub):
     run(main())
 
 
+def test_an_answer_of_another_release_is_no_time_out(hub):
+    hub.garble_header = lambda header: header.replace(b'"version":2', b'"version":3')
+    words = "hub: the hub's answer cannot be read: version: found 3, expected 2"
+
+    async def main():
+        async with AsyncClient(hub.address) as client:
+            with pytest.raises(RemoteProtocolError, match=words):
+                await client.press("a", timeout=LIMIT_S)
+            hub.garble_header = bytes
+            assert await client.press("a") == "a"
+
+    with Client(hub.address) as client:
+        with pytest.raises(RemoteProtocolError, match=words):
+            client.press("a", timeout=LIMIT_S)
+        run(main())
+
+
 def test_calls_share_a_client_and_the_last_may_be_answered_first(hub):
     async def main():
         async with AsyncClient(hub.address) as client:

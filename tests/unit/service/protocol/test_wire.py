@@ -262,11 +262,11 @@ def asked(kind: str, **fields) -> bytes:
 
 @pytest.mark.parametrize(("parts", "message"), [
     ([WIRES[0][0].replace(b'"version":2,', b"")], "no version"),
-    ([WIRES[0][0].replace(b'"version":2', b'"version":1')], "version: Input should be 2"),
-    ([WIRES[0][0].replace(b'"version":2', b'"version":3')], "version: Input should be 2"),
+    ([WIRES[0][0].replace(b'"version":2', b'"version":1')], "version: found 1, expected 2"),
+    ([WIRES[0][0].replace(b'"version":2', b'"version":3')], "version: found 3, expected 2"),
     ([WIRES[0][0].replace(b'"a"', b'"../a"')], "capture_id"),
     ([WIRES[0][0].replace(b'"a"', b'"a\\n"')], "capture_id"),
-    ([WIRES[0][0].replace(b"}", b',"more":1}')], "more: Extra inputs"),
+    ([WIRES[0][0].replace(b"}", b',"more":1}')], "press.more: no such field, found 1"),
     ([WIRES[0][0], b""], "1 arrays follow, 0 announced"),
     (WIRES[1][:2], "1 arrays follow, 2 announced"),
     ([WIRES[1][0], WIRES[1][1][:-1], WIRES[1][2]], "depth has 95 bytes, 96 announced"),
@@ -281,6 +281,19 @@ def asked(kind: str, **fields) -> bytes:
     ([asked("purge", capture_id="a", everything=True)], "expected one of"),
     ([asked("purge", before="9999-12-31T23:59:59-14:00")], "before: .* does not exist in UTC"),
     ([b""] * (wire.MAX_PARTS + 1), "parts"),
+    ([b"{}"], "kind: missing"),
+    ([b"[]"], "header: expected a JSON object, found an array"),
+    ([b"\xff{}"], "header: Invalid JSON: expected value at line 1 column 1"),
+    ([b'{"kind":"press"'], "header: Invalid JSON: EOF while parsing"),
+    ([asked("face_done")], "kind: found 'face_done', only the hub says that"),
+    ([asked("fly")], "kind: found 'fly', no such kind of message"),
+    ([asked("fly", version=3)], "version: found 3, expected 2"),
+    ([asked("press", capture_id="../a")], r"press\.capture_id: .* pattern .*, found '\.\./a'"),
+    ([asked("press", capture_id="a", frames=99)], r"press\.frames: .* equal to 32, found 99"),
+    ([asked("press", capture_id="a", frames=None)], "press.frames: .*integer, found null"),
+    ([asked("press", capture_id="a", frames=[])], "press.frames: .*integer, found an array"),
+    ([asked("press", capture_id="a" * 900)], f"found '{'a' * 60}'$"),
+    ([asked("press")], "press.capture_id: Field required$"),
 ])
 def test_what_is_wrong_is_named(parts, message):
     with pytest.raises(RemoteProtocolError, match=message):
