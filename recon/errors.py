@@ -1,6 +1,7 @@
 """Why a frame did not become a face: always one of these, never a bad cloud."""
 
 from denseface.errors import DensefaceError
+from denseface.recon.candidates import FaceCandidate
 
 __all__ = ["CoarseDepthError", "FaceWithoutDepthError", "ImpossibleFrameError",
            "ImpossibleSettingsError", "NoDepthError", "NoFaceError", "ReconstructionError",
@@ -8,7 +9,15 @@ __all__ = ["CoarseDepthError", "FaceWithoutDepthError", "ImpossibleFrameError",
 
 
 class ReconstructionError(DensefaceError):
-    """Base of every error that a frame leads to."""
+    """Base of every error that a frame leads to.
+
+    Attributes
+    ----------
+    candidates : what the detector took for a face, and what the depth said of each; empty where
+        nothing looked like one, or none was looked for
+    """
+
+    candidates: tuple[FaceCandidate, ...] = ()
 
 
 class ImpossibleSettingsError(DensefaceError, ValueError):

@@ -10,6 +10,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, FailFast, Field, fiel
 
 from denseface.capture.frame import DepthRounding
 from denseface.recon.arrays import Bytes, Floats, Ints
+from denseface.recon.candidates import Box, FaceCandidate
 from denseface.recon.settings import Settings
 from denseface.short_repr import short_repr
 
@@ -105,32 +106,10 @@ class DenseCloud(PointCloud):
             f"grid {rows}x{columns} every {self.grid_step_mm:.2f} mm")
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
-
-
 MAX_STEP = 15.0
 """Largest step in depth within a triangle of neighbours of the grid, in grid steps: more is a gap
 between two surfaces. A slope of ten, the steepest bridge that is kept, makes 14 along a diagonal.
 """
-
-Box = tuple[int, int, int, int]
-"""x, y, width, height; pixels."""
-
-
-class FaceCandidate(_Model):
-    """A detector's box and what the depth said of it."""
-
-    box: Box
-    """x, y, width, height; pixels of the colour image."""
-    depth_mm: float | None
-    """Median depth in the middle of the box; None where nothing was measured."""
-    width_mm: float | None
-    """The box's width at that depth."""
-    verdict: str
-    """`chosen`, `farther`, or why it is no face."""
-
-
 STAGES = ("overview", "detection", "registration", "segmentation", "neighbors", "rbf",
           "propagation")
 """The stages of a reconstruction, in order: names in `Report.timings_ms`, beside `total`."""
@@ -160,8 +139,10 @@ class Consent(BaseModel):
             raise ValueError("this time does not exist in UTC") from error
 
 
-class Report(_Model):
+class Report(BaseModel):
     """What was done to the frame, as written by `--report`."""
+
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 
     capture_id: str = ""
     face_box: Box

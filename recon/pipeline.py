@@ -101,11 +101,23 @@ def _reconstruct(frame: RgbdFrame, settings: Settings, clock: "_Stopwatch") -> F
     colored = frame.color is not None
     if not colored:
         frame, settings = with_shaded_depth(frame), settings.model_copy(update={"shading": False})
-    focal_px = frame.calibration.color.fx
     overview = _overview(frame)
     clock.lap("overview")
     found = _detect(frame, overview)
     clock.lap("detection")
+    try:
+        return _shape(frame, settings, clock, overview, found, colored=colored)
+    except ReconstructionError as error:
+        error.candidates = found.candidates
+        raise
+
+
+def _shape(
+    frame: RgbdFrame, settings: Settings, clock: "_Stopwatch", overview: Registration,
+    found: Detection, *, colored: bool,
+) -> Face:
+    """Go on from the face's box."""
+    focal_px = frame.calibration.color.fx
     registered = register(frame, *box_window(overview, found.box))
     coarse = check_steps(registered.points[registered.valid][:, 2], found.depth_mm)
     clock.lap("registration")
@@ -147,8 +159,10 @@ def _detect(frame: RgbdFrame, overview: Registration) -> Detection:
             seen = _overview(turned)
             if any(look_for_faces(turned.rgb, seen, turned.calibration.color.fx, look,
                                   _FARTHEST_MM).faces for look in _TURNED_LOOKS):
-                raise NoFaceError(f"{error}; there is one when the images are turned by {degrees} "
-                                  f"degrees (--rotate {degrees})") from error
+                hinting = NoFaceError(f"{error}; there is one when the images are turned by "
+                                      f"{degrees} degrees (--rotate {degrees})")
+                hinting.candidates = error.candidates
+                raise hinting from error
         raise
 
 

@@ -239,6 +239,11 @@ class Search:
         self.candidates += self._run(
             self.gray, (0, 0, width, height), _WHOLE_IMAGE, typical, (0.0, float(height)),
             CenterMask(np.ones((1, 1), np.bool_), float(width)))
+        error = self._why_none()
+        error.candidates = tuple(self.candidates)
+        return error
+
+    def _why_none(self) -> NoFaceError | FaceWithoutDepthError:
         if not self.candidates:
             return NoFaceError("no face found in the colour image")
         measured = [c for c in self.candidates if c.depth_mm is not None]

@@ -3,7 +3,7 @@
 import argparse
 
 from denseface.service.commands import _options
-from denseface.service.runtime.terminal import say
+from denseface.service.runtime.terminal import complain, say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from denseface.service.export import FaceFiles
+    from denseface.service.export.written import describe
 
     files = FaceFiles(args.output, args.report, args.rendering, args.mode)
     with _options.client(args, _options.CONNECT_S) as client:
@@ -40,4 +41,6 @@ def run(args: argparse.Namespace) -> int:
         face = client.get(capture_id, timeout=args.timeout)
     files.write(face)
     _options.warn(face)
+    for line in describe(files, face):
+        complain(line)  # stdout has the id, and nothing else
     return 0

@@ -5,17 +5,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from denseface.service.commands import _options
-from denseface.service.runtime.terminal import complain, say
+from denseface.service.export import FORMATS
+from denseface.service.runtime.terminal import say
 
 if TYPE_CHECKING:
-    from denseface.capture import RgbdFrame
+    from denseface.service.tools.frames import FrameChoice
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("input", metavar="INPUT", nargs="?",
-                        help="a .npz frame, a .oni recording, or a folder of frames or image pairs")
-    parser.add_argument("--frame", type=int, default=0, metavar="N",
-                        help="which frame of the recording, from 0 (default: 0)")
+    parser.add_argument("inputs", metavar="INPUT", nargs="*",
+                        help="a .npz frame, a .oni recording, or a folder of frames, of recordings "
+                             "or of image pairs; several make a face of each and a table")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--frame", type=int, metavar="N",
+                       help="which frame of a recording, from 0 (default: 0)")
+    which.add_argument("--all-frames", action="store_true",
+                       help="a face of each frame, NAME_0000 and so on")
     parser.add_argument("--frames", type=_options.burst, default=1, metavar="N",
                         help="average the depth of N frames from there on (default: 1)")
     parser.add_argument("--depth", type=Path, metavar="D.png",
@@ -31,7 +36,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rounding", choices=("cut", "round", "none"),
                         help="how a depth image's depth became a whole number: cut, as "
                              "PrimeSense's drivers do (default: round)")
-    _options.add_outputs(parser, "-o", "--output")
+    *endings, last = FORMATS
+    parser.add_argument("-o", "--output", metavar="OUT|DIR/",
+                        help=f"write the face: {' '.join(endings)} or {last}; into a folder as "
+                             "NAME.ply, after its INPUT; what is there is replaced")
+    parser.add_argument("--format", choices=[ending[1:] for ending in FORMATS],
+                        help="of the faces in a folder (default: ply)")
+    parser.add_argument("--report", metavar="R.json|DIR/", help="write the report")
+    parser.add_argument("--preview", metavar="P.png|DIR/", dest="rendering",
+                        help="write a picture of the face; where there is none, of the frame and "
+                             "what looked like one")
     parser.add_argument("--calibration", type=Path, metavar="FILE",
                         help="calibration that wins over the file's own: JSON, or OpenCV's or "
                              "ROS's YAML")
@@ -40,52 +54,70 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from denseface.service.export import FaceFiles
+    from denseface.service.errors import UsageError
+    from denseface.service.tools.reconstruction.inputs import find_inputs
+    from denseface.service.tools.reconstruction.outputs import Outputs
 
-    files = FaceFiles(args.output, args.report, args.rendering)
-    settings = _options.recon_settings(args)
-    frame = _frame(args)
+    _check(args)
+    settings, choice = _options.recon_settings(args), _choice(args)
+    outputs = Outputs(args.output, args.report, args.rendering,
+                      f".{args.format}" if args.format else None)
+    inputs = find_inputs(args.inputs)
+    if args.inputs and not inputs:
+        raise UsageError("INPUT: calibrations alone, expected a frame, recording or folder")
+    several = args.all_frames or len(inputs) > 1
+    outputs.check(several=several)
+    if several:
+        from denseface.service.tools.reconstruction.many import reconstruct_many
 
-    from denseface.recon import ReconstructionError, reconstruct
+        return reconstruct_many(inputs, choice, settings, outputs,
+                                None if args.all_frames else args.frame or 0)
+    from denseface.service.tools.reconstruction import single
 
-    try:
-        face = reconstruct(frame, settings)
-    except ReconstructionError:
-        for note in frame.origin.notes:
-            complain(f"warning: {note}")
-        raise
-    files.write(face)
+    if args.depth:
+        taken = single.take_pair(args.depth, args.color, choice)
+    else:
+        taken = single.take(inputs[0], args.frame or 0, choice)
+    face, lines = single.reconstruct_one(taken, settings, outputs)
     _options.warn(face)
-    report = face.report
-    say(f"{report.initial_points} measured points, {report.dense_points} dense points, "
-        f"{report.timings_ms['total']:.0f} ms")
+    say(*lines)
+    total = taken.read.total or 1
+    if args.frame is None and args.frames == 1 and total > 1:
+        say(f"frame 0 of {total}: --frame N takes another, --all-frames each")
     return 0
 
 
-def _frame(args: argparse.Namespace) -> "RgbdFrame":
+def _check(args: argparse.Namespace) -> None:
+    """Check which flags are given together."""
+    from denseface.service.errors import UsageError
+
+    if bool(args.inputs) == bool(args.depth):
+        raise UsageError("expected INPUT or --depth, found "
+                         f"{'both' if args.inputs else 'neither'}")
+    if args.color and not args.depth:
+        raise UsageError("--color is given without --depth")
+    if args.depth and (args.frame or args.all_frames or args.frames > 1):
+        raise UsageError("--frame, --all-frames or --frames is given with --depth: a pair of "
+                         "images is one frame")
+    if args.all_frames and args.frames > 1:
+        raise UsageError("--frames is given with --all-frames: each frame becomes a face of its "
+                         "own")
+
+
+def _choice(args: argparse.Namespace) -> "FrameChoice":
+    """Read how frames are to be read."""
     from denseface.capture import DepthRounding
     from denseface.capture.image_pair import PairReading, parse_unit
     from denseface.service.errors import UsageError
-    from denseface.service.tools.frames import read_frame, read_image_pair
+    from denseface.service.tools.frames import FrameChoice
 
-    if (args.input is None) == (args.depth is None):
-        raise UsageError("expected INPUT or --depth, found "
-                         f"{'neither' if args.input is None else 'both'}")
-    if args.color and not args.depth:
-        raise UsageError("--color is given without --depth")
-    most = _options.service_settings(args).max_frame_pixels
     try:
         unit_mm = parse_unit(args.unit) if args.unit else None
     except ValueError as error:
         raise UsageError(f"--unit {error}") from error
     registered = None if args.registered == "auto" else args.registered == "yes"
-    rounding = DepthRounding(args.rounding or DepthRounding.ROUND)
-    reading = PairReading(unit_mm, registered, rounding=rounding, max_pixels=most)
-    if args.depth:
-        if args.frame or args.frames > 1:
-            raise UsageError("--frame or --frames is given with --depth: a pair of images is one "
-                             "frame")
-        return read_image_pair(args.depth, args.color, args.calibration, reading, args.rotate)
     said = unit_mm is not None or registered is not None or args.rounding is not None
-    return read_frame(args.input, args.frame, args.calibration, most, args.frames,
-                      reading if said else None, args.rotate)
+    reading = PairReading(unit_mm, registered,
+                          rounding=DepthRounding(args.rounding or DepthRounding.ROUND))
+    return FrameChoice(_options.service_settings(args).max_frame_pixels, args.calibration,
+                       reading if said else None, args.rotate, args.frames)

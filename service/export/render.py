@@ -3,15 +3,14 @@
 Points are splatted into a z-buffer by NumPy and OpenCV: no window, no GPU.
 """
 
-import struct
-import zlib
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.face import DenseCloud, Face, Report
+from denseface.recon.face import DenseCloud, Face
+from denseface.service.export._drawing import BACKGROUND, FAINT_INK, INK, png, write
 from denseface.service.export._lighting import shade
 from denseface.service.export.mesh import triangulate
 from denseface.service.export.provenance import provenance
@@ -30,17 +29,13 @@ _MARGIN, _HEADER, _FOOTER = 14, 74, 56
 """Around each panel, above and below all, pixels."""
 _FILL = 0.90
 """Share of a panel's width and height that the face may take."""
-_BACKGROUND, _PANEL_COLOR = (20, 22, 24), (31, 34, 37)
+_PANEL_COLOR = (31, 34, 37)
 """RGB."""
-_INK, _FAINT_INK = (236, 238, 240), (156, 162, 168)
-"""RGB, of titles and of captions."""
 _SCALE_BAR_MM = 50
 _SEED_SHARE = 0.75
 """Side of the square of a measured point, in mean spacings: the gaps between points show."""
 _SUBDIVISIONS = 2
 """Parts of each edge of a triangle; points are drawn where they meet."""
-_PNG_BEGINNING = 8 + 25
-"""Bytes of signature and IHDR, after which chunks of text may stand."""
 
 
 def render(face: Face) -> bytes:
@@ -56,7 +51,7 @@ def render(face: Face) -> bytes:
     scale = _scale(dense.points - center)
     width = _MARGIN + len(titles) * (_PANEL + _MARGIN)
     height = _HEADER + len(_VIEWS) * (_PANEL + _MARGIN) + _FOOTER
-    canvas = np.full((height, width, 3), _BACKGROUND, np.uint8)
+    canvas = np.full((height, width, 3), BACKGROUND, np.uint8)
     for row, (_, angle) in enumerate(_VIEWS):
         seeds = _visible(initial.points - center, scale, angle,
                          _SEED_SHARE * face.report.mean_spacing_mm)
@@ -67,7 +62,7 @@ def render(face: Face) -> bytes:
             left = _MARGIN + column * (_PANEL + _MARGIN)
             canvas[top:top + _PANEL, left:left + _PANEL] = _panel(pixels, shown[rows])
     _captions(canvas, titles, scale)
-    return _png(canvas, face.report)
+    return png(canvas, provenance(face.report))
 
 
 def portrait(face: Face, side: int) -> bytes:
@@ -84,7 +79,7 @@ def portrait(face: Face, side: int) -> bytes:
     if scale * _OVERSAMPLING * dense.grid_step_mm > 1:  # else neighbours share a pixel
         points, colors, _ = _subdivided(dense)
     pixels, rows = _visible(points - center, scale, 0.0, dense.grid_step_mm, side)
-    return _png(_panel(pixels, colors[rows], side), face.report)
+    return png(_panel(pixels, colors[rows], side), provenance(face.report))
 
 
 def _subdivided(
@@ -152,38 +147,16 @@ def _panel(
         image.reshape(size, size, 3), (panel, panel), interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _png(image: NDArray[np.uint8], report: Report) -> bytes:
-    """Give a PNG file that says where the face comes from, in a chunk of text for each fact."""
-    encoded, png = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
-    if not encoded:
-        raise RuntimeError("OpenCV could not write the PNG")
-    data = png.tobytes()
-    return data[:_PNG_BEGINNING] + b"".join(
-        _text_chunk(name, text) for name, text in provenance(report).items()
-    ) + data[_PNG_BEGINNING:]
-
-
-def _text_chunk(name: str, text: str) -> bytes:
-    """Give a text in UTF-8, of no language, not compressed (PNG, section 11.3.3.4)."""
-    chunk = b"iTXt" + name.encode() + bytes(5) + text.encode("utf-8", "replace")
-    return struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
-
-
 def _captions(canvas: NDArray[np.uint8], titles: tuple[str, ...], scale: float) -> None:
     for column, title in enumerate(titles):
         left = _MARGIN + column * (_PANEL + _MARGIN)
-        _write(canvas, title, (left + 2, _HEADER - 24), 0.95, _INK)
+        write(canvas, title, (left + 2, _HEADER - 24), 0.95, INK)
     for row, (name, _) in enumerate(_VIEWS):
-        _write(canvas, name, (_MARGIN + 14, _HEADER + row * (_PANEL + _MARGIN) + 30), 0.6,
-               _FAINT_INK)
+        write(canvas, name, (_MARGIN + 14, _HEADER + row * (_PANEL + _MARGIN) + 30), 0.6,
+               FAINT_INK)
     y = canvas.shape[0] - 26
     end = _MARGIN + round(_SCALE_BAR_MM * scale)
-    cv2.line(canvas, (_MARGIN, y), (end, y), _INK, 2, cv2.LINE_AA)
+    cv2.line(canvas, (_MARGIN, y), (end, y), INK, 2, cv2.LINE_AA)
     for x in (_MARGIN, end):
-        cv2.line(canvas, (x, y - 6), (x, y + 6), _INK, 2, cv2.LINE_AA)
-    _write(canvas, f"{_SCALE_BAR_MM} mm", (end + 14, y + 7), 0.6, _INK)
-
-
-def _write(canvas: NDArray[np.uint8], text: str, at: tuple[int, int], size: float,
-           ink: tuple[int, int, int]) -> None:
-    cv2.putText(canvas, text, at, cv2.FONT_HERSHEY_DUPLEX, size, ink, 1, cv2.LINE_AA)
+        cv2.line(canvas, (x, y - 6), (x, y + 6), INK, 2, cv2.LINE_AA)
+    write(canvas, f"{_SCALE_BAR_MM} mm", (end + 14, y + 7), 0.6, INK)

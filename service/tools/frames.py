@@ -1,63 +1,134 @@
-"""One frame out of a file, a folder or a pair of image files."""
+"""Frames out of a file, a folder or a pair of image files: one, a burst, or each."""
 
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
+from typing import NamedTuple
 
 from denseface.capture import RgbdFrame, Source, npz, open_source
 from denseface.capture.burst import fuse
 from denseface.capture.calibration_files import choose_calibration
+from denseface.capture.errors import CaptureError, UnreadableSourceError
 from denseface.capture.image_pair import FolderSource, ImagePairSource, PairReading
 from denseface.capture.source import is_folder_of_pairs
-from denseface.service.errors import UsageError
+from denseface.service.errors import FrameTooLargeError, UsageError
 from denseface.service.protocol.payload import check_frame_size
 
-__all__ = ["read_frame", "read_image_pair"]
+__all__ = ["FrameChoice", "NumberedFrame", "UnreadFrame", "each_frame", "read_frame",
+           "read_image_pair"]
 
 _AT_ONCE = FolderSource, npz.FolderSource
 """Sources that need not read the frames before the one that is asked for."""
 
 
-def read_frame(
-    path: str, number: int, calibration: Path | None, max_pixels: int, burst: int = 1,
-    reading: PairReading | None = None, rotation: int = 0,
-) -> RgbdFrame:
-    """Read a frame of a `.npz` or `.oni` file or of a folder of either kind by its number, from 0.
+class FrameChoice(NamedTuple):
+    """How frames are read, whatever they are read from."""
 
-    Parameters
-    ----------
-    burst : of how many frames from that one on it is the mean
-    reading : how the pairs of a folder are to be understood; None where nothing was said
-    rotation : degrees by which frames are turned, clockwise
+    max_pixels: int
+    """Of an image."""
+    calibration: Path | None = None
+    """Its file, which wins over a source's own."""
+    reading: PairReading | None = None
+    """How the pairs of a folder are to be understood; None where nothing was said."""
+    rotation: int = 0
+    """Degrees by which frames are turned, clockwise."""
+    burst: int = 1
+    """Of how many frames from the first on a frame is the mean."""
+
+
+class NumberedFrame(NamedTuple):
+    """A frame, and which of its source it is."""
+
+    number: int
+    """From 0."""
+    total: int | None
+    """How many frames the source has at most; None where it does not know."""
+    frame: RgbdFrame
+
+
+class UnreadFrame(NamedTuple):
+    """One that cannot be read."""
+
+    number: int | None
+    """From 0; None where its source cannot be opened."""
+    total: int | None
+    problem: str
+    """Why not."""
+
+
+def read_frame(path: str, number: int, choice: FrameChoice) -> NumberedFrame:
+    """Read a frame of a `.npz` or `.oni` file or of a folder of either kind by its number, from 0.
 
     Raises
     ------
     UsageError
-        Where the path names a sensor, there is no frame of that number, or `reading` is said of
-        what has no image pairs.
+        Where there is no frame of that number, or a reading is said of what has no image pairs.
     CaptureError
         Where the file cannot be read, or its depth and colour do not belong together.
     FrameTooLargeError
-        Where an image of the frame has more than `max_pixels`.
+        Where an image of the frame has too many pixels.
     """
-    if path.startswith("openni2:"):
-        raise UsageError(f"{path}: expected a .npz or .oni file; `denseface up` serves a sensor")
-    with _opened(path, calibration, max_pixels, reading) as source:
-        source.rotation = rotation
+    burst = choice.burst
+    with _opened(path, choice) as source:
         count = source.frame_count
         if count is not None and not 0 <= number < count:
             raise UsageError(f"{path}: has {count} frames (0 to {count - 1}), --frame asks for "
                              f"{number}")
         frames: list[RgbdFrame] = []
         for frame in islice(_frames_from(source, number), burst):
-            check_frame_size(frame, max_pixels)
+            check_frame_size(frame, choice.max_pixels)
             frames.append(frame)
     if not frames:
         raise UsageError(f"{path}: has fewer than {number + 1} pairs of depth and colour")
     if len(frames) < burst:
         raise UsageError(f"{path}: has {len(frames)} frames from frame {number} on, --frames asks "
                          f"for {burst}")
-    return fuse(frames)
+    return NumberedFrame(number, count, fuse(frames))
+
+
+def each_frame(path: str, choice: FrameChoice) -> Iterator[NumberedFrame | UnreadFrame]:
+    """Read every frame of what `read_frame` reads, one after the other.
+
+    One that cannot be read does not stop the others where each has a file of its own; a recording
+    ends there.
+
+    Raises
+    ------
+    UsageError, CaptureError
+        As `read_frame`, where nothing can be read at all.
+    """
+    with _opened(path, choice) as source:
+        count = source.frame_count
+        if isinstance(source, _AT_ONCE):
+            for number in range(count or 0):
+                source.look_closely(refuse=True)
+                yield _next(source.frames_from(number), number, count, choice.max_pixels)
+            return
+        frames, number = iter(source), 0
+        while True:
+            source.look_closely(refuse=True)
+            try:
+                one = _next(frames, number, count, choice.max_pixels)
+            except StopIteration:
+                break
+            if isinstance(one, UnreadFrame) and (count is None or number + 1 < count):
+                one = one._replace(problem=f"{one.problem}; what follows in it is not read")
+            yield one
+            number += 1
+        if number == 0:
+            raise UnreadableSourceError(f"{path}: holds no pair of depth and colour")
+
+
+def _next(
+    frames: Iterator[RgbdFrame], number: int, count: int | None, max_pixels: int
+) -> NumberedFrame | UnreadFrame:
+    """Read the next frame; StopIteration where there is none."""
+    try:
+        frame = next(frames)
+        check_frame_size(frame, max_pixels)
+    except (CaptureError, FrameTooLargeError) as error:
+        return UnreadFrame(number, count, str(error))
+    return NumberedFrame(number, count, frame)
 
 
 def read_image_pair(
@@ -97,13 +168,15 @@ def _frames_from(source: Source, number: int) -> Iterator[RgbdFrame]:
             source.look_closely(refuse=True)
 
 
-def _opened(
-    path: str, calibration: Path | None, max_pixels: int, reading: PairReading | None
-) -> Source:
+def _opened(path: str, choice: FrameChoice) -> Source:
+    reading = choice.reading
     if is_folder_of_pairs(Path(path)):
-        return FolderSource(Path(path), choose_calibration(Path(path), calibration),
-                            (reading or PairReading())._replace(max_pixels=max_pixels))
+        chosen = choose_calibration(Path(path), choice.calibration)
+        source: Source = FolderSource(Path(path), chosen, (reading or PairReading())._replace(
+            max_pixels=choice.max_pixels))
+        source.rotation = choice.rotation
+        return source
     if reading is not None:
         raise UsageError(f"{path}: --unit, --rounding and --registered are for image files: a "
                          "folder of pairs, or --depth")
-    return open_source(path, calibration=calibration)
+    return open_source(path, calibration=choice.calibration, rotation=choice.rotation)

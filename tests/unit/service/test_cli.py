@@ -169,7 +169,7 @@ def test_ctrl_c_is_status_130(room, monkeypatch, capfd):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("denseface.recon.reconstruct", interrupted)
+    monkeypatch.setattr("denseface.service.tools.reconstruction.single.reconstruct", interrupted)
     assert outcome(capfd, "reconstruct", room) == (130, "")
 
 

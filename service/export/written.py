@@ -1,0 +1,77 @@
+"""What is said of the files that were written: what each is, its size, and what opens it."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from denseface.service.export.files import FaceFiles
+
+if TYPE_CHECKING:
+    from denseface.recon.face import Face
+
+__all__ = ["NOTHING_WRITTEN", "WrittenFiles", "describe"]
+
+NOTHING_WRITTEN = ("nothing was written: -o writes the face, --preview a picture of it, --report "
+                   "the report")
+
+_VIEWERS = {
+    ".ply": "MeshLab, CloudCompare and Blender open it",
+    ".pcd": "CloudCompare and the Point Cloud Library open it",
+    ".npz": "load_face() of denseface reads it, and so does numpy.load()",
+    ".obj": "MeshLab and Blender open it",
+    ".glb": "Blender and Windows 3D Viewer open it",
+    ".stl": "MeshLab, Blender and slicers for 3D printing open it",
+    ".png": "any browser or image viewer opens it",
+    ".json": "",
+}
+"""By a file's ending: with what to look at it."""
+_MESHES = {".obj", ".glb", ".stl"}
+
+
+def describe(files: FaceFiles, face: "Face") -> list[str]:
+    """Say of each file of a face what it is, a line each; nothing where nothing was asked for."""
+    lines = []
+    if files.output:
+        points = f"{len(face.dense):,} points"
+        what = f"mesh of {points}" if files.output.suffix.lower() in _MESHES else points
+        lines.append(_line(files.output, what))
+    if files.report:
+        lines.append(_line(files.report, "report"))
+    if files.rendering:
+        lines.append(_line(files.rendering, "picture of the face"))
+    return lines
+
+
+class WrittenFiles:
+    """What was written of many faces, by folder and kind."""
+
+    def __init__(self) -> None:
+        self._kinds: dict[tuple[Path, str], tuple[int, int]] = {}
+
+    def add(self, *paths: Path | None) -> None:
+        """Count files that were written; None is none."""
+        for path in filter(None, paths):
+            kind = path.parent, path.suffix.lower()
+            count, size = self._kinds.get(kind, (0, 0))
+            self._kinds[kind] = count + 1, size + path.stat().st_size
+
+    def lines(self) -> list[str]:
+        """Say what there is, a line for each kind."""
+        return [f"{folder}/: {count} {ending}, {_in_words(size)}{_viewers(ending)}"
+                for (folder, ending), (count, size) in self._kinds.items()]
+
+
+def _line(path: Path, what: str) -> str:
+    ending = path.suffix.lower()
+    return f"{path}: {what}, {_in_words(path.stat().st_size)}{_viewers(ending)}"
+
+
+def _viewers(ending: str) -> str:
+    return f"; {viewers}" if (viewers := _VIEWERS[ending]) else ""
+
+
+def _in_words(size: float) -> str:
+    for unit in ("bytes", "kB", "MB"):
+        if size < 1000:
+            return f"{size:.0f} {unit}" if unit == "bytes" or size >= 100 else f"{size:.1f} {unit}"
+        size /= 1000
+    return f"{size:.1f} GB"

@@ -1,0 +1,55 @@
+"""What is said and drawn of a frame that became no face."""
+
+from collections import Counter
+from pathlib import Path
+
+from denseface.capture import RgbdFrame
+from denseface.recon import ReconstructionError
+from denseface.service.errors import StoreError, reason_of
+from denseface.service.export.refusal import draw_refusal
+from denseface.service.runtime.files import write_atomically
+
+__all__ = ["draw_refused", "explained"]
+
+
+def draw_refused(path: Path, frame: RgbdFrame, error: ReconstructionError, name: str) -> None:
+    """Write the picture of a frame without a face.
+
+    Raises
+    ------
+    StoreError
+        It cannot be written.
+    """
+    picture = draw_refusal(frame, error.candidates, f"{name}: {error}")
+    try:
+        write_atomically(path, [picture], sync_name=False)
+    except OSError as failed:
+        raise StoreError(f"{path}: {reason_of(failed)}") from failed
+
+
+def explained(
+    error: ReconstructionError, name: str, *, frames: int | None, picture: Path | None
+) -> ReconstructionError:
+    """Give an error that names file and frame, what looked like a face, and what to try.
+
+    Parameters
+    ----------
+    name : file and frame
+    frames : how many the source has
+    picture : where it was drawn; None where it was not
+    """
+    text = f"{name}: {error}"
+    if len(error.candidates) > 1:
+        verdicts = Counter(one.verdict for one in error.candidates)
+        text += " (" + ", ".join(f"{times} boxes: {what}" if times > 1 else f"1 box: {what}"
+                                 for what, times in verdicts.most_common()) + ")"
+    tries = []
+    if frames is not None and frames > 1:
+        tries.append(f"--frame takes another of its {frames} frames, --all-frames each")
+    if any("size" in one.verdict for one in error.candidates):
+        tries.append("--calibration gives the right focal length")
+    tries.append(f"{picture} shows what was looked at" if picture else
+                 "--preview P.png draws what was looked at")
+    told = type(error)(f"{text}; {'; '.join(tries)}")
+    told.candidates = error.candidates
+    return told

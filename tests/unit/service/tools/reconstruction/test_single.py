@@ -1,0 +1,52 @@
+"""`denseface reconstruct` of one frame: what it says of what it wrote, and of what it did not."""
+
+import cv2
+
+from tests.unit.service.tools.reconstruction.conftest import write_frame
+from tests.unit.service.tools.reconstruction.test_many import run
+
+
+def test_each_file_is_named_with_what_it_is_and_what_opens_it(take, tmp_path, capsys):
+    status, out, _ = run(
+        capsys, take, "--frame", 2, "-o", tmp_path / "f.glb", "--report", tmp_path / "r.json",
+        "--preview", tmp_path / "p.png")
+    size = (tmp_path / "f.glb").stat().st_size
+    assert status == 0
+    assert out[:2] == ["26 measured points, 102 dense points, 1 ms",
+                       f"{tmp_path}/f.glb: mesh of 102 points, {size / 1000:.1f} kB; Blender and "
+                       "Windows 3D Viewer open it"]
+    assert out[2].startswith(f"{tmp_path}/r.json: report, ")
+    assert out[3].startswith(f"{tmp_path}/p.png: picture of the face, ")
+    assert len(out) == 4
+
+
+def test_where_nothing_is_asked_for_that_is_said(take, capsys):
+    status, out, _ = run(capsys, take)
+    assert status == 0
+    assert out[1:] == [
+        "nothing was written: -o writes the face, --preview a picture of it, --report the report",
+        "frame 0 of 3: --frame N takes another, --all-frames each"]
+
+
+def test_a_folder_gets_a_file_by_the_inputs_name(take, tmp_path, capsys):
+    status, out, _ = run(capsys, take, "-o", f"{tmp_path}/new/", "--format", "pcd")
+    assert (status, out[1].partition(":")[0]) == (0, f"{tmp_path}/new/take.pcd")
+
+
+def test_no_face_names_file_and_frame_and_what_to_try(take, capsys):
+    status, out, err = run(capsys, take, "--frame", 1)
+    assert (status, out) == (1, [])
+    assert err == [
+        f"denseface reconstruct: {take}, frame 1: no face found: too wide; --frame takes another "
+        "of its 3 frames, --all-frames each; --calibration gives the right focal length; "
+        "--preview P.png draws what was looked at"]
+
+
+def test_no_face_is_drawn_in_place_of_one(tmp_path, capsys):
+    path = write_frame(tmp_path / "wall.npz", face=False)
+    picture = tmp_path / "p.png"
+    status, _, (line,) = run(capsys, path, "-o", tmp_path / "f.ply", "--preview", picture)
+    assert status == 1
+    assert line.endswith(f"{picture} shows what was looked at")
+    assert cv2.imread(str(picture)).shape[1] > 1000
+    assert not (tmp_path / "f.ply").exists()
