@@ -33,6 +33,8 @@ def openings(cloud: DenseCloud) -> Openings:
     if not (binary_fill_holes(there) - there).any():
         return Openings(0, (0.0, 0.0))
     _, boxes = enclosed_parts(there == 0)
+    if not len(boxes):  # what was filled is open to the outside across a corner
+        return Openings(0, (0.0, 0.0))
     sides = boxes[:, 3:5] * cloud.grid_step_mm
     width, height = sides[sides.max(axis=1).argmax()]
     return Openings(len(sides), (float(width), float(height)))

@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     if args.inputs and not inputs:
         raise UsageError("INPUT: calibrations alone, expected a frame, recording or folder")
     several = args.all_frames or len(inputs) > 1
-    outputs.check(several=several)
+    outputs.check(inputs[0].name if inputs else args.depth.stem, several=several)
     if several:
         from denseface.service.tools.reconstruction.many import reconstruct_many
 

@@ -4,7 +4,7 @@ import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from denseface.service.errors import UsageError, reason_of
+from denseface.service.errors import UsageError
 from denseface.service.export import FORMATS, FaceFiles
 
 __all__ = ["Outputs"]
@@ -36,19 +36,15 @@ class Outputs:
         """Whether anything is to be written."""
         return any(self._given.values())
 
-    @property
-    def folders(self) -> list[str]:
-        """The folders, each once, as given."""
-        return list(dict.fromkeys(one for one in self._given.values() if one and _is_folder(one)))
-
-    def check(self, *, several: bool) -> None:
-        """Check the flags and make the folders.
+    def check(self, name: str, *, several: bool) -> None:
+        """Check the flags, before there is a face of a name, or several.
 
         Raises
         ------
-        UsageError, FormatError
-            They name one file for several faces, a folder that cannot be made or written to, or a
-            file that cannot be written.
+        UsageError
+            They name one file for several faces.
+        FormatError, UsageError, StoreError
+            As `FaceFiles`: a file cannot be written, or its ending is wrong.
         """
         if self.ending and not (self.face and (several or _is_folder(self.face))):
             raise UsageError(f"--format {self.ending[1:]}: expected with a folder, -o DIR/; a "
@@ -63,9 +59,7 @@ class Outputs:
             self.face, self.report, self.picture = (
                 f"{one}/" if one and not _is_folder(one) else one
                 for one in (self.face, self.report, self.picture))
-        for folder in self.folders:
-            _make(folder)
-        self.files("face")
+        self.files(name)
 
     def unique(self, name: str) -> str:
         """Give a name that no face before had, by which its files are called in folders."""
@@ -93,12 +87,3 @@ def _placed(given: str | None, name: str, ending: str) -> Path | None:
     if not given:
         return None
     return Path(given, name + ending) if _is_folder(given) else Path(given)
-
-
-def _make(folder: str) -> None:
-    try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(f"{folder}: {reason_of(error)}") from error
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise UsageError(f"{folder}: Permission denied")

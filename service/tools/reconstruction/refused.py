@@ -4,10 +4,10 @@ from collections import Counter
 from pathlib import Path
 
 from denseface.capture import RgbdFrame
+from denseface.files import write_whole
 from denseface.recon import ReconstructionError
 from denseface.service.errors import StoreError, reason_of
 from denseface.service.export.refusal import draw_refusal
-from denseface.service.runtime.files import write_atomically
 
 __all__ = ["draw_refused", "explained"]
 
@@ -22,7 +22,7 @@ def draw_refused(path: Path, frame: RgbdFrame, error: ReconstructionError, name:
     """
     picture = draw_refusal(frame, error.candidates, f"{name}: {error}")
     try:
-        write_atomically(path, [picture], sync_name=False)
+        write_whole(path, [picture])
     except OSError as failed:
         raise StoreError(f"{path}: {reason_of(failed)}") from failed
 

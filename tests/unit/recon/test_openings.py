@@ -36,6 +36,13 @@ def test_holes_are_counted_and_the_longest_is_measured():
     assert openings(without(cloud, gone)) == (2, (24.0, 6.0))
 
 
+def test_what_meets_the_outside_at_a_corner_is_open_and_no_hole():
+    cloud = small_face(40, 30).dense
+    row, column = cloud.cells.T
+    gone = ((row == 20) & (column == 5)) | ((row == 21) & (column <= 4))
+    assert openings(without(cloud, gone)) == (0, (0.0, 0.0))
+
+
 def test_a_step_within_the_surface_is_a_hole_though_no_point_is_missing():
     cloud = small_face(40, 30, step=0.5).dense
     row, column = cloud.cells.T

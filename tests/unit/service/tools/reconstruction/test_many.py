@@ -106,14 +106,20 @@ def test_a_file_that_cannot_be_written_ends_it(take, tmp_path, capsys):
     status, out, err = run(capsys, take, "--all-frames", "-o", f"{tmp_path}/out/")
     assert status == 1
     assert "0 faces; stopped before the end" in out
-    assert "take_0000.ply" in err[-1]
+    assert err[-1] == f"denseface reconstruct: {tmp_path}/out/take_0000.ply: Is a directory"
+
+
+def test_where_nothing_can_be_written_no_frame_is_read(take, tmp_path, capsys):
+    (tmp_path / "file").touch()
+    status, out, (line,) = run(capsys, take, "--all-frames", "-o", f"{tmp_path}/file/out/")
+    assert (status, out) == (1, [])
+    assert line.startswith(f"denseface reconstruct: {tmp_path}/file/out/take.ply: ")
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
     (["--all-frames", "-o", "{tmp}/face.ply"], "-o {tmp}/face.ply: expected a folder, as there are "
      "several faces: -o DIR/"),
     (["--all-frames", "--report", "r.json"], "--report r.json: expected a folder"),
-    (["--all-frames", "-o", "{tmp}/file/out/"], "{tmp}/file/out/: Not a directory"),
     (["--all-frames", "--frame", "1"], "not allowed with"),
     (["--all-frames", "--frames", "2"], "--frames is given with --all-frames"),
     (["--format", "stl"], "--format stl: expected with a folder"),
@@ -121,7 +127,6 @@ def test_a_file_that_cannot_be_written_ends_it(take, tmp_path, capsys):
     (["--depth", "d.png"], "found both"),
 ])
 def test_wrong_usage_is_one_line(take, tmp_path, capsys, arguments, message):
-    (tmp_path / "file").touch()
     status, out, err = run(capsys, take, *[one.format(tmp=tmp_path) for one in arguments])
     assert (status, out) == (2, [])
     (line,) = err
