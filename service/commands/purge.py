@@ -1,10 +1,10 @@
 """`denseface purge`."""
 
 import argparse
-import sys
 
 from denseface.service.commands import _options
-from denseface.service.runtime.terminal import printable, say
+from denseface.service.runtime.terminal import ask, can_ask, say
+from denseface.service.runtime.terminal.progress import Progress
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,13 +27,13 @@ def run(args: argparse.Namespace) -> int:
               else f"all captures accepted before {args.before:%Y-%m-%d %H:%M:%S} UTC"
               if args.before else "all captures")
     if not args.yes:
-        if not sys.stdin.isatty():
+        if not can_ask():
             raise UsageError("--yes: expected, as there is nobody to ask")
-        question = printable(f"Remove {chosen}, with frame, face and report? [y/N] ")
-        if input(question).strip().lower() != "y":
+        answer = ask(f"Remove {chosen}, with frame, face and report? [y/N]")
+        if (answer or "").lower() not in ("y", "yes"):
             say("nothing removed")
             return 1
-    with _options.operator(args) as operator:
+    with _options.operator(args) as operator, Progress(f"removing {chosen}"):
         removed = operator.purge(
             capture_id=args.capture_id, before=args.before, everything=args.all)
     if not removed and args.capture_id is not None:

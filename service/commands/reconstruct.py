@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="a .npz frame, a .oni recording, or a folder of frames, of recordings "
                              "or of image pairs; several make a face of each and a table")
     which = parser.add_mutually_exclusive_group()
-    which.add_argument("--frame", type=int, metavar="N",
+    which.add_argument("--frame", type=_options.whole(0), metavar="N",
                        help="which frame of a recording, from 0 (default: 0)")
     which.add_argument("--all-frames", action="store_true",
                        help="a face of each frame, NAME_0000 and so on")

@@ -17,16 +17,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--format", action="append", choices=[one[1:] for one in FORMATS],
                         help="of the files that --save writes; may be repeated (default: ply)")
     _options.add_mode(parser)
-    parser.add_argument("--count", type=int, metavar="N", help="end after N captures")
+    parser.add_argument("--count", type=_options.count, metavar="N", help="end after N captures")
     parser.add_argument("--sensor", metavar="NAME", help="with --hints: of this sensor alone")
     start = parser.add_mutually_exclusive_group()
     start.add_argument("--hints", action="store_true",
                        help="follow what could be better in front of the sensor, a line for each "
                             "change, in place of the faces")
-    start.add_argument("--after", type=int, metavar="SEQUENCE",
+    start.add_argument("--after", type=_options.whole(0), metavar="SEQUENCE",
                        help="start after this sequence number; 0 is all that is kept "
                             "(default: only what comes from now on)")
-    start.add_argument("--last", type=int, metavar="N",
+    start.add_argument("--last", type=_options.count, metavar="N",
                        help="start with the last N captures that are kept")
     start.add_argument("--since", type=_options.timestamp, metavar="TIME",
                        help="start with what ended at this time or later, such as "
@@ -37,10 +37,6 @@ def run(args: argparse.Namespace) -> int:
     from denseface.service.errors import UsageError
     from denseface.service.tools.follow import FaceFolder, changes, follow
 
-    for name in ("count", "after", "last"):
-        value = getattr(args, name)
-        if value is not None and value < (name != "after"):
-            raise UsageError(f"--{name} {value}: expected a number that is not negative, or zero")
     if args.format and not args.save:
         raise UsageError("--format: expected with --save DIR, which writes the files")
     if args.hints and args.save:

@@ -19,8 +19,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="calibration that wins over the source's own; with several sources "
                              "one for each, in their order")
     _options.add_rotation(parser, action="append", default=None)
-    parser.add_argument("--workers", type=_worker_count, default=max(1, (os.cpu_count() or 2) - 1),
-                        metavar="N", help="reconstruction processes (default: cores less one)")
+    parser.add_argument("--workers", type=_options.whole(1, 256), metavar="N",
+                        default=max(1, (os.cpu_count() or 2) - 1),
+                        help="reconstruction processes (default: cores less one)")
     _options.add_hub(parser)
     parser.add_argument("--no-kiosk", action="store_true",
                         help=f"do not serve the page for visitors (also: {KIOSK_VARIABLE}=off)")
@@ -87,9 +88,3 @@ def _captures(
     return [[f"--source={source}", *(f"--calibration={one}" for one in calibrations[at:at + 1]),
              *(f"--rotate={one}" for one in rotations[at:at + 1])]
             for at, source in enumerate(sources)]
-
-
-def _worker_count(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= 256:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a number from 1 to 256")
-    return int(text)

@@ -1,17 +1,28 @@
 """Flags that several commands share, and what is made of them."""
 
 import argparse
-import math
 import os
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from denseface.service.commands._options.values import (
+    burst,
+    count,
+    file_mode,
+    seconds,
+    timestamp,
+    whole,
+)
 from denseface.service.export import FORMATS
+
+__all__ = [
+    "add_client", "add_hub", "add_keys", "add_log", "add_mode", "add_outputs", "add_recon",
+    "add_rotation", "add_source", "burst", "client", "count", "file_mode", "operator",
+    "recon_settings", "repeated", "seconds", "service_settings", "timestamp", "warn", "whole",
+]
 
 if TYPE_CHECKING:
     from denseface.recon.face import Face
@@ -109,16 +120,9 @@ def add_outputs(parser: argparse.ArgumentParser, *flags: str) -> None:
 
 def add_mode(parser: argparse.ArgumentParser) -> None:
     """Add `--mode`, of the files that `--save` writes: pictures of people, whatever the umask."""
-    parser.add_argument("--mode", type=_file_mode, default=0o600, metavar="OCTAL",
+    parser.add_argument("--mode", type=file_mode, default=0o600, metavar="OCTAL",
                         help="mode of the files that are written, such as 640 (default: 600, for "
                              "this user alone)")
-
-
-def _file_mode(text: str) -> int:
-    if not re.fullmatch("0?[0-7]{3}", text) or (mode := int(text, 8)) & 0o600 != 0o600:
-        raise argparse.ArgumentTypeError(
-            f"{text!r}: expected three octal digits such as 640, the first a 6 or 7")
-    return mode
 
 
 def add_recon(parser: argparse.ArgumentParser) -> None:
@@ -207,36 +211,3 @@ def warn(face: "Face") -> None:
 
     for warning in face.report.warnings:
         complain(f"warning: {warning}")
-
-
-def seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value <= 86400:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected seconds, more than 0")
-    return value
-
-
-def count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number, at least 1")
-    return int(text)
-
-
-def burst(text: str) -> int:
-    from denseface.capture import MAX_BURST
-
-    if not 1 <= (value := count(text)) <= MAX_BURST:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected 1 to {MAX_BURST} frames")
-    return value
-
-
-def timestamp(text: str) -> datetime:
-    from denseface.service.runtime.parsing import parse_time
-
-    try:
-        return parse_time(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error

@@ -8,7 +8,7 @@ from denseface.service.runtime.terminal import say
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     _options.add_client(parser)
-    parser.add_argument("--last", type=_options.count, default=20, metavar="N",
+    parser.add_argument("--last", type=_options.whole(1, 50), default=20, metavar="N",
                         help="so many, the newest first, at most 50 (default: 20)")
 
 

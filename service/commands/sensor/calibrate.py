@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from denseface.service.commands import _options
+from denseface.service.commands._options.values import wanted
 from denseface.service.runtime.terminal import complain, say
 
 if TYPE_CHECKING:
@@ -135,8 +136,7 @@ def _sides(text: str) -> tuple[int, int]:
     found = re.fullmatch(r"(\d{1,3})x(\d{1,3})", text)
     sides = tuple(map(int, found.groups())) if found else (0, 0)
     if not all(_LEAST_SIDE < side <= _MOST_SIDE for side in sides):
-        raise argparse.ArgumentTypeError(
-            f"{text!r}: expected columns and rows such as 9x6, 3 to {_MOST_SIDE} each")
+        raise wanted(f"columns and rows such as 9x6, {_LEAST_SIDE + 1} to {_MOST_SIDE} each", text)
     return sides[0], sides[1]
 
 
@@ -146,14 +146,12 @@ def _length(text: str) -> float:
     except ValueError:
         length = 0.0
     if not _SQUARE_MM[0] <= length <= _SQUARE_MM[1]:
-        raise argparse.ArgumentTypeError(
-            f"{text!r}: expected millimetres, {_SQUARE_MM[0]:g} to {_SQUARE_MM[1]:g}")
+        raise wanted(f"millimetres, {_SQUARE_MM[0]:g} to {_SQUARE_MM[1]:g}", text)
     return length
 
 
 def _dictionary(text: str) -> str:
     name = text.upper().removeprefix("DICT_")
     if not re.fullmatch(r"[4-7]X[4-7]_(50|100|250|1000)|ARUCO_ORIGINAL", name):
-        raise argparse.ArgumentTypeError(
-            f"{text!r}: expected one of OpenCV's dictionaries such as 4X4_50")
+        raise wanted("one of OpenCV's dictionaries such as 4X4_50", text)
     return name

@@ -1,6 +1,8 @@
 """Lines for people: what came from outside is escaped, what cannot be said is lost."""
 
 from denseface.service.runtime.terminal._lines import (
+    ask,
+    can_ask,
     complain,
     complain_of,
     discard_unless_flushed,
@@ -11,6 +13,6 @@ from denseface.service.runtime.terminal._lines import (
 )
 
 __all__ = [
-    "complain", "complain_of", "discard_unless_flushed", "fill_standard_descriptors", "printable",
-    "reader_left", "say",
+    "ask", "can_ask", "complain", "complain_of", "discard_unless_flushed",
+    "fill_standard_descriptors", "printable", "reader_left", "say",
 ]

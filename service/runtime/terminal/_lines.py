@@ -13,8 +13,8 @@ from types import TracebackType
 from typing import TextIO
 
 __all__ = [
-    "complain", "complain_of", "discard_unless_flushed", "fill_standard_descriptors", "printable",
-    "reader_left", "say", "step_aside_by",
+    "ask", "can_ask", "complain", "complain_of", "discard_unless_flushed",
+    "fill_standard_descriptors", "printable", "reader_left", "say", "step_aside_by",
 ]
 
 _aside: Callable[[], AbstractContextManager[object]] = nullcontext
@@ -48,6 +48,28 @@ def complain(line: str) -> None:
     with _aside(), suppress(OSError, ValueError):
         print(printable(line), file=sys.stderr)
     discard_unless_flushed(sys.stderr)
+
+
+def can_ask() -> bool:
+    """Say whether somebody sits at a terminal and can be asked."""
+    try:
+        return sys.stdin is not None and sys.stderr is not None and sys.stdin.isatty()
+    except ValueError:  # closed
+        return False
+
+
+def ask(question: str) -> str | None:
+    """Ask on stderr, as stdout may lead elsewhere; None at the end of the input, as by Ctrl-D."""
+    with _aside():
+        try:
+            sys.stderr.write(f"{printable(question)} ")
+            sys.stderr.flush()
+            if answer := sys.stdin.readline():
+                return answer.strip()
+            sys.stderr.write("\n")
+        except (OSError, ValueError):
+            discard_unless_flushed(sys.stderr)
+    return None
 
 
 def complain_of(

@@ -1,0 +1,74 @@
+"""Values of flags: each is checked, and refused in the words `expected ..., found ...`."""
+
+import argparse
+import math
+import re
+from collections.abc import Callable
+from datetime import datetime
+
+__all__ = ["burst", "count", "file_mode", "seconds", "timestamp", "wanted", "whole"]
+
+_MOST = 10**12
+"""Largest whole number that anything takes."""
+_DAY_S = 86400.0
+"""Longest time that is waited, seconds."""
+_SHOWN = 60
+"""Characters of a wrong value that are shown."""
+
+
+def wanted(expected: str, found: str) -> argparse.ArgumentTypeError:
+    """Give the error of a value: one line that says both."""
+    shown = found if len(found) <= _SHOWN else found[:_SHOWN] + "..."
+    return argparse.ArgumentTypeError(f"expected {expected}, found {shown!r}")
+
+
+def whole(least: int, most: int = _MOST) -> Callable[[str], int]:
+    """Give what reads a whole number in these bounds."""
+    expected = (f"a whole number, at least {least}" if most == _MOST
+                else f"a whole number from {least} to {most}")
+
+    def read(text: str) -> int:
+        if (not re.fullmatch("[+-]?[0-9]+", text) or len(text) > len(str(_MOST)) + 1
+                or not least <= (value := int(text)) <= most):
+            raise wanted(expected, text)
+        return value
+
+    return read
+
+
+count = whole(1)
+
+
+def seconds(text: str) -> float:
+    """Read a time to wait, seconds."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value <= _DAY_S:
+        raise wanted(f"seconds, more than 0 and at most {_DAY_S:.0f}", text)
+    return value
+
+
+def burst(text: str) -> int:
+    """Read a number of frames that can be made one."""
+    from denseface.capture import MAX_BURST
+
+    return whole(1, MAX_BURST)(text)
+
+
+def timestamp(text: str) -> datetime:
+    """Read a time; UTC where it names no zone."""
+    from denseface.service.runtime.parsing import parse_time
+
+    try:
+        return parse_time(text)
+    except ValueError:
+        raise wanted("a time such as 2026-01-31T14:30, UTC or with a zone", text) from None
+
+
+def file_mode(text: str) -> int:
+    """Read the mode of a file that its owner can read and write."""
+    if not re.fullmatch("0?[0-7]{3}", text) or (mode := int(text, 8)) & 0o600 != 0o600:
+        raise wanted("three octal digits such as 640, the first a 6 or 7", text)
+    return mode
