@@ -1,11 +1,13 @@
 """One process of the table: how it is started, when it hangs, how often it is started again."""
 
 import os
+import signal
 import subprocess
 import sys
 import time
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -90,6 +92,8 @@ class WatchedProcess:
     """When to start, by the monotonic clock, seconds."""
     counts: Counter[str] = field(default_factory=Counter)
     """How often it ended, by `End.reason`."""
+    last_end: str = ""
+    """How it ended last, and why, as far as it said."""
     _link: ProcessLink | None = None
     _beat: Beat | None = None
     """The last sign of life; None while it starts."""
@@ -149,8 +153,8 @@ class WatchedProcess:
         self.running.kill()  # SIGTERM would wait for SIGCONT where it is stopped
         return silence
 
-    def send_restarts(self, counts: dict[str, dict[str, int]]) -> bool:
-        """Tell the process how often each was restarted; False where that is to be tried again."""
+    def send_restarts(self, counts: Mapping[str, Mapping[str, int | str]]) -> bool:
+        """Tell the process how often each ended and how last; False where to be tried again."""
         return self._link is not None and self._link.send_restarts(counts)
 
     def ended(self) -> End | None:
@@ -159,6 +163,8 @@ class WatchedProcess:
         if status is None:
             return None
         self._listen(self._heard)  # what it said last
+        why = self._link.why if self._link is not None else ""
+        self.last_end = _ending(status, why, hung=self._killed)
         self.close()
         self.running = None
         end = End(status, "hung" if self._killed else "exited", self._beat is Beat.HOLDING)
@@ -189,6 +195,15 @@ class WatchedProcess:
     def _listen(self, attended: float) -> None:
         if self._link is not None and (beat := self._link.last_beat()):
             self._beat, self._heard = beat, attended
+
+
+def _ending(status: int, why: str, *, hung: bool) -> str:
+    if hung:
+        return "it hung"
+    with suppress(ValueError):
+        how = f"status {status}" if status >= 0 else signal.Signals(-status).name
+        return f"{how}{why and f': {why}'}"
+    return f"signal {-status}"
 
 
 def _processor_ticks(pid: int) -> int:

@@ -66,7 +66,10 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None,
             with _supply(settings, uri, calibration, rotation) as supply:
                 try:
                     with HubConnection(settings, "capture", supervisor) as connection:
-                        _Capture(settings, connection, supply, uri, name).serve(stop)
+                        _Capture(settings, connection, supply, uri, name, supervisor).serve(stop)
+                except Exception as error:
+                    supervisor.say_why(" ".join(str(error).split()) or type(error).__name__)
+                    raise
                 finally:
                     if not supply.close():
                         _log.error("the driver hangs", source=uri, reason="it does not close")
@@ -98,6 +101,7 @@ class _Capture:
     supply: Supply
     uri: str
     name: str | None = None
+    supervisor: SupervisorLink = field(default_factory=SupervisorLink)
     sender: FrameSender = field(init=False)
     said: SupplyState | None = None
     """The state that the hub was told last."""
@@ -119,6 +123,7 @@ class _Capture:
                 self._receive(packet)
             if reason := self.supply.hangs():
                 _log.error("another process is needed", source=self.uri, reason=reason)
+                self.supervisor.say_why(reason)
                 exit_now(1)
             for outcome in self.supply.step(busy=len(self.sender) > 0):
                 match outcome:

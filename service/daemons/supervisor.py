@@ -149,7 +149,7 @@ class Supervisor:
     def _tell_hub(self) -> None:
         if not self._told:
             self._told = self._processes[0].send_restarts({
-                process.spec.name: dict(process.counts)
+                process.spec.name: {**process.counts, "last": process.last_end}
                 for process in self._processes if process.counts})
 
     def _tell_manager(self) -> None:

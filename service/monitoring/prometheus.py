@@ -83,8 +83,8 @@ def _restarts(snapshot: Snapshot) -> core.Metric:
     family = core.CounterMetricFamily(
         _PREFIX + "restarts", "Processes that were started again.", labels=["process", "reason"])
     for process, counts in snapshot.status.restarts.items():
-        for reason, count in counts:
-            family.add_metric([process, reason], count)
+        family.add_metric([process, "exited"], counts.exited)
+        family.add_metric([process, "hung"], counts.hung)
     return family
 
 

@@ -2,10 +2,11 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, FailFast, Field
+from pydantic import BaseModel, ConfigDict, FailFast, Field, field_validator
 
 from denseface.service.protocol.message_base import BaseAnswer, Name, Names, Number, Token
 from denseface.service.protocol.sensor_messages import SensorFigures
+from denseface.service.runtime.terminal import printable
 
 MAX_SENSOR_STATES = 64
 """Sensors whose state a status tells: so many fit into a header, whatever their reasons are."""
@@ -25,13 +26,20 @@ class Latency(BaseModel):
 
 
 class Restarts(BaseModel):
-    """How often one process of `denseface up` was started again since that began, by the reason."""
+    """How often one process of `denseface up` had to be started again since that began, and why."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
     exited: Number = 0
     hung: Number = 0
     """It was silent for too long and was ended for it."""
+    last: Name = ""
+    """How it ended last: `status 1`, `SIGSEGV` or `it hung`, and why, as far as it said."""
+
+    @field_validator("last", mode="before")
+    @classmethod
+    def _shortened(cls, text: object) -> object:
+        return printable(text)[:200] if isinstance(text, str) else text
 
 
 class SensorStatus(BaseModel):

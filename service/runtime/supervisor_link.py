@@ -1,4 +1,4 @@
-"""What a process and its supervisor tell each other: signs of life, and counts of restarts.
+"""What a process and its supervisor tell each other: signs of life, why it ends, and restarts.
 
 They share a pair of SEQPACKET sockets: a record comes whole or not at all, nobody waits for the
 other, and what a process said last can still be read when it is dead.
@@ -6,7 +6,7 @@ other, and what a process said last can still be read when it is dead.
 
 import json
 import socket
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping
 from contextlib import suppress
 from enum import Enum
 from typing import Any, Self
@@ -19,6 +19,10 @@ LINK_VARIABLE = "DENSEFACE_SUPERVISOR"
 """Environment variable with the descriptor of a process's end."""
 _MAX_RECORD = 64 * 1024
 """Longest record, bytes."""
+_WHY = b"w"
+"""Begins the record that says why a process ends."""
+_MAX_WHY = 400
+"""Longest reason, bytes."""
 _MAX_READ = 4096
 """Records read at a time: more than a socket's buffer holds."""
 
@@ -62,6 +66,12 @@ class SupervisorLink(Closing):
             with suppress(OSError):  # full: the supervisor has enough to read; or it is dead
                 self._end.send(beat.value)
 
+    def say_why(self, reason: str) -> None:
+        """Say why this process is about to end."""
+        if self._end is not None:
+            with suppress(OSError):
+                self._end.send(_WHY + reason.encode(errors="replace")[:_MAX_WHY])
+
     def restarts(self) -> dict[str, Any] | None:
         """Give the newest counts that the supervisor sent; None where there are no new ones."""
         newest = None
@@ -82,6 +92,8 @@ class ProcessLink(Closing):
         self._end, self._other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._end.setblocking(False)
         self._other.setblocking(False)
+        self.why = ""
+        """Why the process ends, as far as it has said that and it was read."""
 
     @property
     def descriptor(self) -> int:
@@ -96,12 +108,14 @@ class ProcessLink(Closing):
         """Read all that the process said; give the last sign of life, None where there is none."""
         last = None
         for record in _records(self._end):
+            if record.startswith(_WHY):
+                self.why = record.removeprefix(_WHY).decode(errors="replace")
             with suppress(ValueError):
                 last = Beat(record)
         return last
 
-    def send_restarts(self, counts: dict[str, dict[str, int]]) -> bool:
-        """Send the counts of all processes; False where they do not get through now."""
+    def send_restarts(self, counts: Mapping[str, Mapping[str, int | str]]) -> bool:
+        """Send how often all processes ended, and how last; False where that is stuck now."""
         try:
             self._end.send(json.dumps(counts).encode())
         except OSError:

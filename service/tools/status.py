@@ -6,13 +6,14 @@ import time
 from denseface.service.client import Client
 from denseface.service.errors import ClientTimeoutError
 from denseface.service.protocol.messages import Status
-from denseface.service.protocol.status import SensorStatus
+from denseface.service.protocol.status import Restarts, SensorStatus
 from denseface.service.runtime.terminal import printable
 
 __all__ = ["as_json", "as_text", "ready_status"]
 
 _POLL_S = 0.1
 """Time between two requests, seconds."""
+_HELP = "`denseface doctor` says what keeps a sensor from working"
 
 
 def ready_status(client: Client, timeout: float) -> Status:
@@ -28,24 +29,43 @@ def ready_status(client: Client, timeout: float) -> Status:
     while not status.ready:
         left = deadline - time.monotonic()
         if left <= 0:
-            raise ClientTimeoutError(f"{_missing(status)} after {timeout:g} s")
+            raise ClientTimeoutError(_missing(status, timeout))
         time.sleep(min(_POLL_S, left))
         status = client.status()
     return status
 
 
-def _missing(status: Status) -> str:
+def _missing(status: Status, timeout: float) -> str:
     if status.obstacle:
-        return f"presses are still refused ({status.obstacle})"
-    missing = ("no hub" if status.state != "serving" else
-               _no_sensor(status) if not status.has_frames else "no worker")
-    return f"{missing} is ready"
+        return f"presses are still refused ({status.obstacle}) after {timeout:g} s"
+    if status.state != "serving":
+        return f"no hub is ready after {timeout:g} s"
+    if status.has_frames:
+        return f"no worker is ready after {timeout:g} s"
+    help_ = f"; {_HELP}" if _is_sensor_wrong(status) else ""
+    return f"no sensor is ready after {timeout:g} s: {_why_no_sensor(status)}{help_}"
 
 
-def _no_sensor(status: Status) -> str:
-    return "no sensor" + "".join(
-        f" ({one.name} is {one.state}{one.reason and f': {one.reason}'})"
-        for one in status.sensor_states)
+def _why_no_sensor(status: Status) -> str:
+    """Say why there is none: as the sensors say, or as their processes ended."""
+    if status.sensor_states:
+        return "; ".join(f"{one.name} is {one.state}{one.reason and f': {one.reason}'}"
+                         for one in status.sensor_states)
+    return "; ".join(
+        f"the process {name} ended {one.exited + one.hung} times and is started again, last ended "
+        f"by {one.last}" for name, one in _ended_captures(status)) or (
+        "no capture process has come yet: `denseface up` starts one, `denseface capture` is one")
+
+
+def _ended_captures(status: Status) -> list[tuple[str, Restarts]]:
+    return [(name, one) for name, one in status.restarts.items() if name.startswith("capture")]
+
+
+def _is_sensor_wrong(status: Status) -> bool:
+    """Whether a look at the sensor may help: one that is being opened is to be waited for."""
+    return (status.state == "serving" and not status.has_frames
+            and not any(one.state == "opening" for one in status.sensor_states)
+            and bool(status.sensor_states or _ended_captures(status)))
 
 
 def _sensor(one: SensorStatus) -> str:
@@ -71,11 +91,14 @@ def as_text(address: str, status: Status) -> str:
     rows = {
         "hub": f"{status.hub_version} at {address}",
         "sensors": "; ".join(map(_sensor, status.sensor_states)) or (
-            ", ".join(status.sensors) or "none"),
+            ", ".join(status.sensors) or f"none: {_why_no_sensor(status)}"
+            if status.state == "serving" else "none"),
         "workers": ", ".join(status.workers) or "none",
         "now": f"{status.pressed} pressed, {status.queued} queued, {status.working} working",
         "kept": f"{status.done} faces, {status.failed} without a face, {status.dead} given up",
     }
+    if _is_sensor_wrong(status):
+        rows["help"] = _HELP
     if status.free_bytes is not None:
         rows["disk"] = f"{status.free_bytes / 1e9:.1f} GB free"
         if status.kept_bytes is not None:
@@ -94,7 +117,7 @@ def as_text(address: str, status: Status) -> str:
     if status.restarts:
         rows["restarts"] = ", ".join(
             f"{process} {reason} {count}" for process, counts in status.restarts.items()
-            for reason, count in counts if count)
+            for reason, count in (("exited", counts.exited), ("hung", counts.hung)) if count)
     if status.state != "serving":
         rows["hub"] += (f", {status.state}: {status.files_read} of {status.files_to_read} files "
                         "read, all else is not known yet")

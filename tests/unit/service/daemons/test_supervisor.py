@@ -8,7 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from denseface.service.daemons._watched_process import AttendedClock, ProcessSpec, WatchedProcess
+from denseface.service.daemons._watched_process import (
+    AttendedClock,
+    ProcessSpec,
+    WatchedProcess,
+    _ending,
+)
 from denseface.service.daemons.supervisor import Supervisor, process_table
 from tests.system.running import RECORDINGS
 from tests.waiting import LIMIT_S, PATIENCE, until
@@ -205,6 +210,17 @@ def test_who_does_something_may_take_long_to_start(starting):
     process.running.wait(LIMIT_S)
     end = process.ended()
     assert (end.reason, end.holding, process.counts) == ("hung", False, {"hung": 1})
+    assert process.last_end == "it hung"
+
+
+def test_how_a_process_ended_is_kept_with_what_it_said(starting):
+    process, _ = starting
+    until(lambda: process.running.poll() is not None)
+    process._link.why = "no such class"
+    process.ended()
+    assert process.last_end == "status 0: no such class"
+    assert [_ending(status, "", hung=False) for status in (1, -11, -64, -99)] == [
+        "status 1", "SIGSEGV", "SIGRTMAX", "signal 99"]
 
 
 def test_who_does_nothing_hangs_from_the_start(starting):

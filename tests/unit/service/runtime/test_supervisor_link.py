@@ -33,6 +33,15 @@ def test_the_last_sign_of_life_counts(ends):
     assert process.last_beat() is None
 
 
+def test_why_a_process_ends_is_heard_and_is_no_sign_of_life(ends):
+    process, supervisor = ends
+    supervisor.beat(Beat.HOLDING)
+    supervisor.say_why("no such class \u00e9" + "x" * 1000)
+    assert process.last_beat() is Beat.HOLDING
+    assert process.why.startswith("no such class \u00e9xxx")
+    assert len(process.why) < 500
+
+
 def test_nobody_waits_for_who_does_not_read(ends):
     process, supervisor = ends
     for _ in range(10_000):

@@ -67,8 +67,32 @@ def test_sensors_are_told_with_their_states_and_what_went_wrong():
         "sensors  B0012 streaming, 5400 frames, 12 dropped, 2 stalls, skew 12.4 ms; "
         "door (usb 1-2) blocked: no permission for /dev/bus/usb")
     with pytest.raises(ClientTimeoutError, match=(
-            r"no sensor \(door is blocked: no permission for /dev/bus/usb\) is ready after")):
+            r"no sensor is ready after 0\.01 s: door is blocked: no permission for /dev/bus/usb; "
+            "`denseface doctor` says what keeps a sensor from working")):
         ready_status(Client(status(sensor_states=states[1:])), 0.01)
+
+
+HELP = "help     `denseface doctor` says what keeps a sensor from working"
+
+
+@pytest.mark.parametrize(("more", "words", "helps"), [
+    ({}, "none: no capture process has come yet: `denseface up` starts one, `denseface capture` is "
+         "one", False),
+    ({"restarts": {"worker-1": {"exited": 1, "last": "SIGKILL"}}}, "none: no capture proc", False),
+    ({"restarts": {"capture": {"exited": 2, "hung": 1, "last": "status 1: no such class"}}},
+     "none: the process capture ended 3 times and is started again, last ended by status 1: no "
+     "such class", True),
+    ({"sensor_states": [{"name": "s", "state": "absent", "reason": "OpenNI2 finds no sensor"}]},
+     "s absent: OpenNI2 finds no sensor", True),
+    ({"sensor_states": [{"name": "s", "state": "opening", "reason": "the source is being opened"}]},
+     "s opening: the source is being opened", False),
+    ({"state": "opening"}, "none", False),
+])
+def test_why_there_is_no_sensor_and_what_helps(more, words, helps):
+    shown = Status.model_validate(status().model_dump() | more)
+    lines = as_text("ipc:///x", shown).splitlines()
+    assert lines[1].startswith(f"sensors  {words}")
+    assert (HELP in lines) is helps
 
 
 def test_lost_lines_of_the_log_are_shown_and_names_obey_no_terminal():
@@ -81,4 +105,5 @@ def test_it_says_what_was_started_again_and_why():
     shown = status(restarts={"hub": {"hung": 1}, "worker-1": {"exited": 2, "hung": 3}})
     assert as_text("ipc:///x", shown).splitlines()[-1] == (
         "restarts hub hung 1, worker-1 exited 2, worker-1 hung 3")
-    assert json.loads(as_json("ipc:///x", shown))["restarts"]["hub"] == {"exited": 0, "hung": 1}
+    assert json.loads(as_json("ipc:///x", shown))["restarts"]["hub"] == {
+        "exited": 0, "hung": 1, "last": ""}
