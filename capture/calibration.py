@@ -12,9 +12,10 @@ from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from denseface.capture.errors import CalibrationError
+from denseface.checked_model import FLATTENED, CheckedModel, first_line
 from denseface.short_repr import short_repr
 
 __all__ = ["MAX_SIDE", "Calibration", "CameraModel", "ChosenCalibration", "DepthToColor"]
@@ -55,8 +56,8 @@ _SAME_SHAPE = 0.005
 """By which two images' sides may differ in ratio: 1296x968 of 640x480 is off by 0.4 %."""
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+class _Model(CheckedModel):
+    error = CalibrationError
 
 
 class CameraModel(_Model):
@@ -74,7 +75,8 @@ class CameraModel(_Model):
     """Principal point along x, pixels."""
     cy: _Finite
     """Principal point along y, pixels."""
-    distortion: tuple[_Finite, _Finite, _Finite, _Finite, _Finite] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    distortion: Annotated[tuple[_Finite, _Finite, _Finite, _Finite, _Finite], FLATTENED] = (
+        0.0, 0.0, 0.0, 0.0, 0.0)
     """(k1, k2, p1, p2, k3), OpenCV's order."""
 
     def project(self, points: NDArray[np.floating]) -> _Array:
@@ -90,7 +92,7 @@ class CameraModel(_Model):
         """
         points = np.asarray(points, np.float64)
         if points.shape[-1:] != (3,):
-            raise ValueError(f"points must have shape (..., 3), got {points.shape}")
+            raise ValueError(f"points must have shape (..., 3), found {points.shape}")
         x, y = self._distort(points[..., 0] / points[..., 2], points[..., 1] / points[..., 2])
         return np.stack([self.fx * x + self.cx, self.fy * y + self.cy], axis=-1)
 
@@ -108,7 +110,7 @@ class CameraModel(_Model):
         """
         pixels = np.asarray(pixels, dtype=np.float64)
         if pixels.shape[-1:] != (2,):
-            raise ValueError(f"pixels must have shape (..., 2), got {pixels.shape}")
+            raise ValueError(f"pixels must have shape (..., 2), found {pixels.shape}")
         z = np.broadcast_to(np.asarray(depth_mm, np.float64), pixels.shape[:-1])
         centered = np.subtract(pixels, (self.cx, self.cy), dtype=np.float64)
         x, y = self._undistort(centered[..., 0] / self.fx, centered[..., 1] / self.fy)
@@ -291,7 +293,7 @@ class DepthToColor(_Model):
     """The rigid transform X_color = rotation @ X_depth + translation."""
 
     rotation: tuple[_Row, _Row, _Row] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
-    translation_mm: tuple[_Shift, _Shift, _Shift] = (0, 0, 0)
+    translation_mm: Annotated[tuple[_Shift, _Shift, _Shift], FLATTENED] = (0, 0, 0)
 
     @field_validator("rotation")
     @classmethod
@@ -316,11 +318,10 @@ class Calibration(_Model):
     depth_to_color: DepthToColor = DepthToColor()
 
     def __repr__(self) -> str:
-        apart = math.hypot(*self.depth_to_color.translation_mm)
         return short_repr(self, *(
             f"{name} {camera.width}x{camera.height} of focal length {camera.fx:.1f}"
             for name, camera in (("depth", self.depth), ("color", self.color))),
-            f"{apart:.1f} mm apart")
+            f"{math.hypot(*self.depth_to_color.translation_mm):.1f} mm apart")
 
     __str__ = __repr__
 
@@ -347,9 +348,8 @@ class Calibration(_Model):
         try:
             return cls.model_validate_json(text)
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            where = ".".join(str(part) for part in first["loc"]) or "JSON"
-            raise CalibrationError(f"{name}: {where}: {first['msg']}") from error
+            hint = "" if "{" in str(text) else ": load_calibration(path) reads a file"
+            raise CalibrationError(f"{name}: {first_line(error, 'JSON')}{hint}") from error
 
     def to_json(self) -> str:
         """Write the JSON of the frame format."""

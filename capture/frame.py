@@ -1,22 +1,33 @@
 """A synchronized depth + colour frame, what its numbers mean and where it comes from."""
 
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from enum import StrEnum
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.arguments import describe
 from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
 from denseface.capture.errors import FrameError
 from denseface.short_repr import short_repr
 
 __all__ = ["MAX_BURST", "DepthMeaning", "DepthRounding", "FrameOrigin", "RgbdFrame"]
 
+_MOST = 2**63
+"""Of a number in a file or message."""
 _UNITS_UM = (1, 100_000)
 """Least and most micrometres of one count of a depth."""
 MAX_BURST = 32
 """Frames that one frame is made of, at most: a second of a sensor, in which few hold still."""
+
+
+def _check_number(name: str, given: object) -> None:
+    if isinstance(given, bool) or not isinstance(given, int | np.integer):
+        raise FrameError(f"{name} must be a whole number, found {describe(given)}")
+    if not -_MOST <= given < _MOST:
+        raise FrameError(f"{name} must fit into 64 bits, found {given}")
 
 
 class DepthRounding(StrEnum):
@@ -51,6 +62,13 @@ class DepthMeaning:
     max_mm: int | None = None
 
     def __post_init__(self) -> None:
+        _check_number("depth_unit_um", self.unit_um)
+        if self.max_mm is not None:
+            _check_number("max_mm", self.max_mm)
+        if self.rounding not in set(DepthRounding):
+            raise FrameError(f"depth_rounding must be {', '.join(DepthRounding)}, found "
+                             f"{describe(self.rounding)}")
+        object.__setattr__(self, "rounding", DepthRounding(self.rounding))  # of a text
         least, most = _UNITS_UM
         if not least <= self.unit_um <= most:
             raise FrameError(f"depth_unit_um must be {least} to {most}, found {self.unit_um}")
@@ -96,6 +114,11 @@ class FrameOrigin:
     source: str = ""
 
     def __post_init__(self) -> None:
+        for name in ("sensor", "captured_at", "source"):
+            if not isinstance(text := getattr(self, name), str):
+                hint = ": its isoformat()" if isinstance(text, datetime) else ""
+                raise FrameError(f"{name} must be str, found {describe(text)}{hint}")
+        _check_number("fused", self.fused)
         if not 1 <= self.fused <= MAX_BURST:
             raise FrameError(f"fused must be 1 to {MAX_BURST}, found {self.fused}")
         if not self.source.isprintable():  # the name of a file may be any bytes
@@ -137,14 +160,18 @@ class RgbdFrame:
     origin: FrameOrigin = field(default=FrameOrigin(), kw_only=True)
 
     def __post_init__(self) -> None:
-        _check("depth", self.depth, np.uint16, 2)
+        _check_depth(self.depth)
+        for name, kind in _KINDS.items():
+            if not isinstance(given := getattr(self, name), kind):
+                raise FrameError(f"{name} must be {kind.__name__}, found {describe(given)}")
+        if not isinstance(self.registered, bool | np.bool_):
+            raise FrameError(f"registered must be bool, found {describe(self.registered)}")
+        for name in ("depth_timestamp_us", "color_timestamp_us"):
+            _check_number(name, getattr(self, name))
         images: list[tuple[str, NDArray[Any], CameraModel]] = [
             ("depth", self.depth, self.depth_camera)]
         if self.color is not None:
-            _check("color", self.color, np.uint8, 3)
-            if self.color.shape[2] != 3:
-                raise FrameError(
-                    f"color must have 3 channels (RGB), found shape {self.color.shape}")
+            _check_color(self.color)
             images.append(("color", self.color, self.calibration.color))
         elif self.registered:
             raise FrameError("registered, but there is no color to be registered to")
@@ -203,9 +230,46 @@ class RgbdFrame:
         return replace(self, origin=replace(self.origin, notes=(*self.origin.notes, *notes)))
 
 
-def _check(name: str, array: NDArray[Any], dtype: type[np.generic], ndim: int) -> None:
-    if not isinstance(array, np.ndarray) or array.dtype != dtype or array.ndim != ndim:
-        is_array = isinstance(array, np.ndarray)
-        found = f"{array.dtype} {array.shape}" if is_array else type(array).__name__
-        raise FrameError(
-            f"{name} must be a {ndim}-dimensional {np.dtype(dtype)} array, found {found}")
+_KINDS: dict[str, type] = {
+    "calibration": Calibration, "depth_meaning": DepthMeaning, "origin": FrameOrigin,
+    "calibration_origin": str}
+"""What `RgbdFrame` takes beside its arrays and numbers."""
+_NO_ARRAY = "np.asarray makes one of what holds numbers"
+
+
+def _check_depth(depth: object) -> None:
+    if isinstance(depth, np.ndarray) and depth.dtype == np.uint16 and depth.ndim == 2:
+        return
+    hint = ""
+    if not isinstance(depth, np.ndarray):
+        hint = _NO_ARRAY if depth is not None else ""
+    elif depth.ndim == 3 and depth.shape[2] == 1:
+        hint = "depth[..., 0] is one"
+    elif depth.ndim == 2 and depth.dtype.kind == "f":
+        hint = "of metres (1000 * depth).round().astype(np.uint16) makes one"
+    elif depth.ndim == 2 and depth.dtype.kind in "iu" and depth.dtype.itemsize > 1:
+        hint = "of millimetres depth.astype(np.uint16) makes one"
+    raise FrameError(_expected("depth", "(H, W) uint16 array", depth, hint))
+
+
+def _check_color(color: object) -> None:
+    is_array = isinstance(color, np.ndarray) and color.dtype == np.uint8
+    shape: tuple[int, ...] = color.shape if isinstance(color, np.ndarray) else ()
+    if is_array and shape[2:] == (3,):
+        return
+    hint = ""
+    if not isinstance(color, np.ndarray):
+        hint = _NO_ARRAY
+    elif shape[2:] == (4,):
+        hint = "color[..., :3] leaves out the fourth channel"
+    elif len(shape) == 3 and shape[0] == 3:
+        hint = "np.moveaxis(color, 0, -1) puts the channels last"
+    elif len(shape) == 2:
+        hint = "np.dstack([color] * 3) makes one of shades of grey"
+    elif color.dtype.kind == "f":
+        hint = "of 0 to 1 (255 * color).round().astype(np.uint8) makes one"
+    raise FrameError(_expected("color", "(H, W, 3) uint8 array, RGB", color, hint))
+
+
+def _expected(name: str, kind: str, given: object, hint: str) -> str:
+    return f"{name} must be a {kind}, found {describe(given)}{': ' if hint else ''}{hint}"

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.arguments import as_path, expect
 from denseface.capture.calibration import MAX_SIDE, Calibration, ChosenCalibration
+from denseface.capture.calibration_files import choose_calibration
 from denseface.capture.doubts import doubts_of
 from denseface.capture.errors import CalibrationError, FrameError, UnreadableSourceError
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
@@ -34,6 +36,9 @@ _KINDS = {
     "captured_at": ArrayKind("str"),
     "source": ArrayKind("str"),
 }
+_ENDING = ".npz"
+_OTHERS = {"initial_points": "is a face that save_face wrote, not a frame: load_face reads it"}
+"""Keys of other files of ours, and what they are."""
 _COLOR = frozenset({"color", "color_timestamp_us"})
 """Keys that are absent, both, where the sensor has no colour camera."""
 _OPTIONAL = frozenset(_KINDS) - {"depth", "depth_timestamp_us", "calibration"}
@@ -48,7 +53,7 @@ class NpzSource(Source):
 
     def __init__(self, path: Path, chosen: ChosenCalibration | None = None) -> None:
         self.uri = str(path)
-        self._frame = load_frame(path, chosen)
+        self._frame = _load(path, chosen)
 
     def __iter__(self) -> Iterator[RgbdFrame]:
         yield self.prepared(self._frame)
@@ -79,7 +84,7 @@ class FolderSource(Source):
 
     def frames_from(self, number: int) -> Iterator[RgbdFrame]:
         """Read the frames from a number on, from 0, without those before it."""
-        return (self.prepared(load_frame(path, self._chosen)) for path in self._paths[number:])
+        return (self.prepared(_load(path, self._chosen)) for path in self._paths[number:])
 
     def close(self) -> None:
         """Nothing is held open."""
@@ -129,24 +134,40 @@ def _frame_files(folder: Path) -> list[Path]:
         raise UnreadableSourceError(f"{folder}: {error.strerror or error}") from error
 
 
-def load_frame(path: str | Path, chosen: ChosenCalibration | None = None) -> RgbdFrame:
-    """Read a frame file.
+def load_frame(
+    path: str | Path, calibration: Calibration | str | Path | None = None
+) -> RgbdFrame:
+    """Read a frame file, as `save_frame` writes it: the frame as it was taken.
+
+    `open_source` also puts right a frame whose depth and colour do not belong together.
 
     Parameters
     ----------
-    chosen : a calibration that wins over the file's own
+    path : NAME.npz
+    calibration : a calibration or the path of one, which wins over ``NAME.calibration.json`` beside
+        the file, which wins over the file's own
 
     Raises
     ------
     UnreadableSourceError
-        Missing, truncated, or not a zip archive of NumPy arrays.
+        Missing, truncated, or not a zip archive of NumPy arrays; another kind of file.
     FrameError
         A key is missing, unknown, or has not the dtype and shape of the format.
     CalibrationError
-        The file's own calibration is used and is not one.
+        The calibration that is used cannot be read, or is not of these images.
     """
+    path = as_path(path)
+    if path.suffix.lower() != _ENDING:
+        raise UnreadableSourceError(
+            f"{path}: frames are read from {_ENDING} alone; open_source(path) reads recordings and "
+            "folders")
+    return _load(path, choose_calibration(path, calibration))
+
+
+def _load(path: Path, chosen: ChosenCalibration | None) -> RgbdFrame:
+    """Read a frame file; raises as `load_frame`."""
     optional = _OPTIONAL if chosen is None else _OPTIONAL | {"calibration"}
-    arrays = read_arrays(path, _KINDS, optional)
+    arrays = read_arrays(path, _KINDS, optional, others=_OTHERS)
     if len(_COLOR & arrays.keys()) == 1:
         (missing,) = _COLOR - arrays.keys()
         raise FrameError(f"{path}: key {missing!r} is missing; color and color_timestamp_us: "
@@ -184,13 +205,26 @@ def _size(image: NDArray[Any]) -> tuple[int, int]:
 def save_frame(
     frame: RgbdFrame, path: str | Path, *, quickly: bool = False, mode: int | None = None
 ) -> None:
-    """Write a frame file: whole, or not at all; OSError as from the system.
+    """Write a frame file: whole, or not at all; folders that are missing are made.
 
     Parameters
     ----------
+    path : NAME.npz
     quickly : do not compress, and do not wait for the disk
     mode : of the file, exactly; None for 666 less the umask
+
+    Raises
+    ------
+    FrameError
+        The path has another ending.
+    OSError
+        Where the file cannot be written: it names the file.
     """
+    expect("frame", frame, RgbdFrame, "save_frame(frame, path)")
+    path = as_path(path)
+    if path.suffix.lower() != _ENDING:
+        raise FrameError(f"{path}: frames are written as {_ENDING} alone, found "
+                         f"{path.suffix or 'no ending'}")
     arrays: dict[str, Any] = {
         "depth": frame.depth,
         "depth_timestamp_us": np.int64(frame.depth_timestamp_us),
@@ -208,7 +242,7 @@ def save_frame(
             arrays[name] = np.array(text[:_MAX_LINE])
     data = io.BytesIO()
     (np.savez if quickly else np.savez_compressed)(data, allow_pickle=False, **arrays)
-    write_whole(Path(path), [data.getbuffer()], mode=mode, synced=not quickly)
+    write_whole(path, [data.getbuffer()], mode=mode, synced=not quickly)
 
 
 def _rounding(text: str) -> DepthRounding:

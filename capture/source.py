@@ -18,13 +18,16 @@ What is read from files may end in ``?`` and options of `ReplayOptions`, such as
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import import_module
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Self, runtime_checkable
 
+from denseface.arguments import as_path, describe
 from denseface.capture.calibration import Calibration
 from denseface.capture.calibration_files import choose_calibration
 from denseface.capture.errors import DriverError, MismatchedFrameError, UnreadableSourceError
 from denseface.capture.frame import RgbdFrame
+from denseface.capture.rotation import ROTATIONS
 
 if TYPE_CHECKING:
     from denseface.capture.preparation import FramePreparation
@@ -184,6 +187,8 @@ def open_source(
         The file is missing, damaged or of no known kind.
     CalibrationError
         A calibration cannot be read.
+    TypeError, ValueError
+        An argument is of another type, or no such rotation.
     FrameError
         A frame file's arrays are not as they should be.
     DriverError
@@ -191,7 +196,13 @@ def open_source(
     SensorError
         The device or one of its streams is missing.
     """
-    text, options = ReplayOptions.split(str(uri))
+    text = str(as_path(uri, "uri")) if not isinstance(uri, str) else uri
+    if not isinstance(calibration, Calibration | str | PathLike | None):
+        raise TypeError("calibration: expected Calibration, str or Path, found "
+                        + describe(calibration))
+    if rotation not in ROTATIONS:
+        raise ValueError(f"rotation: expected 0, 90, 180 or 270 degrees, found {rotation!r}")
+    text, options = ReplayOptions.split(text)
     scheme, colon, address = text.partition(":")
     kind, path = scheme.lower() + colon, None
     if not colon or kind not in _SOURCES:

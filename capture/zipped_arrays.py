@@ -50,9 +50,14 @@ class ArrayKind(NamedTuple):
 
 
 def read_arrays(
-    path: str | Path, kinds: Mapping[str, ArrayKind], optional: Collection[str] = ()
+    path: str | Path, kinds: Mapping[str, ArrayKind], optional: Collection[str] = (), *,
+    others: Mapping[str, str] | None = None,
 ) -> dict[str, NDArray[Any]]:
     """Read the arrays of a file, each under its key.
+
+    Parameters
+    ----------
+    others : keys by which a file of another kind is known, and what to say of it
 
     Raises
     ------
@@ -64,13 +69,16 @@ def read_arrays(
     try:
         with _Archive(open_regular(path).detach()) as file, zipfile.ZipFile(file) as archive:
             file.largest_read = -1
-            return _read_members(path, archive, kinds, optional)
+            return _read_members(path, archive, kinds, optional, others or {})
     except CaptureError:
         raise
     except (OSError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError,
             RuntimeError, ValueError, struct.error) as error:
-        why = getattr(error, "strerror", None) or str(error) or type(error).__name__
-        raise UnreadableSourceError(f"{path}: not a readable .npz file: {why}") from error
+        if why := getattr(error, "strerror", None):
+            raise UnreadableSourceError(f"{path}: {why}") from error
+        raise UnreadableSourceError(
+            f"{path}: no .npz file, or one that is damaged or cut short "
+            f"({error or type(error).__name__})") from error
 
 
 class _Archive(io.BufferedReader):
@@ -87,12 +95,14 @@ class _Archive(io.BufferedReader):
 
 def _read_members(
     path: str | Path, archive: zipfile.ZipFile, kinds: Mapping[str, ArrayKind],
-    optional: Collection[str],
+    optional: Collection[str], others: Mapping[str, str],
 ) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {}
     for member in archive.infolist():
         name = member.filename
         key = name.removesuffix(".npy")
+        if key in others and key not in kinds:
+            raise FrameError(f"{path}: {others[key]}")
         if key not in kinds or key == name or key in arrays:
             raise FrameError(f"{path}: unexpected entry {name!r}; expected keys: "
                              + ", ".join(kinds))

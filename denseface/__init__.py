@@ -8,6 +8,7 @@ TYPE_CHECKING = False
 
 if TYPE_CHECKING:
     from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
+    from denseface.capture.calibration_files import load_calibration
     from denseface.capture.errors import (
         CalibrationError,
         CaptureError,
@@ -84,12 +85,13 @@ __all__ = [
     "ReconstructionError", "RemoteProtocolError", "Report", "RequestFailedError", "RgbdFrame",
     "SensorError", "SensorTimeoutError", "ServiceError", "Settings", "SettingsError", "Source",
     "Status", "TooLittleDepthError", "UnknownCaptureError", "UnreadableSourceError",
-    "WrongSizeError", "__version__", "load_face", "load_frame", "open_source", "reconstruct",
-    "save_face", "save_frame",
+    "WrongSizeError", "__version__", "load_calibration", "load_face", "load_frame", "open_source",
+    "reconstruct", "save_face", "save_frame",
 ]
 
 _NAMES = {
     "capture.calibration": "Calibration CameraModel DepthToColor",
+    "capture.calibration_files": "load_calibration",
     "capture.errors": "CalibrationError CaptureError DriverError FrameError MismatchedFrameError "
                       "SensorError SensorTimeoutError UnreadableSourceError WrongSizeError",
     "capture.frame": "DepthMeaning DepthRounding FrameOrigin RgbdFrame",

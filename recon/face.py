@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AwareDatetime, BaseModel, ConfigDict, FailFast, Field, field_validator
 
+from denseface.arguments import describe
 from denseface.capture.frame import DepthRounding
 from denseface.recon.arrays import Bytes, Floats, Ints
 from denseface.recon.candidates import Box, FaceCandidate
@@ -32,12 +33,15 @@ class PointCloud:
     ------
     ValueError
         Where an array's shape or dtype is not as above, or a coordinate is not finite.
+    TypeError
+        Where one is no array.
     """
 
     points: Floats
     colors: Bytes
 
     def __post_init__(self) -> None:
+        _check_array("points", self.points)
         _check("points", self.points, np.float32, (len(self.points), 3))
         _check("colors", self.colors, np.uint8, (len(self.points), 3))
 
@@ -244,7 +248,13 @@ def _sigma(dense: DenseCloud) -> str:
     return f"sigma {np.median(dense.sigma):.2f} mm (median)" if len(dense) else ""
 
 
+def _check_array(name: str, given: object) -> None:
+    if not isinstance(given, np.ndarray) or not given.ndim:
+        raise TypeError(f"{name} must be an array, found {describe(given)}")
+
+
 def _check(name: str, array: NDArray[Any], dtype: type[np.generic], shape: tuple[int, ...]) -> None:
+    _check_array(name, array)
     if array.dtype != dtype or array.shape != shape:
         raise ValueError(
             f"{name} must be {np.dtype(dtype)} {shape}, found {array.dtype} {array.shape}"

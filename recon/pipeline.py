@@ -13,6 +13,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from denseface.arguments import expect
 from denseface.capture.doubts import doubts_of
 from denseface.capture.frame import FrameOrigin, RgbdFrame
 from denseface.capture.rotation import ROTATIONS, rotate_frame
@@ -72,14 +73,19 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
 
     Raises
     ------
+    TypeError
+        Where `frame` is no frame, or `settings` no settings.
     ReconstructionError
         `NoDepthError`, `NoFaceError`, `FaceWithoutDepthError`, `TooLittleDepthError`,
         `CoarseDepthError` or `ImpossibleFrameError`: the same for the same frame, so trying it
         again does not help.
     """
+    expect("frame", frame, RgbdFrame, "iterating over open_source(uri) gives some")
+    settings = Settings() if settings is None else settings
+    expect("settings", settings, Settings, "Settings.of(preset) makes some")
     clock = _Stopwatch()
     try:
-        return _reconstruct(frame, settings or Settings(), clock)
+        return _reconstruct(frame, settings, clock)
     except ReconstructionError:
         raise
     except Exception as error:

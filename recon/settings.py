@@ -3,8 +3,9 @@
 from enum import StrEnum
 from typing import Annotated, Any, Self, TypedDict, Unpack
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
+from denseface.checked_model import CheckedModel
 from denseface.recon.errors import ImpossibleSettingsError
 
 __all__ = ["Changes", "Neighbors", "Preset", "Settings"]
@@ -59,10 +60,10 @@ class Changes(TypedDict, total=False):
     ratio: float
 
 
-class Settings(BaseModel):
+class Settings(CheckedModel):
     """Settings of `reconstruct`; what is not given comes from the preset."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    error = ImpossibleSettingsError
 
     preset: Preset = Preset.BEST
     r0_factor: Annotated[float, Field(ge=2, le=40)] = 0.0
@@ -103,14 +104,4 @@ class Settings(BaseModel):
         ImpossibleSettingsError
             One line that names the setting: it is unknown, or its value is out of its range.
         """
-        try:
-            return cls.model_validate({**changes, "preset": preset})
-        except ValidationError as error:
-            first = error.errors(include_url=False, include_context=False)[0]
-            name = ".".join(map(str, first["loc"]))
-            why = (f"expected one of {', '.join(cls.model_fields)}"
-                   if first["type"] == "extra_forbidden" else first["msg"])
-            raise ImpossibleSettingsError(
-                f"{name}: {why}, found {str(first['input'])[:60]!r}"
-                if name in cls.model_fields else f"{name}: no setting of that name; {why}"
-            ) from error
+        return cls(**{**changes, "preset": preset})

@@ -5,13 +5,14 @@ import json
 from pathlib import Path
 from typing import Any
 
+from denseface.arguments import as_path
 from denseface.capture.calibration import Calibration, CameraModel, ChosenCalibration
 from denseface.capture.calibration_files._distortion import camera_with_distortion
 from denseface.capture.calibration_files._formats import one_camera, parse_storage
 from denseface.capture.errors import CalibrationError
 from denseface.files import read_bounded
 
-__all__ = ["choose_calibration", "read_calibration"]
+__all__ = ["choose_calibration", "load_calibration", "read_calibration"]
 
 _MAX_FILE_BYTES = 2**20
 """Of a calibration file; a thousand times what one has."""
@@ -39,6 +40,19 @@ def choose_calibration(
     if beside and beside.exists():
         return read_calibration(beside)._replace(origin=f"beside: {beside.name}")
     return None
+
+
+def load_calibration(path: str | Path) -> Calibration:
+    """Read a calibration file: this project's JSON, OpenCV's, ROS's or Open3D's.
+
+    What describes one camera is taken for both. `open_source(uri, path)` takes such a file too.
+
+    Raises
+    ------
+    CalibrationError
+        One line that names the file, what was found and what was expected.
+    """
+    return read_calibration(as_path(path)).calibration
 
 
 def read_calibration(path: str | Path) -> ChosenCalibration:

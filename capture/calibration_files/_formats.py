@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any, cast
+from typing import Any
 
 from denseface.capture.calibration import CameraModel
 from denseface.capture.calibration_files._distortion import camera_with_distortion
@@ -111,16 +111,9 @@ def one_camera(fields: Fields) -> CameraModel:
         raise CalibrationError(f"distortion_model is {model!r}, expected plumb_bob or "
                                "rational_polynomial")
     width, height = (_size(fields, names) for names in (_WIDTH, _HEIGHT))
-    try:
-        camera = CameraModel(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)
-        name = _named(fields, _DISTORTION)
-        return camera_with_distortion(camera, _numbers(fields[name], name)) if name else camera
-    except CalibrationError:
-        raise
-    except ValueError as error:  # pydantic's, of several lines
-        errors = cast("Any", error).errors(include_url=False)
-        where = ".".join(str(part) for part in errors[0]["loc"])
-        raise CalibrationError(f"{where + ': ' if where else ''}{errors[0]['msg']}") from error
+    camera = CameraModel(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)
+    name = _named(fields, _DISTORTION)
+    return camera_with_distortion(camera, _numbers(fields[name], name)) if name else camera
 
 
 def _value(node: Any) -> Any:

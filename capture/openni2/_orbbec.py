@@ -10,7 +10,6 @@ import struct
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
 
@@ -64,8 +63,6 @@ def believable(
             return Calibration(depth=depth, color=depth), "Orbbec factory calibration"
         return (Calibration(depth=depth, color=color.cut_to(*color_size), depth_to_color=pose),
                 "Orbbec factory calibration")
-    except ValidationError as error:
-        reason = error.errors(include_url=False)[0]["msg"]
     except ValueError as error:
         reason = str(error)
     return None, f"Orbbec factory calibration not believed: {reason}"

@@ -28,6 +28,8 @@ _KINDS = {
     "grid_step_mm": ArrayKind("float64"),
     "report": ArrayKind("str"),
 }
+_OTHERS = {"depth": "is a frame, not a face: reconstruct(load_frame(path)) makes one"}
+"""Keys of other files of ours, and what they are."""
 
 
 def to_npz(face: Face) -> bytes:
@@ -46,7 +48,7 @@ def to_npz(face: Face) -> bytes:
 def from_npz(path: str | Path) -> Face:
     """Read a file of `to_npz`; raises as `load_face`."""
     try:
-        return _to_face(read_arrays(path, _KINDS))
+        return _to_face(read_arrays(path, _KINDS, others=_OTHERS))
     except ValidationError as error:
         field, message = first_error(error)
         raise FormatError(f"{path}: report: {field}: {message}") from error

@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from denseface.arguments import as_path, expect
 from denseface.service.errors import FormatError
 
 if TYPE_CHECKING:
@@ -26,15 +27,19 @@ def save_face(face: "Face", path: str | Path, *, mode: int | None = None) -> Non
     ------
     FormatError
         Where the ending is not known.
+    TypeError
+        Where `face` is no face, or `path` no path.
     ServiceError
         Where the file would be in a hub's data folder.
     OSError
         Where the file cannot be written: it names the file.
     """
     from denseface.files import write_whole
+    from denseface.recon.face import Face
     from denseface.service.runtime.files import check_outside_hub
 
-    path = Path(path)
+    expect("face", face, Face, "save_face(face, path)")
+    path = as_path(path)
     ending = check_ending(path)
     check_outside_hub(path)
     write_whole(path, [face_bytes(face, ending)], mode=mode)
@@ -53,8 +58,13 @@ def load_face(path: str | Path) -> "Face":
     Raises
     ------
     FormatError
-        Where the file is missing or no such file.
+        Where the file is missing, damaged, or no such file.
     """
+    path = as_path(path)
+    if path.suffix.lower() != _WHOLE:
+        raise FormatError(
+            f"{path}: faces are read back from {_WHOLE} alone: "
+            f"save_face(face, '{path.stem or 'face'}{_WHOLE}') keeps the whole face")
     from denseface.service.export._npz import from_npz
 
     return from_npz(path)
@@ -74,6 +84,9 @@ def check_ending(path: str | Path) -> str:
                           f"{' '.join(FORMATS)}")
     return ending
 
+
+_WHOLE = ".npz"
+"""Of the files that keep the whole face."""
 
 FORMATS = {
     ".ply": "cloud:to_ply",

@@ -150,12 +150,12 @@ def test_missing_calibration_file(tmp_path):
 
 @pytest.mark.parametrize("bad", [{"fx": float("nan")}, {"cy": float("inf")}, {"width": 2.5}])
 def test_camera_refuses_what_is_no_number(bad):
-    with pytest.raises(ValidationError):
+    with pytest.raises(CalibrationError, match=rf"^{next(iter(bad))}: Input should be"):
         camera(**bad)
 
 
 def test_a_distortion_that_folds_the_image_is_refused():
-    with pytest.raises(ValidationError, match="cannot be inverted"):
+    with pytest.raises(CalibrationError, match="cannot be inverted"):
         camera(distortion=(-2.0, 0, 0, 0, 0))
 
 

@@ -209,7 +209,7 @@ def test_other_compressions_are_refused(tmp_path):
 def test_no_zip_at_all(tmp_path, content):
     path = tmp_path / "no.npz"
     path.write_bytes(content)
-    with pytest.raises(UnreadableSourceError, match=r"no\.npz: not a readable"):
+    with pytest.raises(UnreadableSourceError, match=r"no\.npz: no \.npz file, or one that is dam"):
         load_frame(path)
 
 
