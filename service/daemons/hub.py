@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import structlog
@@ -28,7 +29,7 @@ from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.supervisor_link import SupervisorLink
 from denseface.service.security.permissions import OF_ITS_OWN, missing_role
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage import OpeningStore, WriterThreads
+from denseface.service.storage import OpeningStore, WriterThreads, kept_bytes
 from denseface.service.transport.listener import Incoming
 from denseface.service.transport.listeners import Listeners
 
@@ -57,7 +58,7 @@ def run(settings: ServiceSettings, recon: Settings,
     os.umask(0o077)  # SQLite's files too are for this user alone
     keep_freed_memory()  # fetching it anew for each face costs a third of the processor time
     with StopSignal() as stop, OpeningStore(settings.data) as opening, \
-            WriterThreads() as writer, Observer(settings.data) as observer, \
+            WriterThreads() as writer, Observer(partial(kept_bytes, settings.data)) as observer, \
             zmq.Context() as context:
         rejections = Rejections(observer.figures.counters)
         supervisor = supervisor or SupervisorLink()

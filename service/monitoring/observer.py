@@ -1,9 +1,7 @@
 """What the hub's process measures of itself, and the snapshots that other threads read."""
 
-import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import structlog
 
@@ -15,7 +13,7 @@ from denseface.service.protocol.outgoing import Output, Publish
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.closing import Closing
 
-__all__ = ["Observer", "Snapshot", "folder_bytes"]
+__all__ = ["Observer", "Snapshot"]
 
 _MEASURE_S = 60.0
 """Interval between measurements of the data folder, seconds."""
@@ -38,13 +36,18 @@ class Snapshot:
 
 
 class Observer(Closing):
-    """Records what the hub's loop tells it, the size of the folder `data` too; gives snapshots."""
+    """Records what the hub's loop tells it; gives snapshots.
 
-    def __init__(self, data: Path) -> None:
+    Parameters
+    ----------
+    measure : gives the size of what is kept, bytes; called in a thread; OSError where it cannot
+    """
+
+    def __init__(self, measure: Callable[[], int]) -> None:
         self.figures = Figures()
         self._snapshot: Snapshot | None = None
         self.watch = MessageWatch(self.figures)
-        self._data = data
+        self._measure = measure
         self._measurement = Background[int]("usage")
         self._next_measurement = 0.0
 
@@ -79,19 +82,4 @@ class Observer(Closing):
                     "what is kept cannot be measured", reason=str(error))
         elif not self._measurement and now >= self._next_measurement:
             self._next_measurement = now + _MEASURE_S
-            self._measurement.start(lambda: folder_bytes(self._data))
-
-
-def folder_bytes(folder: Path) -> int:
-    """Give the size of all files under a folder, bytes; one that is removed meanwhile has none."""
-    total = 0
-    with os.scandir(folder) as entries:
-        for entry in entries:
-            try:
-                if entry.is_dir(follow_symlinks=False):
-                    total += folder_bytes(Path(entry.path))
-                else:
-                    total += entry.stat(follow_symlinks=False).st_size
-            except FileNotFoundError:
-                continue
-    return total
+            self._measurement.start(self._measure)

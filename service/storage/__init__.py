@@ -2,7 +2,7 @@
 
 from denseface.service.storage._capture_rows import CaptureRow
 from denseface.service.storage._erasure import Erased, PendingErasure
-from denseface.service.storage._folder_layout import FolderLayout
+from denseface.service.storage._folder_layout import FolderLayout, kept_bytes
 from denseface.service.storage._folder_lock import check_folder
 from denseface.service.storage._recovery import Progress
 from denseface.service.storage.folder_store import FolderStore, OpeningStore
@@ -31,6 +31,7 @@ __all__ = [
     "Writer",
     "WriterThreads",
     "check_folder",
+    "kept_bytes",
     "read_face",
     "read_frame",
     "write",

@@ -17,8 +17,42 @@ _FACE_NAME = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.[0-9a-f]{1,64}\.face
 """Capture id and settings hash."""
 _UNNAMED_FACE = re.compile(r"\.([A-Za-z0-9][A-Za-z0-9_-]{0,63})\.[0-9a-f]{1,64}\.face\.tmp")
 """Capture id and settings hash."""
-_TEMPORARY_NAME = re.compile(r"\..*\.tmp")
-"""As `write_atomically` and `unnamed_face` name it."""
+_QUARANTINED = re.compile(r"\d{4}-\d\d-\d\dT\d{6}\.\d{3}\+0000\..+")
+"""The time at which it came, and its name; a report's has `.json` behind it."""
+_TEMPORARY_NAME = re.compile(
+    r"\.(?:[0-9a-f]{16}|[A-Za-z0-9][A-Za-z0-9_-]{0,63}\.(?:frame|[0-9a-f]{1,64}\.face)(?:\.\d+)?)\.tmp")
+"""As `write_atomically`, an older release and `unnamed_face` name it."""
+
+
+_OWN_FOLDERS = {
+    "frames": (_FRAME_NAME, _UNNAMED_FRAME, _TEMPORARY_NAME),
+    "faces": (_FACE_NAME, _TEMPORARY_NAME),
+    "quarantine": (_QUARANTINED, _TEMPORARY_NAME)}
+"""Names of a hub's own files, by folder."""
+_DATABASE = "captures.sqlite3"
+_OWN_FILES = ("lock", "ballast", _DATABASE, f"{_DATABASE}-wal", f"{_DATABASE}-shm")
+
+
+def is_quarantined(path: Path) -> bool:
+    """Whether a file in the folder of damaged files was put there by a hub."""
+    return _QUARANTINED.fullmatch(path.name) is not None
+
+
+def kept_bytes(root: Path) -> int:
+    """Give the size of a hub's own files in its data folder, bytes.
+
+    One that is removed meanwhile has none. OSError where a folder cannot be read.
+    """
+    own = [root / name for name in _OWN_FILES]
+    for folder, patterns in _OWN_FOLDERS.items():
+        names = os.listdir(root / folder)  # noqa: PTH208  a path for each takes longer
+        own += [root / folder / name for name in names
+                if any(pattern.fullmatch(name) for pattern in patterns)]
+    total = 0
+    for path in own:
+        with suppress(FileNotFoundError):
+            total += path.lstat().st_size
+    return total
 
 
 @dataclass(frozen=True)
@@ -34,7 +68,7 @@ class Listing:
     temporary: list[Path]
     """Half-written files of a hub that was killed, those in quarantine too."""
     unknown: list[Path]
-    """Not written by a hub, those in the data folder itself too."""
+    """Not a hub's, those in the data folder itself too: never counted, never removed."""
 
 
 class FolderLayout:
@@ -47,7 +81,7 @@ class FolderLayout:
         self.frames = private_folder(root / "frames")
         self.faces = private_folder(root / "faces")
         self.quarantine = private_folder(root / "quarantine")
-        self.database = root / "captures.sqlite3"
+        self.database = root / _DATABASE
         self.lock = root / "lock"
         self.disk_reserve = root / "ballast"
         self.root = root
@@ -105,11 +139,11 @@ class FolderLayout:
                 found.faces.append((match.group(1), name))
             else:
                 _note_other(found, self.faces / name)
-        found.temporary.extend(
-            path for path in self.quarantine.iterdir() if _TEMPORARY_NAME.fullmatch(path.name))
-        ours = {self.frames, self.faces, self.quarantine, self.lock, self.disk_reserve,
-                *self.database_files()}
-        found.unknown.extend(path for path in sorted(self.root.iterdir()) if path not in ours)
+        for path in sorted(self.quarantine.iterdir()):
+            if not is_quarantined(path):
+                _note_other(found, path)
+        ours = {*_OWN_FOLDERS, *_OWN_FILES}
+        found.unknown.extend(path for path in sorted(self.root.iterdir()) if path.name not in ours)
         return found
 
 

@@ -9,6 +9,7 @@ import structlog
 
 from denseface.files import read_bounded
 from denseface.service.runtime.files import sync_folder, write_atomically
+from denseface.service.storage._folder_layout import is_quarantined
 from denseface.service.storage._store_clock import StoreClock
 
 _MAX_REPORT_BYTES = 2**16
@@ -55,7 +56,7 @@ class Quarantine:
         known = self._captures
         self._captures = {
             report.name: known[report.name] if report.name in known else _capture_of(report)
-            for report in self._folder.glob("*.json")}
+            for report in self._reports()}
         removed = [name for name, one in self._captures.items() if one in capture_ids]
         for name in removed:
             _remove(self._folder / name)
@@ -64,15 +65,18 @@ class Quarantine:
 
     def remove_before(self, age_s: float) -> None:
         """Remove files that came when the store was younger; OSError as `remove`."""
-        for report in list(self._folder.glob("*.json")):
+        for report in self._reports():
             if _age_s(report) <= age_s:
                 _remove(report)
 
     def clear(self) -> None:
-        """Remove all files; OSError as `remove`."""
+        """Remove all files that a hub put here; OSError as `remove`."""
         for path in list(self._folder.iterdir()):
-            if path.is_file():
-                path.unlink()
+            if is_quarantined(path):
+                path.unlink(missing_ok=True)
+
+    def _reports(self) -> list[Path]:
+        return [path for path in self._folder.glob("*.json") if is_quarantined(path)]
 
 
 def _read(report: Path) -> dict[str, object]:

@@ -82,8 +82,10 @@ def recover(
         reserve.spend_on(_MissingRows(database, store_clock, quarantine, files, listing).add)
         if listing.unknown:
             structlog.get_logger("store").warning(
-                "unknown files, left alone", folder=str(layout.root),
-                files=[path.name for path in islice(listing.unknown, _SHOWN)])
+                "not the hub's own, neither counted nor removed", folder=str(layout.root),
+                number=len(listing.unknown),
+                files=[str(path.relative_to(layout.root))
+                       for path in islice(listing.unknown, _SHOWN)])
     except BaseException:
         database.close()
         raise

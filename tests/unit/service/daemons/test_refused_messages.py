@@ -72,7 +72,7 @@ class Door:
 def door(tmp_path_factory):
     folder = tmp_path_factory.mktemp("door")
     own = ServiceSettings(address=f"ipc://{folder}/hub", data=folder / "data", reserve_mib=0)
-    with WakePipe() as wake, OpeningStore(own.data) as store, Observer(own.data) as observer, \
+    with WakePipe() as wake, OpeningStore(own.data) as store, Observer(lambda: 0) as observer, \
             zmq.Context() as context:
         rejections = Rejections(observer.figures.counters)
         with closing(Listeners(context, own, rejections, [wake])) as listeners:
