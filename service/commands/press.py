@@ -9,7 +9,9 @@ from denseface.service.runtime.terminal import complain, say
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     _options.add_client(parser)
     parser.add_argument("--id", metavar="ID", dest="capture_id",
-                        help="id of the capture; the same one again is the same capture")
+                        help="an id of your choice for the capture: pressed again while it is "
+                             "kept, it is the same capture, else a new one is taken (`denseface "
+                             "get ID` fetches one that is kept, and takes none)")
     parser.add_argument("--timeout", type=_options.seconds, default=60.0, metavar="S",
                         help="longest wait for the frame, and from then on for the face, seconds "
                              "(default: 60); for a hub that is not there at most "

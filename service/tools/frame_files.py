@@ -60,3 +60,17 @@ class FrameFiles:
                 write_atomically(self.photo, [png.tobytes()], sync_name=False, mode=self.mode)
             except OSError as error:
                 raise StoreError(f"{self.photo}: {reason_of(error)}") from error
+
+    def describe(self, frame: RgbdFrame) -> list[str]:
+        """Say of each file that was written what it is, a line each."""
+        lines = []
+        if self.frame:
+            height, width = frame.depth.shape
+            origin = frame.origin
+            taken = f", taken {origin.captured_at}" if origin.captured_at else ""
+            lines.append(f"{self.frame}: frame of {width}x{height}{taken}; `denseface reconstruct "
+                         f"{self.frame}` makes a face of it, load_frame() reads it")
+        if self.photo:
+            height, width, _ = frame.rgb.shape
+            lines.append(f"{self.photo}: photo of {width}x{height}")
+        return lines

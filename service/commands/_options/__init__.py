@@ -161,12 +161,15 @@ def service_settings(args: argparse.Namespace) -> "ServiceSettings":
     return ServiceSettings.of(os.environ, **{name: getattr(args, name, None) for name in names})
 
 
-def client(args: argparse.Namespace, connect_timeout: float | None = None) -> "Client":
-    """Give a client, which says on stderr that it waits for a hub, and why there is none."""
+def client(
+    args: argparse.Namespace, connect_timeout: float | None = None, *, quiet: bool = False
+) -> "Client":
+    """Give a client, which says on stderr that it waits for a hub, and why, unless `quiet`."""
     from denseface.service.client import Client
 
     return Client(args.address, key=args.key, hub_key=args.hub_key,
-                  connect_timeout=connect_timeout, on_waiting=partial(_say_waiting, args))
+                  connect_timeout=connect_timeout,
+                  on_waiting=None if quiet else partial(_say_waiting, args))
 
 
 @contextmanager

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from denseface.service.commands import _options
-from denseface.service.runtime.terminal import say
+from denseface.service.runtime.terminal import complain, say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from denseface.service.errors import UnknownCaptureError
     from denseface.service.export import FaceFiles
+    from denseface.service.export.written import describe
     from denseface.service.tools.frame_files import FrameFiles
 
     files = FaceFiles(args.output, args.report, args.rendering, args.mode)
@@ -38,7 +39,10 @@ def run(args: argparse.Namespace) -> int:
                 raise UnknownCaptureError("--last: the hub keeps no capture")
             capture_id = newest[0].capture_id
         if frame_files:  # first: where there is no face, it shows why
-            frame_files.write(client.get_frame(capture_id, timeout=args.timeout))
+            frame = client.get_frame(capture_id, timeout=args.timeout)
+            frame_files.write(frame)
+            for line in frame_files.describe(frame):
+                complain(line)
             if not files:
                 say(capture_id)
                 return 0
@@ -46,4 +50,6 @@ def run(args: argparse.Namespace) -> int:
     files.write(face)
     say(f"{capture_id} {len(face.dense)} points")
     _options.warn(face)
+    for line in describe(files, face):
+        complain(line)
     return 0

@@ -17,5 +17,5 @@ def run(args: argparse.Namespace) -> int:
     from denseface.service.commands.sensor._kiosk_findings import look_at_kiosk
     from denseface.service.tools import doctor
 
-    return doctor.run(args.source, lambda: _options.client(args), as_json_object=args.json,
-                      more=look_at_kiosk())
+    return doctor.run(args.source, lambda: _options.client(args, quiet=True),
+                      as_json_object=args.json, more=look_at_kiosk())

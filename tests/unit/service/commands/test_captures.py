@@ -37,7 +37,12 @@ def test_frame_and_photo_are_written_where_there_is_no_face(hub, tmp_path, capfd
     both = ["get", "a", "--frame", str(frame), "--photo", str(photo)]
     assert main(both) == 0
     assert main([*both, "--save", str(tmp_path / "a.ply")]) == 1
-    assert capfd.readouterr() == ("a\n", "denseface get: capture a: none (NoFaceError)\n")
+    written = [f"{frame}: frame of 8x6; `denseface reconstruct {frame}` makes a face of it, "
+               "load_frame() reads it", f"{photo}: photo of 10x7"]
+    out, said = capfd.readouterr()
+    assert out == "a\n"
+    assert said.splitlines() == [
+        *written, *written, "denseface get: capture a: none (NoFaceError)"]
     np.testing.assert_array_equal(load_frame(frame).depth, small_frame().depth)
     shown = cv2.cvtColor(cv2.imread(str(photo)), cv2.COLOR_BGR2RGB)
     np.testing.assert_array_equal(shown, small_frame().rgb)
