@@ -18,7 +18,7 @@ from denseface.capture.errors import CalibrationError, FrameError, UnreadableSou
 from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
 from denseface.capture.source import Source
 from denseface.capture.zipped_arrays import ArrayKind, read_arrays
-from denseface.files import write_whole
+from denseface.files import make_folder, sync, write_whole
 
 __all__ = ["FolderSource", "FolderWriter", "NpzSource", "load_frame", "save_frame"]
 
@@ -110,21 +110,34 @@ class FolderWriter:
         self._mode = mode
         self.frames = 0
         """How many are in the folder."""
+        self._unsynced: list[Path] = []
         self._made = not folder.exists()
-        folder.mkdir(0o700, exist_ok=True)
+        make_folder(folder.absolute(), 0o600)
         if _frame_files(folder):
             raise FileExistsError(errno.EEXIST, "Holds frame files already", str(folder))
 
     def add(self, frame: RgbdFrame) -> None:
         """Write one more; OSError as from the system."""
-        save_frame(frame, self.path / f"{self.frames:06}.npz", quickly=True, mode=self._mode)
+        path = self.path / f"{self.frames:06}.npz"
+        save_frame(frame, path, quickly=True, mode=self._mode)
+        self._unsynced.append(path)
         self.frames += 1
 
     def close(self) -> None:
-        """Remove a folder that was made for no frame; harmless when repeated."""
+        """See to it that all is on the disk; harmless when repeated.
+
+        A folder that was made for no frame is removed.
+
+        Raises
+        ------
+        OSError
+            As from the system: a file may be lost that seemed to be written.
+        """
         if self._made and not self.frames:
             with suppress(OSError):
                 self.path.rmdir()
+        while self._unsynced:
+            sync(self._unsynced.pop())
 
 
 def _frame_files(folder: Path) -> list[Path]:

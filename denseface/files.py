@@ -13,7 +13,8 @@ from contextlib import suppress
 from io import BufferedReader
 from pathlib import Path
 
-__all__ = ["check_place", "make_folder", "open_regular", "read_bounded", "write_whole"]
+__all__ = ["check_place", "make_folder", "open_regular", "read_bounded", "sync",
+           "write_whole"]
 
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 """Fails where the name is taken, by whatever it is."""
@@ -118,6 +119,24 @@ def _check_size(descriptor: int, expected: int) -> None:
     size = os.fstat(descriptor).st_size
     if size != expected:
         raise OSError(errno.EIO, f"Has {size} of {expected} bytes after they were written")
+
+
+def sync(path: Path) -> None:
+    """Wait until a file's contents, or the names in a folder, are on the disk.
+
+    Raises
+    ------
+    OSError
+        As from the system, also of what was written before and is lost; it names `path`.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        raise _named(error, path) from error
 
 
 def make_folder(folder: Path, mode: int | None = None) -> None:

@@ -180,21 +180,33 @@ class OniWriter:
     def close(self) -> None:
         """Complete the file, or remove it where it holds no frame; harmless when repeated.
 
-        On a full disk it stays without its table of frames, and can be played all the same.
+        Raises
+        ------
+        OSError
+            As from the system, and it names the file. On a full disk this stays without its table
+            of frames, and can be played all the same.
         """
         if self._file < 0:
             return
+        errors = []
+        for step in (self._complete, self._sync) if self.frames else (self._remove,):
+            try:
+                step()
+            except OSError as error:
+                errors.append(error)
+        file, self._file = self._file, -1
         try:
-            if self.frames:
-                with suppress(OSError):
-                    self._complete()
-                with suppress(OSError):
-                    os.fsync(self._file)
-            else:
-                self.path.unlink(missing_ok=True)
-        finally:
-            os.close(self._file)
-            self._file = -1
+            os.close(file)
+        except OSError as error:
+            errors.append(error)
+        if errors:
+            raise OSError(errors[0].errno, errors[0].strerror, str(self.path)) from errors[0]
+
+    def _sync(self) -> None:
+        os.fsync(self._file)
+
+    def _remove(self) -> None:
+        self.path.unlink(missing_ok=True)
 
     def _complete(self) -> None:
         ends, at = b"", self._end

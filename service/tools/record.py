@@ -4,7 +4,7 @@ import shutil
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -14,8 +14,10 @@ import cv2
 from denseface.capture import CaptureError, RgbdFrame
 from denseface.capture.npz import FolderWriter
 from denseface.capture.oni.writer import OniWriter
-from denseface.service.errors import UsageError
+from denseface.files import make_folder
+from denseface.service.errors import StoreError, UsageError, reason_of
 from denseface.service.log.output import exit_now
+from denseface.service.runtime.files import check_outside_hub
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.terminal import complain, say
 from denseface.service.runtime.terminal.progress import Progress
@@ -37,7 +39,7 @@ class _Writer(Protocol):
         """Append a frame; where that raises, what was there before can be played."""
 
     def close(self) -> None:
-        """Complete what was recorded."""
+        """Complete what was recorded; OSError where the disk refuses a part."""
 
 
 @dataclass(frozen=True)
@@ -68,17 +70,16 @@ def run(
     Raises
     ------
     UsageError
-        `out` is there already, or is of no known kind.
-    CaptureError, OSError
+        `out` is there already, is of no known kind or in a hub's data folder.
+    CaptureError, StoreError
         Nothing could be recorded.
     """
     cv2.setNumThreads(1)
     with StopSignal() as stop, _writing(out, mode) as writer:
         reader = FrameReader(uri, calibration)
         try:
-            end = _record(reader, writer, stop, _Limits(frames, seconds))
+            end = _completed(writer, _record(reader, writer, stop, _Limits(frames, seconds)))
         finally:
-            writer.close()
             hangs = not reader.close()
     if end.error is not None and not writer.frames:
         if hangs:
@@ -142,12 +143,25 @@ def _record(reader: FrameReader, writer: _Writer, stop: StopSignal, limits: _Lim
                 return _End(str(full), _FAILED, full)
             try:
                 writer.add(frame)
-            except (CaptureError, OSError) as error:
-                return _End(f"{getattr(error, 'strerror', None) or error}", _FAILED, error)
+            except CaptureError as error:
+                return _End(str(error), _FAILED, error)
+            except OSError as error:
+                return _End(reason_of(error), _FAILED,
+                            StoreError(f"{writer.path}: {reason_of(error)}"))
             line.show(lambda: f"{writer.frames} frames, {seconds:.1f} s, {reader.lost} lost")  # noqa: B023
             if limits.reached(writer.frames, seconds):
                 return _End("as long as asked for")
     return _End(f"stopped by {stop.reason}", stop.exit_status)
+
+
+def _completed(writer: _Writer, end: _End) -> _End:
+    """Close what was recorded; where the disk refuses a part, that is why the recording failed."""
+    try:
+        writer.close()
+    except OSError as error:
+        why = f"it could not be completed: {reason_of(error)}"
+        return _End(f"{end.why}; {why}", _FAILED, end.error or StoreError(f"{writer.path}: {why}"))
+    return end
 
 
 @contextmanager
@@ -156,23 +170,30 @@ def _writing(out: Path, mode: int) -> Iterator[_Writer]:
     folder = out.is_dir() or not out.suffix
     if not folder and out.suffix.lower() != ".oni":
         raise UsageError(f"{out}: expected NAME.oni or a folder")
+    check_outside_hub(out / "000000.npz" if folder else out)
     try:
+        make_folder(out.absolute().parent, mode)
         if full := _no_room(out):
             raise full
         writer: _Writer = (FolderWriter if folder else OniWriter)(out, mode)
     except FileExistsError as error:
         raise UsageError(f"{out}: there is a recording already; name another, or remove it"
                          ) from error
+    except StoreError:
+        raise
+    except OSError as error:
+        raise StoreError(f"{out}: {reason_of(error)}") from error
     try:
         yield writer
     finally:
-        writer.close()
+        with suppress(OSError):  # where nothing else went wrong, it was closed before
+            writer.close()
 
 
-def _no_room(path: Path) -> OSError | None:
+def _no_room(path: Path) -> StoreError | None:
     """Say where the disk of a file or folder is too full; None where there is room."""
     free = shutil.disk_usage(path if path.is_dir() else path.absolute().parent).free
     if free >= _RESERVE_BYTES:
         return None
-    return OSError(f"{path}: the disk is nearly full: {free >> 20} MiB are free, "
-                   f"{_RESERVE_BYTES >> 20} MiB are kept free")
+    return StoreError(f"{path}: the disk is nearly full: {free >> 20} MiB are free, "
+                      f"{_RESERVE_BYTES >> 20} MiB are kept free")

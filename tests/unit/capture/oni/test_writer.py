@@ -1,3 +1,4 @@
+import errno
 import os
 import struct
 from dataclasses import replace
@@ -206,6 +207,9 @@ def test_a_disk_that_fills_at_each_write(tmp_path, monkeypatch, fails_at):
             writer.add(frame(number))
         except OSError:
             break
+    if writer.frames:
+        with pytest.raises(OSError, match=r"No space left on device: .*oni'$"):
+            writer.close()
     writer.close()
     if fails_at == 1:
         assert not writer.path.exists()
@@ -213,6 +217,25 @@ def test_a_disk_that_fills_at_each_write(tmp_path, monkeypatch, fails_at):
     recorded = Recorded(writer.path)
     assert recorded.pairs == writer.frames == min(fails_at - 1, 3)
     assert what_is_missing(recorded.file) is None
+
+
+@pytest.mark.parametrize("call", ["fsync", "close"])
+def test_a_recording_that_may_not_be_on_the_disk_is_told(writer, monkeypatch, call):
+    writer.add(frame(0))
+    real, calls = getattr(os, call), []
+
+    def fails(descriptor):
+        calls.append(descriptor)
+        real(descriptor)
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, call, fails)
+        with pytest.raises(OSError, match=r"Input/output error: .*\.oni'$"):
+            writer.close()
+    writer.close()
+    assert len(calls) == 1
+    assert Recorded(writer.path).pairs == 1
 
 
 @pytest.mark.parametrize("text", [

@@ -1,5 +1,6 @@
 """Recording without a driver: frame files, played as they are or as if they were live."""
 
+import errno
 import os
 import signal
 import threading
@@ -8,11 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from denseface.capture import open_source
 from denseface.capture.frame import FrameOrigin
 from denseface.capture.npz import save_frame
 from denseface.capture.oni.recorded import Recorded
 from denseface.capture.oni.writer import OniWriter
-from denseface.service.errors import UsageError
+from denseface.service.errors import StoreError, UsageError
+from denseface.service.storage import FolderStore
 from denseface.service.tools import _recording, record
 from tests.unit import frames
 from tests.waiting import LIMIT_S, until
@@ -132,5 +135,33 @@ def test_where_a_recording_cannot_be(folder, tmp_path):
         record.run(str(folder), None, tmp_path / "take.oni")
     with pytest.raises(UsageError, match="there is a recording already"):
         record.run(str(folder), None, folder)
-    with pytest.raises(FileNotFoundError):
-        record.run(str(folder), None, tmp_path / "no" / "take.oni")
+    FolderStore(tmp_path / "data").close()
+    for name in ("data", "data/take.oni"):
+        with pytest.raises(UsageError, match="is a hub's data folder"):
+            record.run(str(folder), None, tmp_path / name)
+    for name in ("take.oni/take.oni", "take.oni/take"):
+        with pytest.raises(StoreError, match=r"take\.oni/take.*: .*take\.oni is no folder$"):
+            record.run(str(folder), None, tmp_path / name)
+    assert (tmp_path / "take.oni").read_text() == "precious"
+
+
+@pytest.mark.parametrize("name", ["take.oni", "take"])
+def test_missing_folders_are_made_for_who_may_see_the_recording(folder, tmp_path, name, capsys):
+    out = tmp_path / "new" / "folder" / name
+    assert record.run(f"{folder}?end=stop", None, out, mode=0o640) == 0
+    assert capsys.readouterr().out.startswith(f"{out}: ")
+    assert [path.stat().st_mode & 0o777 for path in out.parents[:2]] == [0o750, 0o750]
+
+
+@pytest.mark.parametrize("name", ["take.oni", "take"])
+def test_a_recording_that_cannot_be_completed_is_told(folder, tmp_path, monkeypatch, capsys, name):
+    def fails(_):
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(os, "fsync", fails)
+    out = tmp_path / name
+    assert record.run(f"{folder}?end=stop", None, out) == 1
+    assert capsys.readouterr().out.endswith(
+        "; the source is at its end; it could not be completed: Input/output error\n")
+    with open_source(out) as source:
+        assert len(list(source)) == source.frame_count > 0
