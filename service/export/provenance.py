@@ -1,8 +1,11 @@
 """Where a face comes from, as its files say it: short texts, in each format as it can have them."""
 
+from importlib.metadata import version
+
+from denseface.capture.frame import RgbdFrame
 from denseface.recon.face import Report
 
-__all__ = ["comments", "provenance", "stl_header"]
+__all__ = ["comments", "frame_provenance", "provenance", "stl_header"]
 
 _MAX_COMMENT = 400
 """Characters of a value in a comment: readers of PLY take lines of up to 1023 (rply), 512 (VCG)."""
@@ -16,15 +19,21 @@ def provenance(report: Report) -> dict[str, str]:
     `sensor`, `source` (file and number of the frame, or sensor), `calibration` (which one was used)
     and `settings` (of the reconstruction, JSON). No folder of the machine is named.
     """
-    told = {
-        "generator": f"denseface {report.version}",
-        "capture_id": report.capture_id,
-        "captured_at": report.captured_at,
-        "sensor": report.sensor,
-        "source": report.source,
-        "calibration": report.calibration,
-        "settings": report.settings.model_dump_json(),
-    }
+    return _known(
+        generator=f"denseface {report.version}", capture_id=report.capture_id,
+        captured_at=report.captured_at, sensor=report.sensor, source=report.source,
+        calibration=report.calibration, settings=report.settings.model_dump_json())
+
+
+def frame_provenance(frame: RgbdFrame) -> dict[str, str]:
+    """Give what is known of a frame that became no face, or not yet one, in the same words."""
+    origin = frame.origin
+    return _known(
+        generator=f"denseface {version('denseface')}", captured_at=origin.captured_at,
+        sensor=origin.sensor, source=origin.source, calibration=frame.calibration_origin)
+
+
+def _known(**told: str) -> dict[str, str]:
     return {name: text for name, text in told.items() if text}
 
 

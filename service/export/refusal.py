@@ -10,6 +10,7 @@ from denseface.capture.frame import RgbdFrame
 from denseface.recon.face import FaceCandidate
 from denseface.recon.registration import with_shaded_depth
 from denseface.service.export._drawing import BACKGROUND, FAINT_INK, INK, png, width, write
+from denseface.service.export.provenance import frame_provenance
 
 __all__ = ["draw_refusal"]
 
@@ -57,7 +58,7 @@ def draw_refusal(frame: RgbdFrame, candidates: Sequence[FaceCandidate], reason: 
     part = canvas[top:top + len(left_image), _MARGIN:_MARGIN + _PANEL]
     for candidate in _apart(candidates):
         _draw_box(part, candidate, _PANEL / seen.shape[1])
-    return png(canvas)
+    return png(canvas, frame_provenance(frame))
 
 
 def _depth(frame: RgbdFrame) -> NDArray[np.uint8]:

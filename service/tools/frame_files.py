@@ -3,13 +3,12 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
-
 from denseface.capture import RgbdFrame
 from denseface.capture.npz import save_frame
+from denseface.files import write_whole
 from denseface.service.errors import StoreError, UsageError, reason_of
 from denseface.service.export import check_outputs
-from denseface.service.runtime.files import write_atomically
+from denseface.service.export.photo import to_photo
 
 __all__ = ["FrameFiles"]
 
@@ -20,8 +19,8 @@ class FrameFiles:
 
     Raises
     ------
-    UsageError
-        Where an ending is wrong or a folder does not exist.
+    UsageError, StoreError
+        As `check_outputs`.
     """
 
     frame: Path | None = None
@@ -55,9 +54,8 @@ class FrameFiles:
         if self.photo:
             if frame.color is None:
                 raise UsageError(f"--photo {self.photo}: the sensor has no colour camera")
-            _, png = cv2.imencode(".png", cv2.cvtColor(frame.color, cv2.COLOR_RGB2BGR))
             try:
-                write_atomically(self.photo, [png.tobytes()], sync_name=False, mode=self.mode)
+                write_whole(self.photo, [to_photo(frame)], mode=self.mode)
             except OSError as error:
                 raise StoreError(f"{self.photo}: {reason_of(error)}") from error
 

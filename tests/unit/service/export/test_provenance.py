@@ -6,15 +6,19 @@ import re
 import struct
 from dataclasses import replace
 
+import numpy as np
 import open3d as o3d
 import pytest
 from PIL import Image
 
+from denseface.capture.frame import FrameOrigin
 from denseface.recon.settings import Settings
 from denseface.service.export import FORMATS, load_face, save_face
+from denseface.service.export.photo import to_photo
 from denseface.service.export.provenance import comments, provenance, stl_header
+from denseface.service.export.refusal import draw_refusal
 from denseface.service.export.render import portrait
-from tests.unit.service.faces import small_face
+from tests.unit.service.faces import small_face, small_frame
 
 SETTINGS = Settings(ratio=9).model_dump_json()
 TOLD = {"generator": "denseface 1.2.3", "capture_id": "visit-7",
@@ -94,6 +98,18 @@ def test_pictures_say_it_to_other_programs():
     picture = Image.open(io.BytesIO(portrait(face(sensor="Straße"), 64)))
     picture.load()
     assert picture.text == TOLD | {"sensor": "Straße"}
+
+
+def test_pictures_of_a_frame_say_where_it_comes_from():
+    frame = replace(small_frame(), calibration_origin=TOLD["calibration"], origin=FrameOrigin(
+        TOLD["sensor"], TOLD["captured_at"], source=TOLD["source"]))
+    for data in (to_photo(frame), draw_refusal(frame, [], "no face")):
+        picture = Image.open(io.BytesIO(data))
+        picture.load()
+        assert picture.text.pop("generator").startswith("denseface ")
+        assert picture.text == {name: TOLD[name] for name in (
+            "captured_at", "sensor", "source", "calibration")}
+    assert np.asarray(Image.open(io.BytesIO(to_photo(frame)))).tolist() == frame.rgb.tolist()
 
 
 def test_comments_are_lines_that_every_reader_takes():
