@@ -50,7 +50,8 @@ def find_inputs(given: Sequence[str]) -> list[Input]:
         if one.lower().endswith(_SIDE) and len(given) > 1:
             continue
         for uri, problem in _sources(one):
-            found.setdefault(Path(uri).absolute(), (uri, problem))
+            path = Path(uri)
+            found.setdefault(path.resolve() if path.is_dir() else path.absolute(), (uri, problem))
     names = _names([uri for uri, _ in found.values()])
     return [Input(uri, name, problem)
             for (uri, problem), name in zip(found.values(), names, strict=True)]
@@ -58,7 +59,7 @@ def find_inputs(given: Sequence[str]) -> list[Input]:
 
 def _sources(given: str) -> list[tuple[str, str]]:
     """Give the sources that an argument stands for, each with what is wrong with it."""
-    if not Path(given).is_dir():
+    if not given or not Path(given).is_dir():
         return [(given, "")]
     return list(_in_folder(Path(given))) or [(given, "")]
 

@@ -24,6 +24,8 @@ __all__ = ["reconstruct_many"]
 
 _FAILED, _UNREADABLE = 1, 2
 """Exit statuses."""
+_PLAIN_AFTER_S = 10.0
+"""Until the plain line is due, where none can move, seconds: the table moves, too."""
 _Taken = NumberedFrame | UnreadFrame
 _DIGITS = 5
 """Of `_0007`, behind the name of a frame of several."""
@@ -53,7 +55,8 @@ def reconstruct_many(
     ended = False
     total = None if number is None else len(inputs)
     try:
-        with Progress("reconstructing", total=total, unit="frames") as progress:
+        with Progress("reconstructing", total=total, unit="frames",
+                      plain_after_s=_PLAIN_AFTER_S) as progress:
             for one in inputs:
                 for taken in _frames(one, choice, number):
                     row = _row(_name(one, taken, outputs, number), one, taken, settings, outputs,

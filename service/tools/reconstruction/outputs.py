@@ -34,7 +34,7 @@ class Outputs:
     @property
     def any(self) -> bool:
         """Whether anything is to be written."""
-        return any(self._given.values())
+        return any(given is not None for given in self._given.values())
 
     def check(self, name: str, *, several: bool) -> None:
         """Check the flags, before there is a face of a name, or several.
@@ -50,9 +50,9 @@ class Outputs:
             raise UsageError(f"--format {self.ending[1:]}: expected with a folder, -o DIR/; a "
                              "file's own ending picks its format")
         for flag, given in self._given.items():
-            if several and given and not _is_folder(given):
+            if several and given is not None and not _is_folder(given):
                 known = Path(given).suffix.lower() in (*FORMATS, _REPORT, _PICTURE)
-                if known or Path(given).exists():
+                if not given or known or Path(given).exists():
                     raise UsageError(f"{flag} {given}: expected a folder, as there are several "
                                      f"faces: {flag} DIR/")
         if several:
@@ -80,10 +80,10 @@ class Outputs:
 
 
 def _is_folder(given: str) -> bool:
-    return given.endswith(os.sep) or Path(given).is_dir()
+    return bool(given) and (given.endswith(os.sep) or Path(given).is_dir())
 
 
 def _placed(given: str | None, name: str, ending: str) -> Path | None:
-    if not given:
+    if given is None:
         return None
     return Path(given, name + ending) if _is_folder(given) else Path(given)

@@ -9,7 +9,8 @@ from denseface.recon.face import Face
 
 __all__ = ["Row", "Tally", "head", "line"]
 
-_LEAST_NAME = 8
+_LEAST_NAME, _MOST_NAME = 8, 40
+"""Letters of a name that the table has room for."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +43,13 @@ class Row:
 
 def head(width: int) -> str:
     """Give the table's first line, for names of a width."""
-    return (f"{'name':{max(width, _LEAST_NAME)}}{'frame':>7}{'measured':>10}{'dense':>10}"
+    return (f"{'name':{_room(width)}}{'frame':>7}{'measured':>10}{'dense':>10}"
             f"{'sigma mm':>10}{'ms':>7}  remark")
 
 
 def line(row: Row, width: int) -> str:
     """Give a row's line."""
-    name = f"{row.name:{max(width, _LEAST_NAME)}}{'-' if row.frame is None else row.frame:>7}"
+    name = f"{row.name:{_room(width)}}{'-' if row.frame is None else row.frame:>7}"
     if row.why_not:
         return f"{name}{'-':>10}{'-':>10}{'-':>10}{'-':>7}  {row.why_not}"
     remark = f"  {_count(len(row.warnings), 'warning')}" if row.warnings else ""
@@ -108,6 +109,10 @@ class Tally:
             return []
         return [f"medians: {median(self.dense):,.0f} dense points, sigma "
                 f"{median(self.sigma_mm):.2f} mm, {median(self.ms):.0f} ms"]
+
+
+def _room(width: int) -> int:
+    return min(max(width, _LEAST_NAME), _MOST_NAME)
 
 
 def _count(number: int, what: str) -> str:
