@@ -10,7 +10,7 @@ from typing import Protocol, cast
 __all__ = ["COMMANDS", "Command", "load"]
 
 COMMANDS = {
-    "reconstruct": "make a dense face of one frame of a file",
+    "reconstruct": "make dense faces of frames in files and folders",
     "doctor": "look for what keeps a sensor from working",
     "calibrate": "find both cameras and their pose by a board that they see",
     "live": "reconstruct a source frame after frame and show the times",

@@ -46,6 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--preview", metavar="P.png|DIR/", dest="rendering",
                         help="write a picture of the face; where there is none, of the frame and "
                              "what looked like one")
+    parser.add_argument("--table", type=Path, metavar="T.csv",
+                        help="write the table of the faces, of one INPUT too")
     parser.add_argument("--calibration", type=Path, metavar="FILE",
                         help="calibration that wins over the file's own: JSON, or OpenCV's or "
                              "ROS's YAML")
@@ -61,11 +63,11 @@ def run(args: argparse.Namespace) -> int:
     _check(args)
     settings, choice = _options.recon_settings(args), _choice(args)
     outputs = Outputs(args.output, args.report, args.rendering,
-                      f".{args.format}" if args.format else None)
+                      f".{args.format}" if args.format else None, args.table)
     inputs = find_inputs(args.inputs)
     if args.inputs and not inputs:
         raise UsageError("INPUT: calibrations alone, expected a frame, recording or folder")
-    several = args.all_frames or len(inputs) > 1
+    several = args.all_frames or len(inputs) > 1 or bool(args.table and inputs)
     outputs.check(inputs[0].name if inputs else args.depth.stem, several=several)
     if several:
         from denseface.service.tools.reconstruction.many import reconstruct_many
@@ -99,6 +101,8 @@ def _check(args: argparse.Namespace) -> None:
     if args.depth and (args.frame or args.all_frames or args.frames > 1):
         raise UsageError("--frame, --all-frames or --frames is given with --depth: a pair of "
                          "images is one frame")
+    if args.depth and args.table:
+        raise UsageError("--table is given with --depth: a pair of images is one frame")
     if args.all_frames and args.frames > 1:
         raise UsageError("--frames is given with --all-frames: each frame becomes a face of its "
                          "own")

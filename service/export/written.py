@@ -22,6 +22,7 @@ _VIEWERS = {
     ".stl": "MeshLab, Blender and slicers for 3D printing open it",
     ".png": "any browser or image viewer opens it",
     ".json": "",
+    ".csv": "any spreadsheet opens it",
 }
 """By a file's ending: with what to look at it."""
 _MESHES = {".obj", ".glb", ".stl"}

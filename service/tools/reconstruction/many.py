@@ -17,8 +17,8 @@ from denseface.service.tools.frames import (
 )
 from denseface.service.tools.reconstruction.inputs import Input
 from denseface.service.tools.reconstruction.outputs import Outputs
-from denseface.service.tools.reconstruction.refused import draw_refused
-from denseface.service.tools.reconstruction.table import Row, Tally, head, line
+from denseface.service.tools.reconstruction.refused import draw_refused, write_named
+from denseface.service.tools.reconstruction.table import Row, Tally, head, line, to_csv
 
 __all__ = ["reconstruct_many"]
 
@@ -47,9 +47,9 @@ def reconstruct_many(
     Raises
     ------
     StoreError
-        A file cannot be written: nor could those of the next.
+        A file cannot be written: nor could those of the next. The table is written all the same.
     """
-    tally, written = Tally(), WrittenFiles()
+    tally, written, rows = Tally(), WrittenFiles(), list[Row]()
     width = max(len(one.name) for one in inputs) + (_DIGITS if number is None else 0)
     say(head(width), flush=True)
     ended = False
@@ -62,10 +62,15 @@ def reconstruct_many(
                     row = _row(_name(one, taken, outputs, number), one, taken, settings, outputs,
                                written)
                     tally.add(row)
+                    if outputs.table:
+                        rows.append(row)
                     say(line(row, width), flush=True)
                     progress.advance()
         ended = True
     finally:
+        if outputs.table:
+            write_named(outputs.table, to_csv(rows))
+            written.add(outputs.table)
         say("", tally.counts() + ("" if ended else "; stopped before the end"))
         say(*tally.medians(), *written.lines(), *([] if outputs.any else [NOTHING_WRITTEN]))
         for warning, times in tally.warnings.items():
@@ -106,7 +111,7 @@ def _row(
 ) -> Row:
     """Make one face and write it."""
     if isinstance(taken, UnreadFrame):
-        return Row(name, taken.number, taken.problem, unreadable=True)
+        return Row(name, one.uri, taken.number, taken.problem, unreadable=True)
     files = outputs.files(name)
     try:
         face = reconstruct(taken.frame, settings)
@@ -114,7 +119,7 @@ def _row(
         if files.rendering:
             draw_refused(files.rendering, taken.frame, error, f"{one.uri}, frame {taken.number}")
             written.add(files.rendering)
-        return Row(name, taken.number, str(error), warnings=taken.frame.origin.notes)
+        return Row(name, one.uri, taken.number, str(error), warnings=taken.frame.origin.notes)
     files.write(face)
     written.add(files.output, files.report, files.rendering)
-    return Row.of(name, taken.number, face)
+    return Row.of(name, one.uri, taken.number, face)

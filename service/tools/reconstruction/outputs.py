@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from denseface.service.errors import UsageError
-from denseface.service.export import FORMATS, FaceFiles
+from denseface.service.export import FORMATS, FaceFiles, check_outputs
 
 __all__ = ["Outputs"]
 
@@ -23,12 +23,14 @@ class Outputs:
     ----------
     face, report, picture : file or folder, as given; None where not asked for
     ending : of faces' files in a folder, with its dot; None for `.ply`
+    table : file of the table, `.csv`; None where not asked for
     """
 
     face: str | None = None
     report: str | None = None
     picture: str | None = None
     ending: str | None = None
+    table: Path | None = None
     _taken: set[str] = field(default_factory=set, init=False)
 
     @property
@@ -60,6 +62,7 @@ class Outputs:
                 f"{one}/" if one and not _is_folder(one) else one
                 for one in (self.face, self.report, self.picture))
         self.files(name)
+        check_outputs((self.table, ".csv"))
 
     def unique(self, name: str) -> str:
         """Give a name that no face before had, by which its files are called in folders."""

@@ -9,20 +9,31 @@ from denseface.recon import ReconstructionError
 from denseface.service.errors import StoreError, reason_of
 from denseface.service.export.refusal import draw_refusal
 
-__all__ = ["draw_refused", "explained"]
+__all__ = ["draw_refused", "explained", "write_named"]
 
 
-def draw_refused(path: Path, frame: RgbdFrame, error: ReconstructionError, name: str) -> None:
+def draw_refused(
+    path: Path, frame: RgbdFrame, error: ReconstructionError, name: str, mode: int | None = None
+) -> None:
     """Write the picture of a frame without a face.
+
+    Parameters
+    ----------
+    name : of the frame
+    mode : of the file; None for 666 less the umask
 
     Raises
     ------
     StoreError
         It cannot be written.
     """
-    picture = draw_refusal(frame, error.candidates, f"{name}: {error}")
+    write_named(path, draw_refusal(frame, error.candidates, f"{name}: {error}"), mode)
+
+
+def write_named(path: Path, data: bytes, mode: int | None = None) -> None:
+    """Write a whole file; StoreError, which names it, where that fails."""
     try:
-        write_whole(path, [picture])
+        write_whole(path, [data], mode=mode)
     except OSError as failed:
         raise StoreError(f"{path}: {reason_of(failed)}") from failed
 

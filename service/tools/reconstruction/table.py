@@ -1,13 +1,16 @@
-"""The table of many faces: a line for each frame, as it is done."""
+"""The table of many faces: a line for each frame, as it is done; and as a file."""
 
+import csv
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from io import StringIO
 from statistics import median
 
 import numpy as np
 
 from denseface.recon.face import Face
 
-__all__ = ["Row", "Tally", "head", "line"]
+__all__ = ["Row", "Tally", "head", "line", "to_csv"]
 
 _LEAST_NAME, _MOST_NAME = 8, 40
 """Letters of a name that the table has room for."""
@@ -19,6 +22,8 @@ class Row:
 
     name: str
     """Of its files, without their endings."""
+    source: str
+    """File or folder, as given."""
     frame: int | None
     """Its number, from 0; None where the source could not be opened."""
     why_not: str = ""
@@ -33,10 +38,10 @@ class Row:
     warnings: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, name: str, frame: int | None, face: Face) -> "Row":
+    def of(cls, name: str, source: str, frame: int | None, face: Face) -> "Row":
         """Give the row of a face."""
         report = face.report
-        return cls(name, frame, measured=report.initial_points, dense=report.dense_points,
+        return cls(name, source, frame, measured=report.initial_points, dense=report.dense_points,
                    sigma_mm=float(np.median(face.dense.sigma)), ms=report.timings_ms["total"],
                    warnings=report.warnings)
 
@@ -55,6 +60,23 @@ def line(row: Row, width: int) -> str:
     remark = f"  {_count(len(row.warnings), 'warning')}" if row.warnings else ""
     return (f"{name}{row.measured:>10,}{row.dense:>10,}{row.sigma_mm:>10.2f}{row.ms:>7.0f}"
             f"{remark}")
+
+
+def to_csv(rows: Sequence[Row]) -> bytes:
+    """Give the table as a file: comma-separated, UTF-8, the names of the columns first.
+
+    What is not known is empty.
+    """
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("name", "source", "frame", "measured", "dense", "sigma_mm", "ms", "warnings",
+                     "why_not"))
+    for row in rows:
+        figures = (row.measured, row.dense, f"{row.sigma_mm:.3f}", f"{row.ms:.1f}")
+        writer.writerow((row.name, row.source, "" if row.frame is None else row.frame,
+                         *(("",) * len(figures) if row.why_not else figures),
+                         "; ".join(row.warnings), row.why_not))
+    return text.getvalue().encode("utf-8", "backslashreplace")
 
 
 @dataclass
