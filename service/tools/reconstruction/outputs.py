@@ -36,7 +36,7 @@ class Outputs:
     @property
     def any(self) -> bool:
         """Whether anything is to be written."""
-        return any(given is not None for given in self._given.values())
+        return bool(self.table) or any(given is not None for given in self._given.values())
 
     def check(self, name: str, *, several: bool) -> None:
         """Check the flags, before there is a face of a name, or several.

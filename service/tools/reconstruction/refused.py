@@ -5,11 +5,12 @@ from pathlib import Path
 
 from denseface.capture import RgbdFrame
 from denseface.files import write_whole
-from denseface.recon import ReconstructionError
+from denseface.recon import ReconstructionError, reconstruct
+from denseface.recon.face import FaceCandidate
 from denseface.service.errors import StoreError, reason_of
 from denseface.service.export.refusal import draw_refusal
 
-__all__ = ["draw_refused", "explained", "write_named"]
+__all__ = ["draw_failed", "draw_refused", "explained", "write_named"]
 
 
 def draw_refused(
@@ -28,6 +29,22 @@ def draw_refused(
         It cannot be written.
     """
     write_named(path, draw_refusal(frame, error.candidates, f"{name}: {error}"), mode)
+
+
+def draw_failed(path: Path, frame: RgbdFrame, reason: str, mode: int | None = None) -> None:
+    """Write the picture of a frame that became no face elsewhere: what looked like one is sought.
+
+    Raises
+    ------
+    StoreError
+        It cannot be written.
+    """
+    candidates: tuple[FaceCandidate, ...] = ()
+    try:
+        reconstruct(frame)
+    except ReconstructionError as error:
+        candidates = error.candidates
+    write_named(path, draw_refusal(frame, candidates, reason), mode)
 
 
 def write_named(path: Path, data: bytes, mode: int | None = None) -> None:

@@ -49,6 +49,18 @@ def test_frame_and_photo_are_written_where_there_is_no_face(hub, tmp_path, capfd
     assert {one.stat().st_mode & 0o777 for one in tmp_path.iterdir()} == {0o600}
 
 
+def test_a_frame_without_a_face_is_drawn_in_place_of_one(hub, tmp_path, capfd):
+    hub.frames = {"a"}
+    picture = tmp_path / "why.png"
+    hub.outcomes.append(Packet(messages.CaptureFailed(
+        epoch="0f", sequence=1, capture_id="a", error="NoFaceError", message="none", dead=False)))
+    assert main(["get", "a", "--preview", str(picture)]) == 1
+    assert capfd.readouterr() == ("", f"{picture}: picture of the frame, and of what looked like a "
+                                  "face\ndenseface get: capture a: none (NoFaceError)\n")
+    assert cv2.imread(str(picture)).shape[1] > 1000
+    assert picture.stat().st_mode & 0o777 == 0o600
+
+
 @pytest.mark.parametrize(("arguments", "status", "line"), [
     (["get", "z"], 1, "get: capture z: the hub has no such capture: it was never accepted, or is "
                       "no longer kept"),

@@ -1,5 +1,6 @@
 """`denseface reconstruct` of several files, of folders, of all frames."""
 
+import csv
 import json
 from collections import Counter
 
@@ -49,6 +50,22 @@ def test_every_frame_is_taken_and_one_without_a_face_stops_none(take, tmp_path, 
     assert err[-1] == "denseface reconstruct: 1 of 3 gave no face; the table says why"
     assert endings(out_folder) == {".glb": 2, ".json": 2, ".png": 3}
     assert json.loads((out_folder / "take_0002.json").read_text())["dense_points"] == 102
+
+
+def test_the_table_is_a_file_too_of_one_input_as_well(take, tmp_path, capsys):
+    (take / "000002.npz").write_bytes(b"cut")
+    table = tmp_path / "faces.csv"
+    status, out, _ = run(capsys, take, "--all-frames", "--table", table)
+    assert (status, out[-1].partition(", ")[0]) == (2, f"{tmp_path}/: 1 .csv")
+    with table.open(newline="") as file:
+        first, second, third = csv.DictReader(file)
+    assert first == {"name": "take_0000", "source": str(take), "frame": "0", "measured": "26",
+                     "dense": "102", "sigma_mm": "1.306", "ms": "1.0",
+                     "warnings": "it is made up", "why_not": ""}
+    assert (second["dense"], second["why_not"]) == ("", "no face found: too wide")
+    assert "000002.npz" in third["why_not"]
+    run(capsys, take, "--table", table)
+    assert table.read_text().splitlines()[1].startswith("take,")
 
 
 def test_what_cannot_be_read_is_named_and_stops_none(take, tmp_path, capsys):
@@ -122,6 +139,9 @@ def test_where_nothing_can_be_written_no_frame_is_read(take, tmp_path, capsys):
     (["--all-frames", "--report", "r.json"], "--report r.json: expected a folder"),
     (["--all-frames", "--frame", "1"], "not allowed with"),
     (["--all-frames", "--frames", "2"], "--frames is given with --all-frames"),
+    (["--table", "t.txt"], "t.txt: expected a name that ends in .csv"),
+    (["-o", "", "--all-frames"], "-o : expected a folder"),
+    (["-o", ""], "expected one of .ply"),
     (["--format", "stl"], "--format stl: expected with a folder"),
     (["--format", "stl", "-o", "face.glb"], "--format stl: expected with a folder"),
     (["--depth", "d.png"], "found both"),
