@@ -10,6 +10,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, FailFast, Field, fiel
 
 from denseface.arguments import describe
 from denseface.capture.frame import DepthRounding
+from denseface.checked_model import CheckedModel
 from denseface.recon.arrays import Bytes, Floats, Ints
 from denseface.recon.candidates import Box, FaceCandidate
 from denseface.recon.settings import Settings
@@ -119,10 +120,10 @@ STAGES = ("overview", "detection", "registration", "segmentation", "neighbors", 
 """The stages of a reconstruction, in order: names in `Report.timings_ms`, beside `total`."""
 
 
-class Consent(BaseModel):
+class Consent(CheckedModel):
     """What a person agreed to before the picture, as the press said; the hub keeps it."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(allow_inf_nan=False)
 
     text_version: Annotated[str, Field(min_length=1, max_length=64)]
     """Of the text that was read."""

@@ -3,7 +3,16 @@
 import time
 from datetime import datetime
 
-from denseface.service.client.exchanges import Exchange, Exchanges, expect, send_request
+from denseface.service.client.exchanges import (
+    Exchange,
+    Exchanges,
+    check_moment,
+    check_seconds,
+    deadline,
+    expect,
+    request_of,
+    send_request,
+)
 from denseface.service.errors import ClientTimeoutError, LocalProtocolError, UnknownCaptureError
 from denseface.service.protocol import messages
 from denseface.service.protocol.message_base import BaseMessage, CaptureSummary, DeadLetter
@@ -20,8 +29,8 @@ class OperatorExchanges:
 
     def captures(self, last: int, timeout: float) -> Exchange[tuple[CaptureSummary, ...]]:
         """See `Operator.captures`."""
-        if not 1 <= last <= MOST_CAPTURES:
-            raise LocalProtocolError(f"last: expected 1 to {MOST_CAPTURES}, found {last}")
+        if not isinstance(last, int) or not 1 <= last <= MOST_CAPTURES:
+            raise LocalProtocolError(f"last: expected 1 to {MOST_CAPTURES}, found {last!r}")
         answer = yield from send_request(
             messages.ListCaptures(request=self._next_number(), last=last), timeout)
         return expect(answer.message, messages.CaptureList).captures
@@ -34,24 +43,25 @@ class OperatorExchanges:
 
     def retry(self, capture_id: str, timeout: float) -> Exchange[None]:
         """See `Operator.retry`."""
-        answer = yield from self._request_known(messages.RetryDead(
-            request=self._next_number(), capture_id=capture_id), timeout)
+        answer = yield from self._request_known(request_of(
+            messages.RetryDead, request=self._next_number(), capture_id=capture_id), timeout)
         expect(answer, messages.CapturePending)
 
     def drop(self, capture_id: str, timeout: float) -> Exchange[None]:
         """See `Operator.drop`."""
-        answer = yield from self._request_known(messages.DropDead(
-            request=self._next_number(), capture_id=capture_id), timeout)
+        answer = yield from self._request_known(request_of(
+            messages.DropDead, request=self._next_number(), capture_id=capture_id), timeout)
         expect(answer, messages.Removed)
 
     def purge(
         self, capture_id: str | None, before: datetime | None, everything: bool, timeout: float,
     ) -> Exchange[int]:
         """See `Operator.purge`."""
-        removed, until = 0, time.monotonic() + timeout
+        check_moment("before", before)
+        removed, until = 0, deadline(check_seconds(timeout))
         while True:
-            answer = yield from send_request(messages.Purge(
-                request=self._next_number(), capture_id=capture_id, before=before,
+            answer = yield from send_request(request_of(
+                messages.Purge, request=self._next_number(), capture_id=capture_id, before=before,
                 everything=everything), timeout)
             done = expect(answer.message, messages.Removed)
             removed += done.removed
@@ -64,8 +74,8 @@ class OperatorExchanges:
 
     def restart_sensor(self, name: str, timeout: float) -> Exchange[None]:
         """See `Operator.restart_sensor`."""
-        answer = yield from send_request(
-            messages.RestartSensor(request=self._next_number(), sensor=name), timeout)
+        answer = yield from send_request(request_of(
+            messages.RestartSensor, request=self._next_number(), sensor=name), timeout)
         expect(answer.message, messages.SensorRestarting)
 
     @staticmethod

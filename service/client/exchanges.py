@@ -12,10 +12,11 @@ import uuid
 from collections.abc import Generator
 from dataclasses import dataclass
 from datetime import datetime
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from denseface.arguments import describe
 from denseface.capture import RgbdFrame
 from denseface.recon.face import Consent, Face
 from denseface.service import errors
@@ -27,6 +28,7 @@ from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.bounded_dict import BoundedDict
 
 _T = TypeVar("_T")
+_Request = TypeVar("_Request", bound=BaseRequest)
 
 _BAD_ID = "capture id {!r}: expected letters, digits, - and _, at most 64"
 _UNKNOWN = ("capture {}: the hub has no such capture: it was never accepted, or is no longer kept")
@@ -59,7 +61,7 @@ Exchange = Generator[Step, Packet | None, _T]
 
 def send_request(message: BaseRequest, timeout: float) -> Exchange[Packet]:
     """Send a request within an exchange, and give the answer; `timeout` in seconds."""
-    packet = yield SendRequest(message, timeout)
+    packet = yield SendRequest(message, check_seconds(timeout))
     if packet is None:
         raise TypeError("a request is answered by a message")
     return packet
@@ -75,7 +77,38 @@ def expect(answer: object, kind: type[_T]) -> _T:
 
 def deadline(timeout: float | None) -> float:
     """Give when a time-out is over, seconds of `time.monotonic`; infinite for None."""
-    return math.inf if timeout is None else time.monotonic() + timeout
+    return math.inf if timeout is None else time.monotonic() + check_seconds(timeout)
+
+
+def check_seconds(timeout: float) -> float:
+    """Give a time-out back; LocalProtocolError where it is no number."""
+    if not isinstance(timeout, int | float) or math.isnan(timeout):
+        raise errors.LocalProtocolError(f"timeout: expected seconds, found {describe(timeout)}")
+    return timeout
+
+
+def check_moment(name: str, given: datetime | None) -> None:
+    """Raise LocalProtocolError unless a time is one with a zone, or None."""
+    if given is None:
+        return
+    if not isinstance(given, datetime):
+        raise errors.LocalProtocolError(
+            f"{name}: expected datetime with a zone, found {describe(given)}")
+    if given.utcoffset() is None:
+        raise errors.LocalProtocolError(
+            f"{name}: {given} has no zone: {name}.astimezone() takes it as of this machine's")
+
+
+def request_of(kind: type[_Request], **fields: Any) -> _Request:
+    """Make a request; LocalProtocolError, of one line, where an argument may not be as it is."""
+    try:
+        return kind(**fields)
+    except ValidationError as error:
+        field, why = errors.first_error(error, found=bool(error.errors()[0]["loc"]))
+        if field == "capture_id":
+            raise errors.LocalProtocolError(_BAD_ID.format(fields[field])) from error
+        line = f"{field}: {why}" if field else why.removeprefix("Value error, ")
+        raise errors.LocalProtocolError(line) from error
 
 
 class Exchanges:
@@ -93,16 +126,12 @@ class Exchanges:
     ) -> Exchange[str]:
         """See `Client.press`."""
         chosen = uuid.uuid4().hex if capture_id is None else capture_id
-        try:
-            message = messages.Press(
-                request=self.next_number(), capture_id=chosen, sensor=sensor, gate=gate,
-                gate_timeout=gate_timeout, frames=frames, consent=consent)
-        except ValidationError as error:
-            field, why = errors.first_error(error, found=True)
-            raise errors.LocalProtocolError(
-                _BAD_ID.format(chosen)
-                if field == "capture_id" else f"{field}: {why}") from error
-        patience = timeout + (gate_timeout if gate in {"wait", "best"} else 0.0)
+        message = request_of(
+            messages.Press, request=self.next_number(), capture_id=chosen, sensor=sensor,
+            gate=gate, gate_timeout=gate_timeout, frames=frames, consent=consent)
+        patience = check_seconds(timeout)
+        if gate in {"wait", "best"}:
+            patience += message.gate_timeout
         answer = (yield from send_request(message, patience)).message
         if isinstance(answer, messages.PressRefused):
             hint = answer.hint
@@ -114,10 +143,8 @@ class Exchanges:
 
     def withdraw(self, capture_id: str, timeout: float) -> Exchange[int]:
         """See `Client.withdraw`."""
-        try:
-            message = messages.Withdraw(request=self.next_number(), capture_id=capture_id)
-        except ValidationError as error:
-            raise errors.LocalProtocolError(_BAD_ID.format(capture_id)) from error
+        message = request_of(
+            messages.Withdraw, request=self.next_number(), capture_id=capture_id)
         self._withdrawn[capture_id] = None
         answer = yield from send_request(message, timeout)
         return expect(answer.message, messages.Removed).removed
@@ -132,15 +159,12 @@ class Exchanges:
 
     def get(self, capture_id: str, timeout: float) -> Exchange[Face]:
         """See `Client.get`."""
-        until = time.monotonic() + timeout
+        until = deadline(check_seconds(timeout))
         while True:
             left = until - time.monotonic()
-            try:
-                message = messages.GetFace(
-                    request=self.next_number(), capture_id=capture_id,
-                    wait_s=min(max(left, 0.0), _LONGEST_WAIT_S))
-            except ValidationError as error:
-                raise errors.LocalProtocolError(_BAD_ID.format(capture_id)) from error
+            message = request_of(
+                messages.GetFace, request=self.next_number(), capture_id=capture_id,
+                wait_s=min(max(left, 0.0), _LONGEST_WAIT_S))
             answer = yield from send_request(message, left + self._resend_s)
             match answer.message:
                 case messages.CaptureUnknown():
@@ -157,10 +181,8 @@ class Exchanges:
 
     def get_frame(self, capture_id: str, timeout: float) -> Exchange[RgbdFrame]:
         """See `Client.get_frame`."""
-        try:
-            message = messages.GetFrame(request=self.next_number(), capture_id=capture_id)
-        except ValidationError as error:
-            raise errors.LocalProtocolError(_BAD_ID.format(capture_id)) from error
+        message = request_of(
+            messages.GetFrame, request=self.next_number(), capture_id=capture_id)
         answer = yield from send_request(message, timeout)
         if isinstance(answer.message, messages.CaptureUnknown):
             raise errors.UnknownCaptureError(_UNKNOWN.format(capture_id))
@@ -178,9 +200,6 @@ class Exchanges:
         """
         if last is None and since is None:
             return None
-        try:
-            return messages.FindStart(request=self.next_number(), last=last, since=since)
-        except ValidationError as error:
-            raise errors.LocalProtocolError(
-                f"expected a positive last, found {last}, or a since with a zone, found {since}"
-            ) from error
+        check_moment("since", since)
+        return request_of(
+            messages.FindStart, request=self.next_number(), last=last, since=since)

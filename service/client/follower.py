@@ -39,6 +39,9 @@ class Follower:
     ) -> None:
         if (after is not None) + (last is not None) + (since is not None) > 1:
             raise LocalProtocolError("expected at most one of after, last and since")
+        if after is not None and (not isinstance(after, int) or after < 0):
+            raise LocalProtocolError(
+                f"after: expected a sequence number, 0 or more, found {after!r}")
         self._exchanges = exchanges
         self._after = after
         self._start_request = exchanges.start(last, since)

@@ -39,8 +39,9 @@ class ConsentRow:
         if row["text_version"] is None:
             return None
         try:
-            consent = Consent(text_version=row["text_version"], language=row["language"],
-                              retention_s=row["retention_s"], at=row["agreed_at"])
+            consent = Consent.model_validate({
+                "text_version": row["text_version"], "language": row["language"],
+                "retention_s": row["retention_s"], "at": row["agreed_at"]})
         except ValidationError as error:
             raise DamagedDatabaseError(f"consent: {' '.join(first_error(error))}") from error
         return cls(consent, row["due_age_s"])

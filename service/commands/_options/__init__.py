@@ -174,20 +174,12 @@ def client(
 
 @contextmanager
 def operator(args: argparse.Namespace) -> Iterator["Operator"]:
-    """Give an operator of the hub; raises `LocalProtocolError` where an id is malformed."""
-    from pydantic import ValidationError
-
+    """Give an operator of the hub."""
     from denseface.service.client import Operator
-    from denseface.service.errors import LocalProtocolError
 
-    try:
-        with Operator(args.address, key=args.key, hub_key=args.hub_key,
-                      connect_timeout=CONNECT_S, on_waiting=partial(_say_waiting, args)
-                      ) as operator:
-            yield operator
-    except ValidationError as error:
-        raise LocalProtocolError(
-            f"capture id {error.errors()[0]['input']!r}: malformed") from error
+    with Operator(args.address, key=args.key, hub_key=args.hub_key, connect_timeout=CONNECT_S,
+                  on_waiting=partial(_say_waiting, args)) as operator:
+        yield operator
 
 
 def _say_waiting(args: argparse.Namespace, line: str) -> None:

@@ -142,6 +142,64 @@ def test_what_is_wrong_is_named_in_one_line(call, line):
     assert str(caught.value) == line
 
 
+@pytest.fixture(scope="module")
+def operator(tmp_path_factory):
+    """Give one that no hub answers: what is wrong is named before anything is asked."""
+    with d.Operator(f"ipc://{tmp_path_factory.mktemp('run')}/hub") as operator:
+        yield operator
+
+
+NO_ID = ": expected letters, digits, - and _, at most 64"
+NO_ZONE = " has no zone: {0}.astimezone() takes it as of this machine's"
+ASKED = [
+    (lambda o: o.press(5), f"capture id 5{NO_ID}"),
+    (lambda o: o.press("a b"), f"capture id 'a b'{NO_ID}"),
+    (lambda o: o.press(timeout="1"), "timeout: expected seconds, found str '1'"),
+    (lambda o: o.press(timeout=float("nan")), "timeout: expected seconds, found float nan"),
+    (lambda o: o.press(gate="good"),
+     "gate: Input should be 'off', 'wait', 'refuse' or 'best', found 'good'"),
+    (lambda o: o.press(frames=0), "frames: Input should be greater than or equal to 1, found 0"),
+    (lambda o: o.press(consent="yes"),
+     "consent: Input should be a valid dictionary or instance of Consent, found 'yes'"),
+    (lambda o: o.press(sensor=5), "sensor: Input should be a valid string, found 5"),
+    (lambda o: o.get(None), f"capture id None{NO_ID}"),
+    (lambda o: o.get("a", timeout=None), "timeout: expected seconds, found None"),
+    (lambda o: o.get_frame("a b"), f"capture id 'a b'{NO_ID}"),
+    (lambda o: o.withdraw("a b"), f"capture id 'a b'{NO_ID}"),
+    (lambda o: o.status(timeout="5"), "timeout: expected seconds, found str '5'"),
+    (lambda o: next(o.published(after="x")),
+     "after: expected a sequence number, 0 or more, found 'x'"),
+    (lambda o: next(o.published(after=-1)),
+     "after: expected a sequence number, 0 or more, found -1"),
+    (lambda o: next(o.published(last=0)),
+     "last: Input should be greater than or equal to 1, found 0"),
+    (lambda o: next(o.published(since=NOW)), f"since: {NOW}{NO_ZONE.format('since')}"),
+    (lambda o: next(o.faces(since="2026-01-01")),
+     "since: expected datetime with a zone, found str '2026-01-01'"),
+    (lambda o: next(o.published(since=NOW.date())),
+     "since: expected datetime with a zone, found date"),
+    (lambda o: next(o.published(after=1, last=2)),
+     "expected at most one of after, last and since"),
+    (lambda o: next(o.hints(timeout="x")), "timeout: expected seconds, found str 'x'"),
+    (lambda o: o.purge(before=NOW), f"before: {NOW}{NO_ZONE.format('before')}"),
+    (lambda o: o.purge(before="2026"), "before: expected datetime with a zone, found str '2026'"),
+    (lambda o: o.purge(), "expected one of capture_id, before and everything"),
+    (lambda o: o.purge(capture_id="a b"), f"capture id 'a b'{NO_ID}"),
+    (lambda o: o.captures(51), "last: expected 1 to 50, found 51"),
+    (lambda o: o.retry(None), f"capture id None{NO_ID}"),
+    (lambda o: o.restart_sensor(None), "sensor: Input should be a valid string, found None"),
+    (lambda _: d.Consent(text_version="1", language="en", at=NOW),
+     f"at: Input should have timezone info, found '{NOW}'"),
+]
+
+
+@pytest.mark.parametrize(("call", "line"), ASKED, ids=[line[:40] for _, line in ASKED])
+def test_what_is_wrong_is_named_before_the_hub_is_asked(operator, call, line):
+    with pytest.raises((d.LocalProtocolError, ValueError)) as caught:
+        call(operator)
+    assert str(caught.value) == line
+
+
 def test_what_people_have_is_taken_as_it_is():
     """NumPy's numbers, OpenCV's rows and columns, channels in reverse, a rounding by its name."""
     camera = d.CameraModel(width=np.int64(8), height=np.int32(6), fx=np.float32(10), fy=10, cx=4,
