@@ -5,6 +5,7 @@ import shutil
 
 import pytest
 
+from tests.system.consoles import matches, typed_in
 from tests.system.running import RECORDINGS, REPOSITORY
 from tests.system.snippets import Snippet, reader, run_all, snippets
 from tests.virtual_sensor.clip import write_clip
@@ -35,6 +36,11 @@ def test_what_a_page_shows_runs(page, sensor):
         done = run_all(snippets(REPOSITORY / page), desk, variables, _TIMEOUT_S)
         assert done.returncode == 0, f"{page}: {done.stderr}{done.stdout}"
         assert "Warning" not in done.stderr
+    if page == "README.md":
+        first = next(one for block in snippets(REPOSITORY / "docs" / "first-hour.md")
+                     for one in typed_in(block.text, block.line + 1)
+                     if block.language == "console" and one.command == "script/demo")
+        assert matches(f"{first.shown}...\n", done.stdout), done.stdout
 
 
 @pytest.mark.parametrize("page", HOW_TOS, ids=lambda page: page.stem)
