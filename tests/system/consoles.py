@@ -15,8 +15,8 @@ __all__ = ["Typed", "matches", "run_consoles", "typed_in"]
 _PROMPT = "$ "
 _MARK = "\x01"
 """Comes before the number of each command in what the shell prints."""
-_WILD = re.compile(r"\.\.\.|\b[0-9a-f]{32}\b|\d+(?:[.,]\d+)*| +")
-"""What of a shown line is not taken literally."""
+_WILD = {r"\.\.\.": ".*", r"\b[0-9a-f]{32}\b": "[0-9a-f]{32}", r"\d+(?:[.,]\d+)*": None, " +": " +"}
+"""What of a shown line is not taken literally, and what it stands for; None: for the like of it."""
 
 
 class Typed(NamedTuple):
@@ -47,18 +47,9 @@ def matches(shown: str, printed: str) -> bool:
 
 
 def _pattern(row: str) -> str:
-    def wild(found: re.Match[str]) -> str:
-        if found[0] == "...":
-            return ".*"
-        if found[0].isspace():
-            return " +"
-        return r"[0-9a-f]{32}" if len(found[0]) == 32 and "." not in found[0] else r"\d+(?:[.,]\d+)*"
-
-    parts, at = [], 0
-    for found in _WILD.finditer(row):
-        parts += [re.escape(row[at:found.start()]), wild(found)]
-        at = found.end()
-    return "".join([*parts, re.escape(row[at:])])
+    parts = re.split(f"({'|'.join(_WILD)})", row)
+    return "".join(next((stands_for or wild for wild, stands_for in _WILD.items()
+                         if re.fullmatch(wild, part)), re.escape(part)) for part in parts)
 
 
 def run_consoles(
