@@ -84,6 +84,7 @@ class BaseClient:
         if subscription:
             subscription.monitor.check()
         if send_parts(self._socket, parts):
+            self._hub_wait.end()
             return self._resend_s
         self._hub_wait.look(self._monitor)
         return _SEND_RETRY_S

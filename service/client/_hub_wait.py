@@ -32,10 +32,14 @@ class HubWait:
         self._since: float | None = None
         self._was_connected = False
 
+    def end(self) -> None:
+        """Note that there is a connection."""
+        self._since, self._was_connected = None, True
+
     def look(self, monitor: ConnectionMonitor) -> None:
         """Note how a connection is now; ClientTimeoutError where the first one takes too long."""
         if monitor.connected:
-            self._since, self._was_connected = None, True
+            self.end()
             return
         now = time.monotonic()
         if self._since is None:

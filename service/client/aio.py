@@ -251,6 +251,7 @@ class AsyncClient(BaseClient):
             self._check_subscription(subscription)
             if time.monotonic() >= until:
                 raise self._nothing_published(subscription)
+        self._hub_wait.end()
 
     async def _readable(self, socket: zmq.Socket[bytes], seconds: float) -> bool:
         """Wait until there is something to receive; False where there is nothing in this time."""

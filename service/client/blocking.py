@@ -277,6 +277,7 @@ class Client(Closing, BaseClient):
             self._check_subscription(subscription)
             if time.monotonic() >= until:
                 raise self._nothing_published(subscription)
+        self._hub_wait.end()
 
     def _send_request(
         self, message: BaseRequest, timeout: float, subscription: Subscription | None = None

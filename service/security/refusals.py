@@ -1,7 +1,7 @@
 """What the sender of a message that is refused is told, and how often.
 
 Who has no key that is allowed is told nothing. An answer is about as long as what it answers, or
-short, and there are few of them: nobody is flooded by what somebody else says in his name.
+short, and there are few of them: nobody is flooded by what somebody else says in their name.
 """
 
 import time

@@ -70,6 +70,24 @@ def test_a_hub_that_is_there_and_silent_is_not_said_to_be_absent(monkeypatch):
                 client.status(timeout=0.1)
 
 
+def test_a_hub_that_was_there_is_waited_for_as_long_as_a_call_may_take(address):
+    said = []
+    first = FakeHub(address)
+    with Client(address, connect_timeout=0.2, on_waiting=said.append) as client:
+        try:
+            assert client.press("a", timeout=LIMIT_S) == "a"
+        finally:
+            first.close()
+        with pytest.raises(ClientTimeoutError, match=r"no answer from the hub within 0\.5 s"):
+            client.press("b", timeout=0.5)
+        assert len(said) == 1
+        again = FakeHub(address)
+        try:
+            assert client.press("b", timeout=LIMIT_S) == "b"
+        finally:
+            again.close()
+
+
 @pytest.mark.parametrize("command", [["press"], ["get", "a"], ["list"], ["purge", "--all", "--yes"],
                                      ["dead", "list"]])
 def test_commands_say_what_they_wait_for_and_end(address, command, capfd, monkeypatch):
