@@ -14,11 +14,13 @@ import open3d as o3d
 import pytest
 from scipy.spatial import KDTree
 
-from denseface.recon.face import Consent
+from denseface.recon.face import MAX_STEP, Consent
 from denseface.service.errors import FormatError
 from denseface.service.export import FORMATS, load_face, save_face
 from denseface.service.export.mesh import triangulate
 from tests.unit.service.faces import small_face
+
+REPOSITORY = Path(__file__).parents[4]
 
 
 def test_ply_has_exactly_the_properties_that_are_promised(tmp_path):
@@ -106,6 +108,12 @@ def test_triangles_cover_the_grid_once_and_no_step():
     left = dense.cells[triangles, 1] < 5
     assert (left.all(axis=1) | ~left.any(axis=1)).all()
     assert len(triangles) > 100
+
+
+def test_the_page_for_visitors_joins_the_same_points():
+    source = (REPOSITORY / "service/kiosk/frontend/src/viewer/surface.ts").read_text()
+    limit, = re.findall(r"const MAX_STEP = (.*);", source)
+    assert float(limit) == MAX_STEP
 
 
 def test_npz_gives_the_whole_face_back(tmp_path):
