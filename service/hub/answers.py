@@ -71,6 +71,10 @@ def _of_another_job(report: Report, capture_id: str, facts: JobFacts) -> str | N
         return "has other settings than the job"
     if report.calibration != frame.calibration_origin:
         return "has another calibration than the frame"
+    for name in ("sensor", "captured_at", "source"):
+        # An older worker says nothing of a source.
+        if getattr(report, name) not in ("", getattr(frame, name)):
+            return f"has another {name} than the frame"
     if report.skew_us != frame.depth_timestamp_us - frame.color_timestamp_us:
         return f"has a skew of {report.skew_us} us, the frame another"
     x, y, width, height = report.face_box

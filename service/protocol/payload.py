@@ -11,7 +11,15 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, FailFast, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    FailFast,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from denseface.capture import (
     MAX_BURST,
@@ -123,6 +131,13 @@ class FrameHeader(_PayloadHeader):
     skew_known_by: _Line = ""
     fused: Annotated[int, Field(ge=1, le=MAX_BURST)] = 1
     notes: Annotated[tuple[_Note, ...], Field(max_length=32), FailFast()] = ()
+
+    @field_validator("source")
+    @classmethod
+    def _is_a_line(cls, text: str) -> str:
+        if not text.isprintable():
+            raise ValueError("must be a line of text")
+        return text
 
     def layout(self) -> tuple[ArrayInfo, ...]:
         """Return depth, and colour where there is one, as large as the calibration says."""

@@ -32,6 +32,7 @@ with open_source(sys.argv[1]) as source:
             "unit_um": frame.depth_meaning.unit_um,
             "skew_us": frame.skew_us, "skew_known_by": frame.origin.skew_known_by,
             "sensor": frame.origin.sensor, "captured_at": frame.origin.captured_at,
+            "source": frame.origin.source,
             "rounding": frame.depth_meaning.rounding, "calibration": frame.calibration_origin,
             "notes": frame.origin.notes}))
 """
@@ -191,10 +192,10 @@ def test_a_recording_says_when_by_what_and_how(control, tmp_path):
     before = datetime.now(UTC) - timedelta(seconds=1)
     with recording(control, out, "--frames", 8) as process:
         said, complaint = process.communicate(timeout=LIMIT_S)
-    assert (process.returncode, complaint) == (0, "")
+    assert (process.returncode, without_progress(complaint, out)) == (0, [])
     assert said == f"{out}: 8 frames; as long as asked for\n" or "were lost" in said
     frames = played(out)
-    assert len(frames) == 8
+    assert [frame["source"] for frame in frames] == [f"take.oni#{n}" for n in range(8)]
     times = [datetime.fromisoformat(frame["captured_at"]) for frame in frames]
     assert times == sorted(set(times))
     assert before < times[0] < datetime.now(UTC)
@@ -214,7 +215,7 @@ def test_a_sensor_without_color_whose_unit_is_a_tenth_of_a_millimetre(control, t
     out = tmp_path / name
     with recording(control, out, "--frames", 4) as process:
         _, complaint = process.communicate(timeout=LIMIT_S)
-    assert (process.returncode, complaint) == (0, "")
+    assert (process.returncode, without_progress(complaint, out)) == (0, [])
     done = run_python(_MARKS, out, env=environment())
     frames = [json.loads(line) for line in done.stdout.splitlines()]
     assert len(frames) == 4
@@ -247,12 +248,13 @@ def test_so_many_seconds_into_a_folder(control, tmp_path):
     out = tmp_path / "take"
     with recording(control, out, "--seconds", 0.5) as process:
         said, complaint = process.communicate(timeout=LIMIT_S)
-    assert (process.returncode, complaint) == (0, "")
+    assert (process.returncode, without_progress(complaint, out)) == (0, [])
     assert "as long as asked for" in said
     frames = played(out)
     assert frames
     assert frames[0]["sensor"]
     assert frames[0]["captured_at"]
+    assert frames[0]["source"] == f"openni2:{frames[0]['sensor']}"
 
 
 @pytest.mark.parametrize(("name", "limit"), [("take.oni", 6_000_000), ("take", 1_000_000)])

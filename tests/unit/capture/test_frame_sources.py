@@ -6,6 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from denseface.capture import open_source
 from denseface.capture.burst import fuse
@@ -62,6 +63,8 @@ def test_what_a_frame_was_read_from_goes_over_the_wire_and_stays_with_a_burst():
     one = ROOM.with_source("take.oni#3")
     header, arrays = FrameHeader.of(one)
     assert header.join(arrays).origin == one.origin
+    with pytest.raises(ValidationError, match="must be a line of text"):
+        FrameHeader.model_validate(header.model_dump() | {"source": "a\nb"})
     assert fuse([one, one]).origin.source == "take.oni#3"
 
 
