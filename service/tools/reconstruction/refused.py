@@ -75,9 +75,9 @@ def explained(
     if frames is not None and frames > 1:
         tries.append(f"--frame takes another of its {frames} frames, --all-frames each")
     if any("size" in one.verdict for one in error.candidates):
-        tries.append("--calibration gives the right focal length")
+        tries.append("--calibration FILE where its cameras are others than assumed")
     tries.append(f"{picture} shows what was looked at" if picture else
                  "--preview P.png draws what was looked at")
-    told = type(error)(f"{text}; {'; '.join(tries)}")
+    told = type(error)(f"{text}{' ' if text.endswith('?') else '; '}{'; '.join(tries)}")
     told.candidates = error.candidates
     return told

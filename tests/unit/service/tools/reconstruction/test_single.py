@@ -38,8 +38,8 @@ def test_no_face_names_file_and_frame_and_what_to_try(take, capsys):
     assert (status, out) == (1, [])
     assert err == [
         f"denseface reconstruct: {take}, frame 1: no face found: too wide; --frame takes another "
-        "of its 3 frames, --all-frames each; --calibration gives the right focal length; "
-        "--preview P.png draws what was looked at"]
+        "of its 3 frames, --all-frames each; --calibration FILE where its cameras are others than "
+        "assumed; --preview P.png draws what was looked at"]
 
 
 def test_no_face_is_drawn_in_place_of_one(tmp_path, capsys):
