@@ -33,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from denseface.service.export import FaceFiles
     from denseface.service.export.written import describe
+    from denseface.service.tools.fetch import fetch_face
 
     files = FaceFiles(args.output, args.report, args.rendering, args.mode)
     with _options.client(args, _options.CONNECT_S) as client:
@@ -40,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
             args.capture_id, timeout=args.timeout, sensor=args.sensor, gate=args.gate,
             gate_timeout=args.gate_timeout, frames=args.frames)
         say(capture_id, flush=True)
-        face = client.get(capture_id, timeout=args.timeout)
+        face = fetch_face(client, capture_id, files, args.timeout)
     files.write(face)
     _options.warn(face)
     for line in describe(files, face):

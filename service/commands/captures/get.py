@@ -25,9 +25,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from denseface.service.errors import CaptureFailedError, UnknownCaptureError
+    from denseface.service.errors import UnknownCaptureError
     from denseface.service.export import FaceFiles
     from denseface.service.export.written import describe
+    from denseface.service.tools.fetch import fetch_face
     from denseface.service.tools.frame_files import FrameFiles
 
     files = FaceFiles(args.output, args.report, args.rendering, args.mode)
@@ -46,16 +47,7 @@ def run(args: argparse.Namespace) -> int:
             if not files:
                 say(capture_id)
                 return 0
-        try:
-            face = client.get(capture_id, timeout=args.timeout)
-        except CaptureFailedError as error:
-            if files.rendering:
-                from denseface.service.tools.reconstruction.refused import draw_failed
-
-                draw_failed(files.rendering, client.get_frame(capture_id, timeout=args.timeout),
-                            str(error), args.mode)
-                complain(f"{files.rendering}: picture of the frame, and of what looked like a face")
-            raise
+        face = fetch_face(client, capture_id, files, args.timeout)
     files.write(face)
     say(f"{capture_id} {len(face.dense)} points")
     _options.warn(face)

@@ -42,7 +42,8 @@ def test_frame_and_photo_are_written_where_there_is_no_face(hub, tmp_path, capfd
     out, said = capfd.readouterr()
     assert out == "a\n"
     assert said.splitlines() == [
-        *written, *written, "denseface get: capture a: none (NoFaceError)"]
+        *written, *written, "denseface get: capture a: none (NoFaceError); `denseface get a "
+        "--preview P.png` draws what was looked at"]
     np.testing.assert_array_equal(load_frame(frame).depth, small_frame().depth)
     shown = cv2.cvtColor(cv2.imread(str(photo)), cv2.COLOR_BGR2RGB)
     np.testing.assert_array_equal(shown, small_frame().rgb)
