@@ -3,7 +3,7 @@
 from enum import StrEnum
 from typing import Annotated, Any, Self, TypedDict, Unpack
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from denseface.checked_model import CheckedModel
 from denseface.recon.errors import ImpossibleSettingsError
@@ -60,6 +60,10 @@ class Changes(TypedDict, total=False):
     ratio: float
 
 
+def _none_by_its_name(given: object) -> object:
+    return None if given == "none" else given
+
+
 class Settings(CheckedModel):
     """Settings of `reconstruct`; what is not given comes from the preset."""
 
@@ -70,7 +74,8 @@ class Settings(CheckedModel):
     """R0 of Eq. (3) in units of the seeds' mean spacing."""
     smoothing: Annotated[float, Field(ge=0.05, le=1000)] = 0.0
     """lambda: weight of the squared norm against the squared residuals (unitless)."""
-    detail_factor: Annotated[float, Field(ge=0.5, le=10)] | None = None
+    detail_factor: Annotated[
+        Annotated[float, Field(ge=0.5, le=10)] | None, BeforeValidator(_none_by_its_name)] = None
     """Radius of the averages that give back what the fit smooths away, in mean spacings; None:
     the fit alone."""
     symmetry: bool = False

@@ -69,7 +69,7 @@ def test_a_how_to_does_what_it_says(page, sensor, tmp_path):
         assert done.returncode == 0, f"{page} leaves: {done.stderr}{done.stdout}"
 
 
-@pytest.mark.parametrize("page", [*PAGES, *map(str, HOW_TOS)])
+@pytest.mark.parametrize("page", [*PAGES, "docs/python.md", *map(str, HOW_TOS)])
 def test_blocks_are_of_a_kind_that_is_run_or_say_why_not(page):
     for block in snippets(REPOSITORY / page):
         assert block.language in LANGUAGES, f"{page}:{block.line}"

@@ -20,7 +20,8 @@ from denseface.service.errors import (
 )
 from denseface.service.export import load_face
 from tests.ports import free_port
-from tests.system.running import RECORDINGS, denseface, hub_alone, service, sockets
+from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, service, sockets
+from tests.system.snippets import snippets
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.process import environment, play
 from tests.waiting import LIMIT_S, until
@@ -45,6 +46,22 @@ def test_a_press_gives_a_face_a_report_and_a_picture(running, tmp_path):
     assert {path.stat().st_mode & 0o777 for path in tmp_path.iterdir()} == {0o600}
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "face.npz", "face.png", "report.json"]
+
+
+def test_the_python_page_is_one_session(running, tmp_path, monkeypatch):
+    """Each block of docs/python.md after the other, as somebody in a notebook runs them."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("DENSEFACE_ADDRESS", running.address)
+    (tmp_path / "fixtures").symlink_to(REPOSITORY / "fixtures")
+    session = {"__name__": "notebook"}
+    for block in snippets(REPOSITORY / "docs/python.md"):
+        assert block.language == "python"
+        if not block.reason:
+            code = "\n" * block.line + block.text
+            exec(compile(code, "docs/python.md", "exec"), session)  # noqa: S102
+    assert repr(session["frame"]).startswith("<RgbdFrame: depth 640x480")
+    assert len(session["again"].initial) == len(load_face("face.npz").initial)
+    assert len(list((tmp_path / "faces").glob("*.ply"))) == 1
 
 
 def test_the_same_id_again_is_the_same_capture(running):

@@ -90,6 +90,8 @@ def test_all_errors_have_one_base_and_are_documented():
     bases = {name for name in ERRORS
              if getattr(denseface, name).__bases__ == (denseface.DensefaceError,)}
     assert bases <= set(re.findall(r"`(\w+)`", errors.__doc__))
+    page = (Path(__file__).resolve().parents[3] / "docs" / "python.md").read_text()
+    assert {*ERRORS} <= set(re.findall(r"`(\w+Error)`", page))
 
 
 def test_every_error_that_a_call_documents_is_public():
