@@ -7,7 +7,7 @@ from pathlib import Path
 import zmq
 
 from denseface.service.client._hub_wait import HubWait
-from denseface.service.client.exchanges import Exchanges
+from denseface.service.client.exchanges import Exchanges, check_seconds
 from denseface.service.errors import (
     ClientClosedError,
     ClientForkedError,
@@ -36,6 +36,8 @@ class BaseClient:
         connect_timeout: float | None = None, on_waiting: Callable[[str], None] | None = None,
     ) -> None:
         settings = ServiceSettings.of(os.environ, address=address, key=key, hub_key=hub_key)
+        if connect_timeout is not None:
+            check_seconds(connect_timeout)
         self._process = os.getpid()
         self.address = settings.address
         self._resend_s = settings.resend_s

@@ -172,7 +172,8 @@ class Exchanges:
                 case messages.CapturePending():
                     if time.monotonic() >= until:
                         raise errors.ClientTimeoutError(
-                            f"capture {capture_id}: accepted, no face within {timeout:g} s")
+                            f"capture {capture_id}: accepted, no face within {timeout:g} s: it is "
+                            "pending, ask again")
                 case _:
                     outcome = outcome_of(answer)
                     if isinstance(outcome, PublishedFailure):

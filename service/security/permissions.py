@@ -34,4 +34,6 @@ def missing_role(roles: frozenset[Role], message: BaseMessage, *, own: bool = Fa
     needed = ROLES_BY_KIND.get(message.kind, frozenset())
     if roles & needed or (own and isinstance(message, OF_ITS_OWN) and Role.PRESSER in roles):
         return None
-    return f"{message.kind} needs the role {' or '.join(sorted(needed)) or 'of nobody'}"
+    others = isinstance(message, OF_ITS_OWN) and Role.PRESSER in roles
+    return (f"{message.kind} needs the role {' or '.join(sorted(needed)) or 'of nobody'}"
+            f"{', or that the same key pressed it' if others else ''}")

@@ -28,8 +28,7 @@ def check_openable(address: str, path: Path) -> None:
 def why_absent(path: Path | None) -> str:
     """Say why nobody answers at the socket's file of an `ipc` address, or at another one (None)."""
     if path is None:
-        return ("no connection: no hub listens there, or the network does not let it through; "
-                + _START)
+        return f"nothing answers there, or the network does not let it through; {_START}"
     if why := _why_locked(path):
         return why
     try:

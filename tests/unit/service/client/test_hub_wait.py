@@ -8,7 +8,7 @@ from structlog.testing import capture_logs
 from denseface.service.cli import main
 from denseface.service.client import AsyncClient, Client, _hub_wait
 from denseface.service.commands import _options
-from denseface.service.errors import ClientTimeoutError
+from denseface.service.errors import ClientTimeoutError, LocalProtocolError
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.wake_pipe import WakePipe
 from denseface.service.settings import ServiceSettings
@@ -42,6 +42,11 @@ def test_a_hub_that_is_not_there_is_said_once_and_why(address):
         with pytest.raises(ClientTimeoutError, match=r"no answer from the hub within 0\.1 s: ther"):
             client.status(timeout=0.1)
     assert said == [f"waiting for the hub at {address}: {NO_FILE}"]
+
+
+def test_a_time_that_is_none_is_refused(address):
+    with pytest.raises(LocalProtocolError, match="expected seconds, found"):
+        Client(address, connect_timeout="5")
 
 
 def test_who_only_listens_and_who_awaits_says_it_too(address):

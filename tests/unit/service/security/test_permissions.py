@@ -94,8 +94,10 @@ def test_what_the_hub_says_is_for_nobody_to_say():
 def test_a_presser_gets_what_it_pressed(role, own, may, kind):
     lacks = missing_role(frozenset({role}), kind(request=1, capture_id="a"), own=own)
     assert (lacks is None) is may
-    assert may or lacks in ("get_face needs the role subscriber",
-                            "get_frame needs the role operator")
+    needed = {messages.GetFace: "get_face needs the role subscriber",
+              messages.GetFrame: "get_frame needs the role operator"}[kind]
+    pressed = ", or that the same key pressed it" if role is Role.PRESSER else ""
+    assert may or lacks == needed + pressed
 
 
 def test_refusals_are_all_counted_and_not_all_logged(capfd, monkeypatch):

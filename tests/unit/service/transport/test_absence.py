@@ -37,7 +37,7 @@ def test_what_is_at_the_place_of_the_socket_is_said(tmp_path):
     path.unlink()
     path.write_text("mine")
     assert why(path) == "there is a file of that name, and it is no socket"
-    assert "no connection" in why_absent(None)
+    assert why_absent(None).startswith("nothing answers there, or the network does")
 
 
 def test_another_users_socket_is_refused_at_once_by_its_owner(tmp_path, monkeypatch):
