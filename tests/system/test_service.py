@@ -37,7 +37,9 @@ def test_a_press_gives_a_face_a_report_and_a_picture(running, tmp_path):
     done = running.run(
         "press", "--id", "demo", "--save", tmp_path / "face.npz", "--report",
         tmp_path / "report.json", "--preview", tmp_path / "face.png")
-    assert (done.returncode, done.stdout, done.stderr) == (0, "demo\n", "")
+    assert (done.returncode, done.stdout) == (0, "demo\n")
+    assert [line.partition(": ")[0] for line in done.stderr.splitlines()] == [
+        str(tmp_path / name) for name in ("face.npz", "report.json", "face.png")]
     face = load_face(tmp_path / "face.npz")
     report = json.loads((tmp_path / "report.json").read_text())
     assert report["capture_id"] == "demo"
