@@ -175,6 +175,14 @@ def test_a_folder_in_the_file_s_place_leaves_nothing_behind(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["face.ply"]
 
 
+@pytest.mark.parametrize("ending", FORMATS)
+def test_writing_takes_no_open3d_which_cannot_be_loaded_without_libgl(
+        tmp_path, monkeypatch, ending):
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    save_face(small_face(), tmp_path / f"face{ending}")
+    assert (tmp_path / f"face{ending}").stat().st_size > 500
+
+
 def test_a_file_for_which_there_is_no_room_is_not_left_half_written(tmp_path):
     """No file may have more than 2 KiB here: what the system says is as on a full disk."""
     code = """
