@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.arguments import expect
 from denseface.capture.errors import FrameError
 from denseface.capture.frame import MAX_BURST, DepthMeaning, DepthRounding, RgbdFrame
 
@@ -52,6 +53,9 @@ def fuse(frames: Sequence[RgbdFrame]) -> RgbdFrame:
     FrameError
         There is none, there are too many, or they are not of one sensor.
     """
+    expect("frames", frames, Sequence)
+    for frame in frames:
+        expect("frames", frame, RgbdFrame)
     if not 1 <= len(frames) <= MAX_BURST:
         raise FrameError(f"a burst has 1 to {MAX_BURST} frames, found {len(frames)}")
     first = frames[0]

@@ -7,6 +7,7 @@ TYPE_CHECKING = False
 """As that of `typing`, whose import takes longer than all that is here."""
 
 if TYPE_CHECKING:
+    from denseface.capture.burst import fuse
     from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
     from denseface.capture.calibration_files import load_calibration
     from denseface.capture.errors import (
@@ -35,8 +36,10 @@ if TYPE_CHECKING:
         TooLittleDepthError,
     )
     from denseface.recon.face import Consent, DenseCloud, Face, FaceCandidate, PointCloud, Report
+    from denseface.recon.measurement import Length, Measurements, measure
     from denseface.recon.pipeline import reconstruct
     from denseface.recon.settings import Neighbors, Preset, Settings
+    from denseface.recon.warmup import warm
     from denseface.service.client import (
         AsyncClient,
         AsyncOperator,
@@ -67,6 +70,7 @@ if TYPE_CHECKING:
         UnknownCaptureError,
     )
     from denseface.service.export import load_face, save_face
+    from denseface.service.export.render import render
     from denseface.service.protocol.message_base import CaptureSummary, DeadLetter
     from denseface.service.protocol.status import Status
 
@@ -79,17 +83,19 @@ __all__ = [
     "DeadLetter", "DenseCloud", "DensefaceError", "DepthMeaning", "DepthRounding", "DepthToColor",
     "DriverError", "Face", "FaceCandidate", "FaceWithoutDepthError", "FormatError", "FrameError",
     "FrameOrigin", "ImpossibleFrameError", "ImpossibleSettingsError", "KeyFileError",
-    "KeyRefusedError", "LocalProtocolError", "MismatchedFrameError", "Neighbors", "NoDepthError",
-    "NoFaceError", "Operator", "PointCloud", "Preset", "PressRefusedError", "ProtocolError",
-    "Published", "PublishedFace", "PublishedFailure", "PublishedHint", "PublishedPreview",
-    "ReconstructionError", "RemoteProtocolError", "Report", "RequestFailedError", "RgbdFrame",
-    "SensorError", "SensorTimeoutError", "ServiceError", "Settings", "SettingsError", "Source",
-    "Status", "TooLittleDepthError", "UnknownCaptureError", "UnreadableSourceError",
-    "WrongSizeError", "__version__", "load_calibration", "load_face", "load_frame", "open_source",
-    "reconstruct", "save_face", "save_frame",
+    "KeyRefusedError", "Length", "LocalProtocolError", "Measurements", "MismatchedFrameError",
+    "Neighbors", "NoDepthError", "NoFaceError", "Operator", "PointCloud", "Preset",
+    "PressRefusedError", "ProtocolError", "Published", "PublishedFace", "PublishedFailure",
+    "PublishedHint", "PublishedPreview", "ReconstructionError", "RemoteProtocolError", "Report",
+    "RequestFailedError", "RgbdFrame", "SensorError", "SensorTimeoutError", "ServiceError",
+    "Settings", "SettingsError", "Source", "Status", "TooLittleDepthError", "UnknownCaptureError",
+    "UnreadableSourceError", "WrongSizeError", "__version__", "fuse", "load_calibration",
+    "load_face", "load_frame", "measure", "open_source", "reconstruct", "render", "save_face",
+    "save_frame", "warm",
 ]
 
 _NAMES = {
+    "capture.burst": "fuse",
     "capture.calibration": "Calibration CameraModel DepthToColor",
     "capture.calibration_files": "load_calibration",
     "capture.errors": "CalibrationError CaptureError DriverError FrameError MismatchedFrameError "
@@ -102,8 +108,10 @@ _NAMES = {
                     "ImpossibleSettingsError NoDepthError NoFaceError ReconstructionError "
                     "TooLittleDepthError",
     "recon.face": "Consent DenseCloud Face FaceCandidate PointCloud Report",
+    "recon.measurement": "Length Measurements measure",
     "recon.pipeline": "reconstruct",
     "recon.settings": "Neighbors Preset Settings",
+    "recon.warmup": "warm",
     "service.client": "AsyncClient AsyncOperator Client Operator Published PublishedFace "
                       "PublishedFailure PublishedHint PublishedPreview",
     "service.errors": "AddressError CaptureFailedError ClientClosedError ClientForkedError "
@@ -111,6 +119,7 @@ _NAMES = {
                       "LocalProtocolError PressRefusedError ProtocolError RemoteProtocolError "
                       "RequestFailedError ServiceError SettingsError UnknownCaptureError",
     "service.export": "load_face save_face",
+    "service.export.render": "render",
     "service.protocol.message_base": "CaptureSummary DeadLetter",
     "service.protocol.status": "Status",
 }

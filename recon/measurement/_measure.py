@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from denseface.arguments import expect
 from denseface.recon.face import DenseCloud, Face
 from denseface.recon.measurement._face_map import FaceMap, head_frame
 from denseface.recon.measurement._landmarks import Landmarks, find_landmarks
@@ -82,6 +83,7 @@ def measure(face: Face) -> Measurements:
     Pose does not matter: all ends are found in the head's own frame. What is not found, or has no
     face's size, is None; all of it where the face's plane of symmetry is not found.
     """
+    expect("face", face, Face)
     raw = raw_lengths(face.dense)
     found = {}
     for name, one in raw.items():

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.arguments import expect
 from denseface.recon.face import DenseCloud, Face
 from denseface.service.export._drawing import BACKGROUND, FAINT_INK, INK, png, write
 from denseface.service.export._lighting import shade
@@ -43,6 +44,7 @@ def render(face: Face) -> bytes:
 
     The picture has one scale, given by a bar.
     """
+    expect("face", face, Face)
     initial, dense = face.initial, face.dense
     points, colors, normals = _subdivided(dense)
     shading = shade(normals)
