@@ -68,7 +68,9 @@ def run(args: argparse.Namespace) -> int:
     if args.inputs and not inputs:
         raise UsageError("INPUT: calibrations alone, expected a frame, recording or folder")
     several = args.all_frames or len(inputs) > 1 or bool(args.table and inputs)
-    outputs.check(inputs[0].name if inputs else args.depth.stem, several=several)
+    images = [path for path in (args.depth, args.color, args.calibration) if path]
+    outputs.check([one.name for one in inputs] or [args.depth.stem],
+                  [*(one.path for one in inputs), *images], several=several)
     if several:
         from denseface.service.tools.reconstruction.many import reconstruct_many
 

@@ -25,6 +25,11 @@ class Input(NamedTuple):
     problem: str = ""
     """Why it cannot be read; empty where that is not known before it is opened."""
 
+    @property
+    def path(self) -> Path:
+        """The file or folder, without options."""
+        return Path(ReplayOptions.split(self.uri)[0])
+
 
 def find_inputs(given: Sequence[str]) -> list[Input]:
     """Find the sources in files and folders, each once, in the order given.

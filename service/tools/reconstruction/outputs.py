@@ -1,6 +1,7 @@
 """Where faces, their reports and their pictures go: files by name, or folders."""
 
 import os
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from denseface.service.export import FORMATS, FaceFiles, check_outputs
 
 __all__ = ["Outputs"]
 
-_REPORT, _PICTURE = ".json", ".png"
+_REPORT, _PICTURE, _FRAME = ".json", ".png", ".npz"
 
 
 @dataclass
@@ -32,19 +33,25 @@ class Outputs:
     ending: str | None = None
     table: Path | None = None
     _taken: set[str] = field(default_factory=set, init=False)
+    _read: set[Path] = field(default_factory=set, init=False)
 
     @property
     def any(self) -> bool:
         """Whether anything is to be written."""
         return bool(self.table) or any(given is not None for given in self._given.values())
 
-    def check(self, name: str, *, several: bool) -> None:
-        """Check the flags, before there is a face of a name, or several.
+    def check(self, names: Sequence[str], read: Iterable[Path], *, several: bool) -> None:
+        """Check the flags, before there is a face.
+
+        Parameters
+        ----------
+        names : of faces, one or more
+        read : files and folders that faces are made of, which nothing may replace
 
         Raises
         ------
         UsageError
-            They name one file for several faces.
+            They name one file for several faces, or what is read.
         FormatError, UsageError, StoreError
             As `FaceFiles`: a file cannot be written, or its ending is wrong.
         """
@@ -61,7 +68,10 @@ class Outputs:
             self.face, self.report, self.picture = (
                 f"{one}/" if one and not _is_folder(one) else one
                 for one in (self.face, self.report, self.picture))
-        self.files(name)
+        self._read = {path.resolve() for path in read}
+        for name in names:
+            self._placed(name)
+        self.files(names[0])
         check_outputs((self.table, ".csv"))
 
     def unique(self, name: str) -> str:
@@ -73,9 +83,24 @@ class Outputs:
         return free
 
     def files(self, name: str) -> FaceFiles:
-        """Give the files of a face of a name; raises as `FaceFiles`."""
-        return FaceFiles(_placed(self.face, name, self.ending or next(iter(FORMATS))),
-                         _placed(self.report, name, _REPORT), _placed(self.picture, name, _PICTURE))
+        """Give the files of a face of a name; raises as `FaceFiles`, and where one is read."""
+        return FaceFiles(*self._placed(name))
+
+    def _placed(self, name: str) -> tuple[Path | None, Path | None, Path | None]:
+        """Give where face, report and picture go."""
+        endings = self.ending or next(iter(FORMATS)), _REPORT, _PICTURE
+        face, report, picture = (
+            Path(given, name + ending) if given and _is_folder(given) else
+            None if given is None else Path(given)
+            for given, ending in zip(self._given.values(), endings, strict=True))
+        for path in filter(None, (face, report, picture)):
+            if path.resolve() in self._read:
+                raise UsageError(f"{path}: is read, and would be replaced by what is written: name "
+                                 "another place")
+        if face and face.suffix.lower() == _FRAME and face.resolve().parent in self._read:
+            raise UsageError(f"{face}: would be among the frames that are read from its folder: "
+                             "name another folder")
+        return face, report, picture
 
     @property
     def _given(self) -> dict[str, str | None]:
@@ -84,9 +109,3 @@ class Outputs:
 
 def _is_folder(given: str) -> bool:
     return bool(given) and (given.endswith(os.sep) or Path(given).is_dir())
-
-
-def _placed(given: str | None, name: str, ending: str) -> Path | None:
-    if given is None:
-        return None
-    return Path(given, name + ending) if _is_folder(given) else Path(given)

@@ -133,6 +133,25 @@ def test_where_nothing_can_be_written_no_frame_is_read(take, tmp_path, capsys):
     assert line.startswith(f"denseface reconstruct: {tmp_path}/file/out/take.ply: ")
 
 
+@pytest.mark.parametrize("arguments", [
+    ["{tmp}/a.npz", "{tmp}/b.npz", "-o", "{tmp}", "--format", "npz"],
+    ["{tmp}/a.npz", "-o", "{tmp}/take/../a.npz"],
+    ["{tmp}/take", "--all-frames", "-o", "{tmp}/take", "--format", "npz"],
+    ["{tmp}/a.npz", "--calibration", "{tmp}/c.json", "--report", "{tmp}/c.json"],
+    ["--depth", "{tmp}/d.png", "--preview", "{tmp}/d.png"],
+])
+def test_nothing_replaces_what_is_read(take, tmp_path, capsys, arguments):
+    for name in ("a", "b"):
+        write_frame(tmp_path / f"{name}.npz")
+    (tmp_path / "c.json").touch()
+    (tmp_path / "d.png").touch()
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*.*")}
+    status, out, (line,) = run(capsys, *[one.format(tmp=tmp_path) for one in arguments])
+    assert (status, out) == (2, [])
+    assert "read" in line
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*.*")} == before
+
+
 @pytest.mark.parametrize(("arguments", "message"), [
     (["--all-frames", "-o", "{tmp}/face.ply"], "-o {tmp}/face.ply: expected a folder, as there are "
      "several faces: -o DIR/"),
