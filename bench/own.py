@@ -6,7 +6,7 @@ from functools import partial
 
 from bench.cases import Case
 from denseface.recon import Settings
-from denseface.recon.pipeline import surface_of
+from denseface.recon.fitting import surface_of
 from denseface.recon.propagation import densify, noise_fraction
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import segment_face

@@ -25,7 +25,7 @@ from bench.own import after_segmentation, milliseconds
 from bench.pcl_peer import Pcl
 from bench.peer_methods import inpaint_points, rbf_points
 from denseface.recon import Preset, Settings, pipeline, reconstruct, warm
-from denseface.recon.pipeline import surface_of
+from denseface.recon.fitting import surface_of
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.surface import MIN_SEEDS, fit_surface
 

@@ -18,7 +18,6 @@ from denseface.capture.doubts import doubts_of
 from denseface.capture.frame import FrameOrigin, RgbdFrame
 from denseface.capture.rotation import ROTATIONS, rotate_frame
 from denseface.recon.arrays import Floats
-from denseface.recon.detail import add_detail
 from denseface.recon.detection import Detection, detect_face, look_for_faces
 from denseface.recon.errors import (
     ImpossibleFrameError,
@@ -28,7 +27,8 @@ from denseface.recon.errors import (
     TooLittleDepthError,
 )
 from denseface.recon.face import Face, PointCloud, Report
-from denseface.recon.intermediate import ColorSampler, Registration, SurfaceGrid
+from denseface.recon.fitting import surface_of
+from denseface.recon.intermediate import Registration
 from denseface.recon.numerics.threads import one_blas_thread
 from denseface.recon.openings import Openings, openings
 from denseface.recon.plausibility import check_face, check_steps
@@ -36,10 +36,10 @@ from denseface.recon.propagation import densify, noise_fraction
 from denseface.recon.registration import register, sample_colors, with_shaded_depth
 from denseface.recon.segmentation import box_window, segment_face
 from denseface.recon.settings import Settings
-from denseface.recon.support import Support
-from denseface.recon.surface import MIN_SEEDS, fit_surface, mean_spacing
+from denseface.recon.surface import MIN_SEEDS, mean_spacing
+from denseface.recon.warmup import warm
 
-__all__ = ["ends_the_same", "reconstruct", "surface_of"]
+__all__ = ["ends_the_same", "reconstruct"]
 
 _FEW_SEEDS = 2000
 """With fewer seeds, the report warns."""
@@ -60,6 +60,8 @@ which another attempt may have."""
 @one_blas_thread
 def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     """Turn one depth + colour frame into a dense, coloured face.
+
+    The first call in a process runs `warm` first, which the report's times leave out.
 
     Parameters
     ----------
@@ -83,6 +85,7 @@ def reconstruct(frame: RgbdFrame, settings: Settings | None = None) -> Face:
     expect("frame", frame, RgbdFrame, "iterating over open_source(uri) gives some")
     settings = Settings() if settings is None else settings
     expect("settings", settings, Settings, "Settings.of(preset) makes some")
+    warm()
     clock = _Stopwatch()
     try:
         return _reconstruct(frame, settings, clock)
@@ -201,32 +204,6 @@ def _overview(frame: RgbdFrame) -> Registration:
 @cache
 def _version() -> str:
     return version("denseface")
-
-
-def surface_of(
-    points: Floats, spacing: float, settings: Settings, sampler: ColorSampler | None = None
-) -> SurfaceGrid:
-    """Fit the seeds, and add the detail that the settings ask for.
-
-    Parameters
-    ----------
-    points : (n, 3) float32, mm, depth camera frame
-    spacing : their mean spacing, mm
-    sampler : tells points' colours; None, and there is no detail by shading
-
-    Raises
-    ------
-    TooLittleDepthError
-        Where there are too few points, or all on a line.
-    """
-    fit = fit_surface(points, settings.r0_factor * spacing, settings.smoothing)
-    support = Support.of(points, spacing)
-    if settings.detail_factor is None:
-        return fit.on_support(support)
-    return add_detail(
-        fit.heights(support.xs, support.ys), support, points, spacing,
-        settings.detail_factor * spacing, symmetry=settings.symmetry,
-        sampler=sampler if settings.shading else None)
 
 
 def _warnings(

@@ -9,8 +9,9 @@ from denseface.capture.calibration import Calibration, CameraModel
 from denseface.capture.frame import RgbdFrame
 from denseface.recon.detection import detect_face, judge_box
 from denseface.recon.errors import NoFaceError
+from denseface.recon.fitting import surface_of
+from denseface.recon.numerics.compilation.progress import compiling
 from denseface.recon.numerics.malloc import keep_freed_memory
-from denseface.recon.pipeline import surface_of
 from denseface.recon.propagation import densify
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import segment_face
@@ -36,6 +37,11 @@ def warm() -> None:
     From then on the process keeps memory that a frame frees for the next: `recon.numerics.malloc`.
     """
     keep_freed_memory()
+    with compiling.session():
+        _run_every_stage()
+
+
+def _run_every_stage() -> None:
     settings = Settings()
     frame = _ball()
     registered = register(frame)

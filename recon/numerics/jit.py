@@ -1,8 +1,4 @@
-"""Compiling loops, whichever folders can be written.
-
-Compiled code is cached beside its file or, where that is read-only, in the user's cache folder;
-where neither can be written, it is compiled at each start.
-"""
+"""Compiling loops; where their code is kept is in `recon.numerics.compilation`."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
@@ -13,8 +9,10 @@ from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 
 from denseface.recon.arrays import Floats
+from denseface.recon.numerics.compilation.cache import KernelCache
+from denseface.recon.numerics.compilation.progress import compiling
 
-__all__ = ["STACK_FLOATS", "compiled", "inlined", "stack_floats"]
+__all__ = ["STACK_FLOATS", "compiled", "compiled_exactly", "inlined", "stack_floats"]
 
 STACK_FLOATS = 8
 """Numbers in `stack_floats`."""
@@ -24,10 +22,21 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 def compiled(function: _F) -> _F:
     """Compile a function of arrays and numbers when it is first called, with fast math."""
-    try:
-        return cast("_F", njit(cache=True, fastmath=True, error_model="numpy")(function))
-    except RuntimeError:  # numba found no folder for its cache
-        return cast("_F", njit(fastmath=True, error_model="numpy")(function))
+    return _kept(function, fastmath=True, error_model="numpy")
+
+
+def compiled_exactly(function: _F) -> _F:
+    """Compile a function as it is written; while it runs, other threads run too."""
+    return _kept(function, nogil=True)
+
+
+def _kept(function: _F, **options: Any) -> _F:
+    """Compile a function when it is first called, and keep the code for the next start."""
+    kernel: Any = njit(**options)(function)
+    if kernel is not function:  # as it is where NUMBA_DISABLE_JIT is set
+        kernel._cache = KernelCache(function)
+        compiling.add(kernel)
+    return cast("_F", kernel)
 
 
 def inlined(function: _F) -> _F:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from denseface.service.cli._parser import USAGE, parse
 from denseface.service.commands import load
+from denseface.service.log.kernels import KernelLines, tell_of_kernels
 from denseface.service.runtime.interruption import Interruption, interrupted
 from denseface.service.runtime.process import forbid_core_dumps, untried_python
 from denseface.service.runtime.signals import PARENT_VARIABLE
@@ -30,6 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and give its exit status."""
     fill_standard_descriptors()
     forbid_core_dumps()
+    tell_of_kernels(KernelLines())
     args = parse(arguments)
     # Once: not by each process that `denseface up` starts.
     if (doubt := untried_python()) and PARENT_VARIABLE not in os.environ:

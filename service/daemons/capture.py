@@ -115,7 +115,7 @@ class _Capture:
 
     def serve(self, stop: StopSignal) -> None:
         """Do so until `stop`, or until told to begin anew."""
-        for packet in self.connection.packets(stop, self.supply.wake, lambda: None):
+        for packet in self.connection.packets(stop, self.supply.wake):
             if packet is not None:
                 if isinstance(packet.message, messages.Restart):
                     _log.warning("told to begin anew", source=self.uri)

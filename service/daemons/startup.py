@@ -5,6 +5,7 @@ from typing import Literal
 
 from denseface.service.log.events import configure
 from denseface.service.log.ids import IDS_VARIABLE
+from denseface.service.log.kernels import KernelEvents, tell_of_kernels
 from denseface.service.runtime import failpoints
 from denseface.service.runtime.process import name_process
 from denseface.service.runtime.signals import die_with_parent
@@ -25,6 +26,7 @@ def start_process(name: str, log_format: Literal["text", "json"]) -> SupervisorL
     die_with_parent()
     # What is neither on nor off is refused later, by the settings: it hides them meanwhile.
     configure(log_format, name, ids=os.environ.get(IDS_VARIABLE, "on") in ("", "on"))
+    tell_of_kernels(KernelEvents())
     failpoints.arm(os.environ)
     return SupervisorLink.inherit(os.environ)
 

@@ -13,6 +13,7 @@ import structlog
 from denseface import recon
 from denseface.recon import ReconstructionError, reconstruct
 from denseface.recon.face import Face
+from denseface.recon.numerics.compilation.progress import compiling
 from denseface.recon.pipeline import ends_the_same
 from denseface.service.log.output import exit_now
 from denseface.service.protocol import messages
@@ -51,23 +52,22 @@ def run(settings: ServiceSettings, supervisor: SupervisorLink | None = None) -> 
     cv2.setNumThreads(1)
     supervisor = supervisor or SupervisorLink()
     with StopSignal() as stop:
-        begun = time.monotonic()
-        warm()
-        _log.info("warm", seconds=round(time.monotonic() - begun, 2))
-        with Background[Face]("recon") as compute:
+        with Background[None]("warm") as warming, Background[Face]("recon") as compute:
             with HubConnection(settings, "worker", supervisor) as connection:
                 worker = _Worker(settings, connection, compute, supervisor)
-                worker.serve(stop)
-                worker.finish()
-            if compute:
-                exit_now(stop.exit_status)  # the job is handed back, its thread cannot be stopped
+                if worker.start(stop, warming):
+                    worker.serve(stop)
+                    worker.finish()
+            if compute or warming:
+                exit_now(stop.exit_status)  # a job is handed back, its thread cannot be stopped
         return stop.exit_status
 
 
 def warm() -> None:
     """Compile and load all that the first job would otherwise wait for."""
-    recon.warm()
-    warm_packing()
+    with compiling.session():
+        recon.warm()
+        warm_packing()
 
 
 @dataclass
@@ -82,9 +82,22 @@ class _Worker:
     """Sends the answer to a job that ended; False where the hub is not there."""
     credit: int = 0
     """Jobs asked for so far."""
+    name: str = field(default_factory=lambda: f"{socket.gethostname()}/{os.getpid()}")
+
+    def start(self, stop: StopSignal, warming: Background[None]) -> bool:
+        """Get ready while the hub hears how far that is; False where that was stopped."""
+        begun = time.monotonic()
+        warming.start(warm)
+        for _ in self.connection.packets(stop, warming, self._progress):
+            if warming.done():
+                warming.result()
+                _log.info("warm", seconds=round(time.monotonic() - begun, 2))
+                self._send_ready()
+                return True
+        return False
 
     def serve(self, stop: StopSignal) -> None:
-        for packet in self.connection.packets(stop, self.compute, self._holding):
+        for packet in self.connection.packets(stop, self.compute, self._heartbeat):
             if packet is not None:
                 self._receive(packet)
             self._deliver()
@@ -115,16 +128,25 @@ class _Worker:
                     _log.warning("job handed back", capture_id=self._holding(),
                                  seconds=round(self.compute.elapsed_s, 1))
                     return
-                self.connection.send(messages.Heartbeat(holding=self._holding()))
+                self.connection.send(self._heartbeat())
             self.send_answer = self._answer_job()
             self._deliver()
 
     def _holding(self) -> str | None:
         return self.jobs[0].capture_id if self.jobs else None
 
+    def _heartbeat(self) -> messages.Heartbeat:
+        return messages.Heartbeat(holding=self._holding())
+
+    def _progress(self) -> messages.Heartbeat:
+        """Say how far it is with its kernels, where these are not just loaded."""
+        if (progress := compiling.progress) is None:
+            return messages.Heartbeat()
+        return messages.Heartbeat(compiling=messages.Compiling(
+            name=self.name, done=progress.done, total=progress.total))
+
     def _send_ready(self) -> None:
-        self.connection.send(messages.WorkerReady(
-            name=f"{socket.gethostname()}/{os.getpid()}", credit=self.credit))
+        self.connection.send(messages.WorkerReady(name=self.name, credit=self.credit))
 
     def _receive(self, packet: Packet) -> None:
         match packet.message:

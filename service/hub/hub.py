@@ -231,7 +231,7 @@ class Hub:
 
     def peers(self) -> list[bytes]:
         """Return the routing ids of all sensors and workers."""
-        return [*self._peers.sensors, *self._peers.workers]
+        return [*self._peers.sensors, *self._peers.starting, *self._peers.workers]
 
     def _receive(
         self, now: float, peer: bytes, packet: Packet, key: str, roles: frozenset[Role]
@@ -264,6 +264,8 @@ class Hub:
                 yield from self._sensor_ready(now, peer, message, key)
             case messages.WorkerReady() as message:
                 yield from self._worker_ready(now, peer, message, key)
+            case messages.Heartbeat(compiling=messages.Compiling() as one) if Role.WORKER in roles:
+                self._peers.worker_compiles(peer, one, now, key)
             case messages.Heartbeat(holding=holding):
                 if not self._peers.heartbeat(peer, holding, now):
                     self._peers.ask_for_ready(peer)
@@ -391,3 +393,4 @@ class Hub:
             say("worker gone", name=worker.name, reason=reason, key=worker.key or LOCAL)
             self._status.note_change()
             self._jobs.worker_lost(worker)
+        self._peers.starting.pop(peer, None)

@@ -8,6 +8,7 @@ from denseface.service.hub import sensors
 from denseface.service.hub.sensors import SensorPeer
 from denseface.service.protocol.message_base import MAX_JOBS
 from denseface.service.protocol.sensor_messages import SensorState
+from denseface.service.protocol.status import Compiling
 from denseface.service.runtime.bounded_dict import BoundedDict
 
 MAX_PEERS = 256
@@ -43,11 +44,24 @@ class WorkerPeer:
 
 
 @dataclass
+class StartingWorker:
+    """A process that says that it compiles, and will be ready then."""
+
+    peer: bytes
+    seen: float
+    """When it last said so, seconds."""
+    key: str
+    """As of a sensor."""
+    compiling: Compiling
+
+
+@dataclass
 class Peers:
     """Peers by the routing id of their connection."""
 
     sensors: dict[bytes, SensorPeer] = field(default_factory=dict)
     workers: dict[bytes, WorkerPeer] = field(default_factory=dict)
+    starting: dict[bytes, StartingWorker] = field(default_factory=dict)
     _asked: BoundedDict[bytes, int] = field(
         default_factory=lambda: BoundedDict(_MAX_ANNOUNCED))
     """How often a peer was asked to say that it is ready, less the times that it did."""
@@ -70,9 +84,17 @@ class Peers:
 
     def worker_ready(self, peer: bytes, name: str, credit: int, now: float, key: str = "") -> None:
         """Mark a worker as free, unless this credit was used before."""
+        self.starting.pop(peer, None)
         worker = self.workers.setdefault(peer, WorkerPeer(peer, name, now, key))
         if credit > worker.credit:
             worker.credit, worker.free, worker.seen = credit, True, now
+
+    def worker_compiles(
+        self, peer: bytes, compiling: Compiling, now: float, key: str = ""
+    ) -> None:
+        """Note how far a worker is that is not ready yet, unless there are too many."""
+        if peer not in self.workers and self.too_many(peer, key, self.starting) is None:
+            self.starting[peer] = StartingWorker(peer, now, key, compiling)
 
     def ask_for_ready(self, peer: bytes) -> None:
         """Note that a peer was asked to say that it is ready.
@@ -94,6 +116,7 @@ class Peers:
 
         That is so of an unknown peer, and of a worker without a job whose `WorkerReady` was lost.
         """
+        self.starting.pop(peer, None)
         if sensor := self.sensors.get(peer):
             sensor.seen = now
         elif worker := self.workers.get(peer):
@@ -139,7 +162,7 @@ class Peers:
 
     @staticmethod
     def too_many(
-        peer: bytes, key: str, known: Mapping[bytes, SensorPeer | WorkerPeer]
+        peer: bytes, key: str, known: Mapping[bytes, SensorPeer | StartingWorker | WorkerPeer]
     ) -> int | None:
         """Give the limit that a new sensor or worker would exceed; None where there is room."""
         if peer in known:
@@ -149,5 +172,5 @@ class Peers:
         own = sum(one.key == key for one in known.values())
         return MAX_PEERS_PER_KEY if key and own >= MAX_PEERS_PER_KEY else None
 
-    def _all(self) -> list[SensorPeer | WorkerPeer]:
-        return [*self.sensors.values(), *self.workers.values()]
+    def _all(self) -> list[SensorPeer | StartingWorker | WorkerPeer]:
+        return [*self.sensors.values(), *self.starting.values(), *self.workers.values()]

@@ -7,6 +7,7 @@ refused whatever the sensor.
 import math
 from collections.abc import Iterator
 from importlib.metadata import version
+from itertools import islice
 
 from pydantic import ValidationError
 
@@ -19,7 +20,7 @@ from denseface.service.monitoring import Figures, Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, Publish
 from denseface.service.protocol.states import CaptureState
-from denseface.service.protocol.status import MAX_SENSOR_STATES
+from denseface.service.protocol.status import MAX_COMPILING, MAX_SENSOR_STATES
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 
@@ -116,7 +117,9 @@ class StatusReport:
             free_bytes=self._free_bytes(), kept_bytes=self._figures.kept_bytes,
             log_lines_lost=self._figures.log_lines_lost,
             obstacle=self._why_refused(), retention_s=self._settings.retention,
-            heartbeat_s=self._settings.heartbeat_s)
+            heartbeat_s=self._settings.heartbeat_s,
+            compiling=tuple(one.compiling for one in islice(
+                self._peers.starting.values(), MAX_COMPILING)))
 
     def _free_bytes(self) -> int | None:
         try:

@@ -63,7 +63,7 @@ class Health:
             found += [f"sensor: {one.name} is {one.state}{one.reason and f': {one.reason}'}"
                       for one in status.sensor_states] or ["sensor: none is alive"]
         if not status.workers:
-            found.append("worker: none is alive")
+            found.append(f"worker: {status.kernels or 'none is alive'}")
         return found
 
 

@@ -1,12 +1,12 @@
 """Compiled loops that pack a dense cloud."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from denseface.recon.numerics.jit import compiled_exactly
 
-# Without the GIL: another thread computes the next face meanwhile.
-@njit(cache=True, nogil=True)
+
+@compiled_exactly  # another thread computes the next face meanwhile
 def pack(
     points: NDArray[np.float32], normals: NDArray[np.float32], cells: NDArray[np.int32],
     rows: int, columns: int, unit: float,
@@ -44,7 +44,7 @@ def pack(
     return n, support, xs, ys, zs, tilts
 
 
-@njit(cache=True, nogil=True)
+@compiled_exactly
 def to_float16_bits(bits: NDArray[np.uint32]) -> NDArray[np.uint16]:
     """Round float32 to float16, both as their bits; 25 times as fast as NumPy.
 

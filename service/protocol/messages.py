@@ -52,6 +52,7 @@ from denseface.service.protocol.sensor_messages import SensorState as SensorStat
 from denseface.service.protocol.sensor_messages import Take as Take
 from denseface.service.protocol.sensor_messages import TakeHints as TakeHints
 from denseface.service.protocol.sensor_messages import TakePreview as TakePreview
+from denseface.service.protocol.status import Compiling as Compiling
 from denseface.service.protocol.status import Latency as Latency
 from denseface.service.protocol.status import Status as Status
 
@@ -329,9 +330,13 @@ class WorkerReady(ToHub):
 class Heartbeat(ToHub):
     """A sensor or worker is alive."""
 
+    newer: ClassVar = frozenset({"compiling"})
+
     kind: Literal["heartbeat"] = "heartbeat"
     holding: CaptureId | None = None
     """The job that a worker holds."""
+    compiling: Compiling | None = None
+    """Of a worker that is not ready yet."""
 
 
 class Goodbye(ToHub):

@@ -4,12 +4,22 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, FailFast, Field, field_validator
 
-from denseface.service.protocol.message_base import BaseAnswer, Name, Names, Number, Token
+from denseface.service.protocol.message_base import (
+    BaseAnswer,
+    Name,
+    Names,
+    Number,
+    PeerName,
+    Token,
+)
 from denseface.service.protocol.sensor_messages import SensorFigures
 from denseface.service.runtime.terminal import printable
 
 MAX_SENSOR_STATES = 64
 """Sensors whose state a status tells: so many fit into a header, whatever their reasons are."""
+
+MAX_COMPILING = 64
+"""Workers of which a status tells that they compile."""
 
 _TimeS = Annotated[float, Field(ge=0)]
 _Counts = Annotated[dict[Name, Number], Field(default_factory=dict, max_length=64)]
@@ -55,6 +65,17 @@ class SensorStatus(BaseModel):
     identity: Name = ""
     """Serial number, USB port or address."""
     figures: SensorFigures = SensorFigures()
+
+
+class Compiling(BaseModel):
+    """A worker that is not ready yet, as its kernels are compiled: by itself or another process."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    name: PeerName
+    done: Number
+    """Kernels that stand ready."""
+    total: Number
 
 
 class Status(BaseAnswer):
@@ -115,6 +136,8 @@ class Status(BaseAnswer):
     older hub does not say."""
     heartbeat_s: Annotated[float, Field(gt=0)] = 1.0
     """Longest time between two statuses that are published."""
+    compiling: Annotated[tuple[Compiling, ...], Field(max_length=MAX_COMPILING), FailFast()] = ()
+    """Workers that will be ready when their kernels are; the first where there are more."""
 
     @property
     def ready(self) -> bool:
@@ -128,3 +151,13 @@ class Status(BaseAnswer):
         if not self.sensor_states:  # an older hub's
             return bool(self.sensors)
         return any(one.state in ("streaming", "warming") for one in self.sensor_states)
+
+    @property
+    def kernels(self) -> str:
+        """How far the workers are that compile their kernels; empty where none does."""
+        if not self.compiling:
+            return ""
+        done, total = max((one.done, one.total) for one in self.compiling)
+        who = ("a worker compiles its" if len(self.compiling) == 1 else
+               f"{len(self.compiling)} workers compile their")
+        return f"{who} kernels, {done} of {total}"

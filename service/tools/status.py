@@ -19,15 +19,22 @@ _HELP = "`denseface doctor` says what keeps a sensor from working"
 def ready_status(client: Client, timeout: float) -> Status:
     """Wait until hub, a sensor and a worker are ready, at most `timeout` seconds.
 
+    The time in which kernels are compiled is not counted: it comes once on a machine.
+
     Raises
     ------
     ClientTimeoutError
         One line that says what is missing.
     """
-    deadline = time.monotonic() + timeout
+    looked = time.monotonic()
+    deadline = looked + timeout
     status = client.status(timeout=timeout)
     while not status.ready:
-        left = deadline - time.monotonic()
+        now = time.monotonic()
+        if status.compiling and not status.workers:
+            deadline += now - looked
+        looked = now
+        left = deadline - now
         if left <= 0:
             raise ClientTimeoutError(_missing(status, timeout))
         time.sleep(min(_POLL_S, left))
@@ -41,7 +48,7 @@ def _missing(status: Status, timeout: float) -> str:
     if status.state != "serving":
         return f"no hub is ready after {timeout:g} s"
     if status.has_frames:
-        return f"no worker is ready after {timeout:g} s"
+        return f"no worker is ready after {timeout:g} s{status.kernels and f': {status.kernels}'}"
     help_ = f"; {_HELP}" if _is_sensor_wrong(status) else ""
     return f"no sensor is ready after {timeout:g} s: {_why_no_sensor(status)}{help_}"
 
@@ -93,7 +100,7 @@ def as_text(address: str, status: Status) -> str:
         "sensors": "; ".join(map(_sensor, status.sensor_states)) or (
             ", ".join(status.sensors) or f"none: {_why_no_sensor(status)}"
             if status.state == "serving" else "none"),
-        "workers": ", ".join(status.workers) or "none",
+        "workers": "; ".join(filter(None, [", ".join(status.workers), status.kernels])) or "none",
         "now": f"{status.pressed} pressed, {status.queued} queued, {status.working} working",
         "kept": f"{status.done} faces, {status.failed} without a face, {status.dead} given up",
     }

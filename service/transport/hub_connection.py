@@ -59,11 +59,11 @@ class HubConnection:
         return send_parts(self._socket, encode(Packet(message, arrays or {})))
 
     def packets(
-        self, stop: StopSignal, wake: WakePipe, holding: Callable[[], str | None]
+        self, stop: StopSignal, wake: WakePipe, heartbeat: Callable[[], Heartbeat] = Heartbeat
     ) -> Iterator[Packet | None]:
         """Give what the hub sends, and None at every heartbeat and when `wake` is readable.
 
-        `stop` ends the iteration; `holding` gives the capture that this process works on.
+        `stop` ends the iteration; `heartbeat` gives what this process says of itself.
         """
         poller = zmq.Poller()
         for readable in (self._socket, stop, wake):
@@ -71,9 +71,9 @@ class HubConnection:
         due = 0.0
         while not stop:
             if (now := time.monotonic()) >= due:
-                held = holding()
-                self._supervisor.beat(Beat.HOLDING if held else Beat.IDLE)
-                sent = self.send(Heartbeat(holding=held))
+                said = heartbeat()
+                self._supervisor.beat(Beat.HOLDING if said.holding else Beat.IDLE)
+                sent = self.send(said)
                 due = now + (self._heartbeat_s if sent else min(_RETRY_S, self._heartbeat_s))
                 if self._monitor.read():
                     self._log.error("refused by the hub", reason=str(self._monitor.refused))

@@ -13,7 +13,7 @@ from denseface.capture.calibration import CameraModel, DepthToColor
 from denseface.capture.frame import RgbdFrame
 from denseface.recon import Settings
 from denseface.recon.face import DenseCloud, Seeds
-from denseface.recon.pipeline import surface_of
+from denseface.recon.fitting import surface_of
 from denseface.recon.propagation import densify
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.settings import Neighbors

@@ -22,7 +22,7 @@ from denseface.recon import (
     TooLittleDepthError,
     reconstruct,
 )
-from denseface.recon.pipeline import surface_of
+from denseface.recon.fitting import surface_of
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import segment_face
 from denseface.recon.settings import Neighbors

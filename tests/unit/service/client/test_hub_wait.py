@@ -109,7 +109,7 @@ def test_a_daemon_says_once_that_it_waits_and_once_that_it_waits_no_longer(addre
     with capture_logs() as log, StopSignal() as stop, WakePipe() as wake, \
             HubConnection(settings, "worker") as connection:
         try:
-            for number, _ in enumerate(connection.packets(stop, wake, lambda: None)):
+            for number, _ in enumerate(connection.packets(stop, wake)):
                 if number == 10:
                     hub = FakeHub(address)
                 if len(log) == 2:

@@ -6,6 +6,7 @@ import cv2
 import pytest
 
 from denseface.recon import NoFaceError
+from denseface.recon.numerics.compilation.progress import Progress
 from denseface.recon.settings import Settings
 from denseface.service.daemons import worker
 from denseface.service.daemons.worker import _Worker
@@ -97,6 +98,30 @@ def test_it_asks_for_the_next_job_when_it_begins_one(run):
         ("worker_ready", 0), ("worker_ready", 1),
         ("worker_ready", 2), ("result", "a"),  # b is under way before a is answered
         ("result", "b")]
+
+
+def test_while_it_compiles_it_says_how_far_it_is_and_asks_for_nothing(monkeypatch):
+    may_end, sent = threading.Event(), []
+    monkeypatch.setattr(worker, "warm", lambda: may_end.wait(LIMIT_S))
+    monkeypatch.setattr(worker.compiling, "progress", Progress("compiling", 12, 63))
+
+    class Hub:
+        def packets(self, _, warming, heartbeat):
+            sent.append(heartbeat().compiling)
+            yield Packet(messages.Announce())
+            assert len(sent) == 1
+            may_end.set()
+            assert warming.wait(LIMIT_S)
+            yield None
+
+        def send(self, message):
+            sent.append(message)
+
+    with Background("warm") as warming:
+        one = _Worker(SETTINGS, Hub(), warming, name="w")
+        assert one.start(object(), warming)
+    assert sent == [messages.Compiling(name="w", done=12, total=63),
+                    messages.WorkerReady(name="w", credit=0)]
 
 
 def test_it_goes_on_after_a_frame_without_a_face(run):

@@ -7,6 +7,7 @@ import pytest
 from denseface.service.errors import StoreError
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Publish
+from denseface.service.protocol.roles import Role
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
 from tests.unit.service.hub.bench import OTHER, SENSOR, SETTINGS, WORKER
@@ -136,3 +137,35 @@ def test_a_new_subscriber_is_told_at_once(bench, said):
 
 def test_it_says_how_long_captures_are_kept(bench):
     assert bench.hub._status.make().retention_s == SETTINGS.retention
+
+
+def compiles(done, name="w"):
+    return messages.Heartbeat(compiling=messages.Compiling(name=name, done=done, total=63))
+
+
+def test_a_worker_that_compiles_is_told_with_how_far_it_is_until_it_is_ready(bench, said):
+    assert bench.say(WORKER, compiles(11)) == bench.say(WORKER, compiles(12)) == []
+    (status,) = said.later()
+    assert (status.workers, status.kernels) == ((), "a worker compiles its kernels, 12 of 63")
+    assert not status.ready
+    bench.say(WORKER, messages.WorkerReady(name="w", credit=0))
+    (status,) = said.later()
+    assert (status.workers, status.kernels) == (("w",), "")
+
+
+def test_one_that_compiles_and_falls_silent_or_says_so_no_more_is_forgotten(bench, said):
+    bench.say(OTHER, compiles(0))
+    bench.say(WORKER, compiles(12))
+    assert [sent.kind for _, sent in bench.say(WORKER, messages.Heartbeat())] == ["announce"]
+    assert [len(one.compiling) for one in said.later()] == [1]
+    assert not said.later(100)[-1].compiling
+
+
+def test_a_key_of_a_sensor_is_no_worker_that_compiles(bench, said):
+    roles = frozenset({Role.SENSOR})
+    bench.say(SENSOR, compiles(12), key="k", roles=roles)
+    for number in range(70):
+        bench.say(b"%d" % number, compiles(number), key="k", roles=frozenset({Role.WORKER}))
+    (status,) = said.later()
+    assert len(status.compiling) == 64, "of one key, as of workers"
+    assert "of 63" in status.kernels

@@ -94,6 +94,8 @@ to_hub = st.one_of(
     plain(messages.QualityHint, hint=hints),
     plain(messages.WorkerReady, name=peer_names, credit=numbers),
     plain(messages.Heartbeat, holding=st.none() | ids),
+    plain(messages.Heartbeat, compiling=st.builds(
+        messages.Compiling, name=peer_names, done=numbers, total=numbers)),
     st.just(Packet(messages.Goodbye())),
     plain(messages.FrameFailed, capture_id=ids, message=texts),
     plain(messages.FrameFailed, capture_id=ids, message=texts, reason=st.just("quality"),

@@ -1,13 +1,14 @@
 """The hub's status as its users see it."""
 
 import json
+from types import SimpleNamespace
 
 import pytest
 
 from denseface.service.errors import ClientTimeoutError
 from denseface.service.protocol.messages import Status
 from denseface.service.protocol.sensor_messages import SensorFigures
-from denseface.service.protocol.status import SensorStatus
+from denseface.service.protocol.status import Compiling, SensorStatus
 from denseface.service.tools import status as module
 from denseface.service.tools.status import as_json, as_text, ready_status
 
@@ -38,6 +39,26 @@ def test_it_is_waited_for_until_a_press_would_become_a_face(monkeypatch):
 def test_what_is_missing_at_the_end_is_named(last, missing):
     with pytest.raises(ClientTimeoutError, match=f"no {missing} is ready after 0.01 s"):
         ready_status(Client(last), 0.01)
+
+
+COMPILING = status("s", compiling=[Compiling(name="w", done=12, total=63)])
+
+
+def test_the_time_in_which_kernels_are_compiled_does_not_count(monkeypatch):
+    clock = iter(range(1000))
+    monkeypatch.setattr(module, "time", SimpleNamespace(
+        monotonic=lambda: 100 * next(clock), sleep=lambda _: None))
+    ready = status("s", workers=("w",))
+    assert ready_status(Client(*[COMPILING] * 50, ready), 60) is ready
+    with pytest.raises(ClientTimeoutError, match="no worker is ready after 60 s"):
+        ready_status(Client(status("s")), 60)
+
+
+def test_a_worker_that_compiles_is_told_with_how_far_it_is():
+    assert "workers  a worker compiles its kernels, 12 of 63" in as_text("ipc:///x", COMPILING)
+    others = [Compiling(name=name, done=done, total=63) for name, done in (("b", 0), ("c", 40))]
+    several = status("s", workers=("a",), compiling=others)
+    assert "workers  a; 2 workers compile their kernels, 40 of 63" in as_text("ipc:///x", several)
 
 
 def test_what_refuses_every_press_is_said():
