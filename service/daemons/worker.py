@@ -66,8 +66,8 @@ def run(settings: ServiceSettings, supervisor: SupervisorLink | None = None) -> 
 def warm() -> None:
     """Compile and load all that the first job would otherwise wait for."""
     with compiling.session():
-        recon.warm()
         warm_packing()
+        recon.warm()
 
 
 @dataclass

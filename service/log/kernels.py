@@ -81,7 +81,8 @@ class KernelEvents(logging.Handler):
         """Log a record of recon's, unless another was logged just now."""
         progress: Any = record.progress  # type: ignore[attr-defined]
         now = time.monotonic()
-        if record.levelno < logging.WARNING and now < self._due:
+        if record.levelno < logging.WARNING and (
+                now < self._due or progress.state == "waiting"):  # the other says it
             return
         self._due = now + _EVENT_S
         import structlog  # which a command that only says lines need not load
