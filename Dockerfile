@@ -31,9 +31,9 @@ ENV PATH=/opt/denseface/bin:$PATH \
     DENSEFACE_METRICS=127.0.0.1:9400
 # The kiosk's page, reached from outside only where DENSEFACE_KIOSK_ADDRESS says so.
 EXPOSE 8080
+# Compiled for this processor, for whoever the container runs as: else each start would compile it.
+RUN denseface warm
 USER denseface
-# Compiled for this processor into the user's cache: else the first start would wait for it.
-RUN python3 -c 'from denseface.service.daemons.worker import warm; warm()'
 # What users have written, apart from the hub's own: nothing there is removed.
 WORKDIR /faces
 VOLUME /data /faces

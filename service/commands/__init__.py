@@ -27,6 +27,7 @@ COMMANDS = {
     "hub": "run the hub alone",
     "capture": "run a capture process alone",
     "worker": "run a reconstruction worker alone",
+    "warm": "compile now what the first start would otherwise wait for",
     "kiosk": "run the page alone where visitors see their own face",
 }
 """What each does, by the name of its module, in the order of `denseface --help`."""

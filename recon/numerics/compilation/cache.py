@@ -93,7 +93,9 @@ class KernelCache(_Cache):
                 kept, reduced = pickle.loads(  # noqa: S301 - nobody else can have written it
                     read_bounded(folder / name, _MAX_BYTES))
                 if kept == key:
-                    return _rebuild(target_context, *reduced)
+                    code = _rebuild(target_context, *reduced)
+                    self._turns.folders.add(folder)
+                    return code
         return None
 
     def _save(self, name: str, code: bytes) -> str:
@@ -107,6 +109,7 @@ class KernelCache(_Cache):
                     reason = f"{folder}: {error.strerror}"
                 else:
                     self._remove_older(folder, name)
+                    self._turns.folders.add(folder)
                     return ""
             reasons.append(reason)
         return "; ".join(reasons)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol
 
-__all__ = ["LOGGER", "Compiling", "Kernel", "Progress", "compiling"]
+__all__ = ["LOGGER", "Compiling", "Kernel", "Progress", "compiling", "nowhere"]
 
 LOGGER = "denseface.kernels"
 _POLL_S = 0.1
@@ -57,9 +57,14 @@ class Progress:
                 who = "compiling kernels, once on this machine"
             case "compiled":
                 return f"kernels ready after {self.seconds:.0f} s" + (
-                    f", for this start alone, as they can be kept nowhere: set NUMBA_CACHE_DIR to "
-                    f"a folder that only you can write ({self.not_kept})" if self.not_kept else "")
+                    f", for this start alone: {nowhere(self.not_kept)}" if self.not_kept else "")
         return f"{who}: {self.done} of {self.total}"
+
+
+def nowhere(reason: str) -> str:
+    """Say that code cannot be kept, why, and what to do."""
+    return ("compiled kernels can be kept nowhere; set NUMBA_CACHE_DIR to a folder that only you "
+            f"can write ({reason})")
 
 
 class Compiling:
@@ -74,9 +79,19 @@ class Compiling:
         self._begun: float | None = None
         """When waiting or compiling began, monotonic clock, seconds; None while it has not."""
         self._not_kept = ""
+        self.compiled = 0
+        """How often this process compiled."""
+        self.folders: set[Path] = set()
+        """Where the code is that it loaded or kept."""
+        self.lost = ""
+        """Why some of it is kept nowhere; empty where all of it is."""
         self.progress: Progress | None = None
         """The last that was said; None where nothing is compiled, and nothing waited for."""
         self._log = logging.getLogger(LOGGER)
+
+    def __len__(self) -> int:
+        """How many kernels there are."""
+        return len(self._kernels)
 
     def add(self, kernel: Kernel) -> None:
         """Count one more kernel."""
@@ -125,6 +140,8 @@ class Compiling:
 
     def end_one(self, not_kept: str) -> None:
         """Say that a kernel was compiled, and why its code was not kept."""
+        self.compiled += 1
+        self.lost = self.lost or not_kept
         self._not_kept = self._not_kept or not_kept
         if not self._sessions:
             self.give_turn()
