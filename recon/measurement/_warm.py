@@ -6,6 +6,7 @@ import numpy as np
 
 from denseface.recon.face import DenseCloud
 from denseface.recon.measurement._measure import raw_lengths
+from denseface.recon.numerics.compilation.progress import compiling
 
 __all__ = ["warm"]
 
@@ -20,7 +21,8 @@ def warm() -> None:
     points = np.stack([x, y, 700 + x * x / 150 + y * y / 300], axis=-1).astype(np.float32)
     normals = np.stack([x / 75, y / 150, np.full(len(x), -1.0)], axis=-1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    raw_lengths(DenseCloud(
-        points=points, colors=np.zeros(points.shape, np.uint8), normals=normals.astype(np.float32),
-        sigma=np.ones(len(points), np.float32), cells=cells, grid_shape=(_SIDE, _SIDE),
-        grid_step_mm=_STEP_MM))
+    with compiling.session():
+        raw_lengths(DenseCloud(
+            points=points, colors=np.zeros(points.shape, np.uint8),
+            normals=normals.astype(np.float32), sigma=np.ones(len(points), np.float32),
+            cells=cells, grid_shape=(_SIDE, _SIDE), grid_step_mm=_STEP_MM))
