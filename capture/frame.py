@@ -187,7 +187,8 @@ class RgbdFrame:
         readings = np.count_nonzero(self.depth) / self.depth.size
         return short_repr(
             self, depth, f"{readings:.0%} of it measured", color,
-            "registered" if self.registered else "", self.origin.sensor, self.origin.captured_at)
+            "registered" if self.registered else "",
+            self.origin.sensor or self.origin.source, self.origin.captured_at)
 
     @property
     def rgb(self) -> NDArray[np.uint8]:

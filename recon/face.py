@@ -203,7 +203,7 @@ class Report(BaseModel):
             self, self.capture_id, f"{self.initial_points:,} measured points",
             f"{self.dense_points:,} dense points", f"noise {self.noise_mm:.2f} mm",
             f"{self.settings.preset}", f"{warned} warning{'s' * (warned != 1)}" if warned else "",
-            self.sensor, self.captured_at)
+            self.sensor or self.source, self.captured_at)
 
     __str__ = __repr__
 
@@ -234,8 +234,8 @@ class Face:
     def __repr__(self) -> str:
         return short_repr(
             self, self.report.capture_id, f"{len(self.initial):,} measured points",
-            f"{len(self.dense):,} dense points", _sigma(self.dense), self.report.sensor,
-            self.report.captured_at)
+            f"{len(self.dense):,} dense points", _sigma(self.dense),
+            self.report.sensor or self.report.source, self.report.captured_at)
 
 
 def _extent(points: Floats) -> str:

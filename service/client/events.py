@@ -33,7 +33,8 @@ class PublishedFace:
 
     def __repr__(self) -> str:
         return short_repr(self, f"number {self.sequence}", self.capture_id,
-                          f"{len(self.face.dense):,} dense points", self.face.report.sensor,
+                          f"{len(self.face.dense):,} dense points",
+                          self.face.report.sensor or self.face.report.source,
                           self.face.report.captured_at)
 
 

@@ -14,6 +14,7 @@ from denseface.service.protocol.message_base import (
 )
 from denseface.service.protocol.sensor_messages import SensorFigures
 from denseface.service.runtime.terminal import printable
+from denseface.short_repr import short_repr
 
 MAX_SENSOR_STATES = 64
 """Sensors whose state a status tells: so many fit into a header, whatever their reasons are."""
@@ -138,6 +139,15 @@ class Status(BaseAnswer):
     """Longest time between two statuses that are published."""
     compiling: Annotated[tuple[Compiling, ...], Field(max_length=MAX_COMPILING), FailFast()] = ()
     """Workers that will be ready when their kernels are; the first where there are more."""
+
+    def __repr__(self) -> str:
+        return short_repr(
+            self, "ready" if self.ready else self.obstacle or self.state,
+            f"sensors: {' '.join(self.sensors) or 'none'}",
+            f"{len(self.workers)} worker{'s' * (len(self.workers) != 1)}",
+            f"{self.queued + self.working} waiting", f"{self.done} done")
+
+    __str__ = __repr__
 
     @property
     def ready(self) -> bool:

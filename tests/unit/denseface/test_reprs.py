@@ -13,6 +13,7 @@ from denseface import (
     PublishedFailure,
     PublishedHint,
     PublishedPreview,
+    Status,
 )
 from denseface.recon.face import Seeds
 from denseface.service.errors import CaptureFailedError
@@ -76,6 +77,23 @@ def test_whatever_its_names_are(kind):
         line = repr(things(name, name)[kind])
         assert len(line) < 200
         assert line.isprintable()
+
+
+def test_where_no_sensor_is_known_its_source_is_said():
+    origin = FrameOrigin(source="take.oni#3")
+    assert repr(replace(small_frame(), origin=origin)) == (
+        "<RgbdFrame: depth 8x6, 100% of it measured, color 10x7, take.oni#3>")
+
+
+def test_how_the_hub_is():
+    status = Status(
+        request=1, epoch="0f", sequence=1, hub_version="1", sensors=("S1", "S2"), workers=("w",),
+        pressed=0, queued=1, working=2, done=3, failed=0, dead=0, refused={}, presses_refused={},
+        since_start={})
+    assert repr(status) == (
+        "<Status: ready, sensors: S1 S2, 1 worker, 3 waiting, 3 done>")
+    assert repr(status.model_copy(update={"obstacle": "disk", "sensors": ()})).startswith(
+        "<Status: disk, sensors: none, ")
 
 
 def test_what_is_empty_or_without_color():
