@@ -12,6 +12,9 @@ from denseface.service.export.refusal import draw_refusal
 
 __all__ = ["draw_failed", "draw_refused", "explained", "write_named"]
 
+_TOLD = {"chosen": "taken", "farther": "farther away"}
+"""Verdicts that need other words where there is no face in the end."""
+
 
 def draw_refused(
     path: Path, frame: RgbdFrame, error: ReconstructionError, name: str, mode: int | None = None
@@ -68,7 +71,7 @@ def explained(
     """
     text = f"{name}: {error}"
     if len(error.candidates) > 1:
-        verdicts = Counter(one.verdict for one in error.candidates)
+        verdicts = Counter(_TOLD.get(one.verdict, one.verdict) for one in error.candidates)
         text += " (" + ", ".join(f"{times} boxes: {what}" if times > 1 else f"1 box: {what}"
                                  for what, times in verdicts.most_common()) + ")"
     tries = []

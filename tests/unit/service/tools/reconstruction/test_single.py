@@ -1,8 +1,12 @@
 """`denseface reconstruct` of one frame: what it says of what it wrote, and of what it did not."""
 
+from pathlib import Path
+
 import cv2
 
-from tests.unit.service.tools.reconstruction.conftest import write_frame
+from denseface.recon import CoarseDepthError
+from denseface.service.tools.reconstruction.refused import explained
+from tests.unit.service.tools.reconstruction.conftest import CANDIDATE, write_frame
 from tests.unit.service.tools.reconstruction.test_many import run
 
 
@@ -50,3 +54,15 @@ def test_no_face_is_drawn_in_place_of_one(tmp_path, capsys):
     assert line.endswith(f"{picture} shows what was looked at")
     assert cv2.imread(str(picture)).shape[1] > 1000
     assert not (tmp_path / "f.ply").exists()
+
+
+def test_several_boxes_are_counted_by_their_verdicts():
+    error = CoarseDepthError("steps of 12 mm: was it kept in 8 bits?")
+    error.candidates = tuple(CANDIDATE.model_copy(update={"verdict": verdict})
+                             for verdict in ("chosen", "flat", "flat", "farther"))
+    told = explained(error, "a.npz, frame 0", frames=1, picture=Path("p.png"))
+    assert isinstance(told, CoarseDepthError)
+    assert told.candidates == error.candidates
+    assert str(told) == (
+        "a.npz, frame 0: steps of 12 mm: was it kept in 8 bits? (2 boxes: flat, 1 box: taken, "
+        "1 box: farther away); p.png shows what was looked at")
