@@ -70,6 +70,7 @@ if TYPE_CHECKING:
         UnknownCaptureError,
     )
     from denseface.service.export import load_face, save_face
+    from denseface.service.export.refusal import draw_refusal
     from denseface.service.export.render import render
     from denseface.service.protocol.message_base import CaptureSummary, DeadLetter
     from denseface.service.protocol.status import Status
@@ -89,9 +90,9 @@ __all__ = [
     "PublishedHint", "PublishedPreview", "ReconstructionError", "RemoteProtocolError", "Report",
     "RequestFailedError", "RgbdFrame", "SensorError", "SensorTimeoutError", "ServiceError",
     "Settings", "SettingsError", "Source", "Status", "TooLittleDepthError", "UnknownCaptureError",
-    "UnreadableSourceError", "WrongSizeError", "__version__", "fuse", "load_calibration",
-    "load_face", "load_frame", "measure", "open_source", "reconstruct", "render", "save_face",
-    "save_frame", "warm",
+    "UnreadableSourceError", "WrongSizeError", "__version__", "draw_refusal", "fuse",
+    "load_calibration", "load_face", "load_frame", "measure", "open_source", "reconstruct",
+    "render", "save_face", "save_frame", "warm",
 ]
 
 _NAMES = {
@@ -119,6 +120,7 @@ _NAMES = {
                       "LocalProtocolError PressRefusedError ProtocolError RemoteProtocolError "
                       "RequestFailedError ServiceError SettingsError UnknownCaptureError",
     "service.export": "load_face save_face",
+    "service.export.refusal": "draw_refusal",
     "service.export.render": "render",
     "service.protocol.message_base": "CaptureSummary DeadLetter",
     "service.protocol.status": "Status",

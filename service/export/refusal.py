@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.arguments import expect
 from denseface.capture.frame import RgbdFrame
 from denseface.recon.face import FaceCandidate
 from denseface.recon.registration import with_shaded_depth
@@ -40,6 +41,7 @@ def draw_refusal(frame: RgbdFrame, candidates: Sequence[FaceCandidate], reason: 
     candidates : `ReconstructionError.candidates`
     reason : why it is none, one line
     """
+    expect("frame", frame, RgbdFrame)
     lines = _wrapped(reason)
     top = _HEADER + _LINE * len(lines)
     seen = with_shaded_depth(frame).rgb

@@ -76,6 +76,7 @@ WRONG = [
     (lambda: d.fuse([]), "a burst has 1 to 32 frames, found 0"),
     (lambda: d.measure(FACE.dense), "face: expected Face, found DenseCloud"),
     (lambda: d.render(FRAME), "face: expected Face, found RgbdFrame"),
+    (lambda: d.draw_refusal(FACE, (), ""), "frame: expected RgbdFrame, found Face"),
     (lambda: d.save_face("f.ply", FACE),
      "face: expected Face, found str 'f.ply': save_face(face, path)"),
     (lambda: d.save_face(FACE.dense, "f.ply"),
