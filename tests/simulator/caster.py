@@ -40,7 +40,7 @@ class Caster:
         distance = found["t_hit"].numpy()
         hit = np.isfinite(distance)
         u, v = found["primitive_uvs"].numpy().T
-        return (distance, np.where(hit, found["geometry_ids"].numpy(), -1).astype(np.int32),
+        return (distance, np.where(hit, found["geometry_ids"].numpy().astype(np.int32), -1),
                 np.where(hit, found["primitive_ids"].numpy(), 0).astype(np.int64),
                 np.stack([1 - u - v, u, v], axis=-1))
 

@@ -232,13 +232,15 @@ def test_a_rebuild_can_be_stopped_and_begun_again(data):
 
 def test_a_start_lists_each_folder_once_and_reads_no_file(data, monkeypatch):
     listed = Counter()
-    listdir = os.listdir
 
-    def counted(path="."):
-        listed[Path(path).name] += 1
-        return listdir(path)
+    def counted(lists):
+        def count(path="."):
+            listed[Path(path).name] += 1
+            return lists(path)
+        return count
 
-    monkeypatch.setattr(os, "listdir", counted)
+    for name in ("listdir", "scandir"):  # which of them `Path.iterdir` takes goes by the version
+        monkeypatch.setattr(os, name, counted(getattr(os, name)))
     progress = Progress()
     with FolderStore(data, FakeClock(), progress):
         assert listed == {"frames": 1, "faces": 1, "quarantine": 1, "data": 1}
