@@ -1,8 +1,8 @@
 """One command: its exit status, and one line on stderr for what went wrong.
 
-0 done; 1 the job failed; 2 wrong usage, unreadable input or no driver to read it with; 129, 130 and
-143 after SIGHUP, Ctrl-C and SIGTERM; 141 where the reader of stdout left. The same where stderr
-cannot be written.
+0 done; 1 the job failed; 2 wrong usage, unreadable input, or a part of the installation missing:
+another try would end the same; 129, 130 and 143 after SIGHUP, Ctrl-C and SIGTERM; 141 where the
+reader of stdout left. The same where stderr cannot be written.
 """
 
 import os
@@ -53,6 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 sys.excepthook = complain_of
             raise
         line = " ".join(str(error).split()) or type(error).__name__
+        if isinstance(error, ImportError):
+            line += f"; the installation in {sys.prefix} is incomplete: install denseface again"
         if getattr(args, "log", "text") == "json":
             import structlog
 
@@ -76,5 +78,5 @@ def _exit_status(error: Exception) -> int:
 
     wrong_input = (CalibrationError, DriverError, FrameError, UnreadableSourceError,
                    errors.FormatError, errors.FrameTooLargeError, errors.LocalProtocolError,
-                   errors.SettingsError, errors.UsageError)
+                   errors.SettingsError, errors.UsageError, ImportError)
     return USAGE if isinstance(error, wrong_input) else _FAILED

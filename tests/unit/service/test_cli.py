@@ -145,6 +145,17 @@ def test_an_untried_python_is_said_once(tmp_path, monkeypatch, capfd):
     assert line not in capfd.readouterr().err
 
 
+def test_an_installation_without_a_part_is_one_line_and_status_2(room, monkeypatch, capfd):
+    monkeypatch.setitem(sys.modules, "denseface.recon.pipeline", None)
+    monkeypatch.setattr("denseface.service.commands.reconstruct.run", lambda _: (
+        __import__("denseface.recon.pipeline")))
+    status, text = outcome(capfd, "reconstruct", room)
+    assert status == 2
+    assert text.endswith(
+        f"; the installation in {sys.prefix} is incomplete: install denseface again\n")
+    assert text.count("\n") == 1
+
+
 def test_a_frame_without_a_face_is_one_line_and_status_1(room, tmp_path, capfd):
     status, text = outcome(capfd, "reconstruct", room, "-o", tmp_path / "face.ply")
     assert (status, len(text.splitlines())) == (1, 1)
