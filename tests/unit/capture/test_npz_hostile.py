@@ -76,9 +76,8 @@ def _mutated(rng: Random, content: bytearray) -> bytes:
     return bytes(content)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_zip_with_wrong_fields_is_a_named_error(tmp_path, seed):
-    rng, whole = Random(seed), write(tmp_path / "w.npz").read_bytes()
+def test_a_zip_with_wrong_fields_is_a_named_error(tmp_path):
+    rng, whole = Random(0), write(tmp_path / "w.npz").read_bytes()
     path, refused = tmp_path / "m.npz", 0
     for _ in range(600):
         path.write_bytes(_mutated(rng, bytearray(whole)))
@@ -86,9 +85,8 @@ def test_a_zip_with_wrong_fields_is_a_named_error(tmp_path, seed):
     assert refused > 100
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_an_array_header_with_wrong_fields_is_a_named_error(tmp_path, seed):
-    rng = Random(seed)
+def test_an_array_header_with_wrong_fields_is_a_named_error(tmp_path):
+    rng = Random(0)
     good = entries(write(tmp_path / "w.npz"))
     path, refused = tmp_path / "m.npz", 0
     for _ in range(400):
@@ -107,13 +105,13 @@ def test_an_array_header_with_wrong_fields_is_a_named_error(tmp_path, seed):
 # Bombs.
 
 def test_a_member_that_inflates_without_end_is_not_followed(tmp_path):
-    """It claims a small array and holds a gigabyte of zeros in one megabyte."""
+    """It claims a small array and holds 64 MiB of zeros in 64 kB."""
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
     head = array((H, W), "<u2")
     packed = packer.compress(head) + b"".join(
-        packer.compress(bytes(2**20)) for _ in range(1024)) + packer.flush()
+        packer.compress(bytes(2**20)) for _ in range(64)) + packer.flush()
     path = tmp_path / "bomb.npz"
-    size = len(head) + 2**30
+    size = len(head) + 2**26
     name = b"depth.npy"
     local = struct.pack("<4s5H3I2H", b"PK\3\4", 20, 0, 8, 0, 0, 0, len(packed), size, len(name), 0)
     central = struct.pack("<4s6H3I5H2I", b"PK\1\2", 20, 20, 0, 8, 0, 0, 0, len(packed), size,
