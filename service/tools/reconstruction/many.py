@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from denseface.capture.errors import CaptureError
-from denseface.recon import ReconstructionError, Settings, reconstruct, warm
+from denseface.recon import ReconstructionError, Settings, reconstruct
 from denseface.service.errors import FrameTooLargeError, UsageError
 from denseface.service.export.written import NOTHING_WRITTEN, WrittenFiles
 from denseface.service.runtime.terminal import complain, say
@@ -51,7 +51,6 @@ def reconstruct_many(
     """
     tally, written, rows = Tally(), WrittenFiles(), list[Row]()
     width = max(len(one.name) for one in inputs) + (_DIGITS if number is None else 0)
-    warm()  # what is compiled or loaded is no frame's time
     say(head(width), flush=True)
     ended = False
     total = None if number is None else len(inputs)

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from denseface.capture.image_pair import PairReading
-from denseface.recon import Face, ReconstructionError, Settings, reconstruct, warm
+from denseface.recon import Face, ReconstructionError, Settings, reconstruct
 from denseface.service.errors import UsageError
 from denseface.service.export.written import NOTHING_WRITTEN, describe
 from denseface.service.runtime.terminal import complain
@@ -57,7 +57,6 @@ def reconstruct_one(taken: Taken, settings: Settings, outputs: Outputs) -> tuple
         A file cannot be written.
     """
     frame, files = taken.read.frame, outputs.files(taken.name)
-    warm()  # what is compiled or loaded is no frame's time
     try:
         face = reconstruct(frame, settings)
     except ReconstructionError as error:

@@ -42,7 +42,6 @@ def reconstruct(monkeypatch):
     """Make faces without work."""
     for module in (many, single):
         monkeypatch.setattr(module, "reconstruct", made_up)
-        monkeypatch.setattr(module, "warm", lambda: None)
     monkeypatch.setattr(render, "render", lambda _: b"\x89PNG")
 
 
