@@ -1,21 +1,22 @@
 """The cache of one kernel: reads from every folder that can be trusted, writes to the first.
 
-numba's own reads from the first folder alone that it can write, believes every folder, and passes
-on what a full disk or a damaged file raises.
+Its files are numba's. numba's own cache reads from the first folder alone that it can write,
+believes every folder, and passes on what a full disk or a damaged file raises.
 """
 
-import pickle
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from numba.core import compiler, serialize
-from numba.core.caching import _Cache
+from numba.core import compiler
+from numba.core.caching import IndexDataCacheFile, _Cache
 
-from denseface.files import read_bounded, write_whole
-from denseface.recon.numerics.compilation.fingerprint import fingerprint, short_hash
+from denseface.files import write_whole
+from denseface.recon.numerics.compilation.fingerprint import fingerprint
 from denseface.recon.numerics.compilation.folders import (
     folders_for,
     why_not_trusted,
@@ -25,11 +26,8 @@ from denseface.recon.numerics.compilation.progress import Compiling, compiling
 
 __all__ = ["KernelCache", "folder_to_write"]
 
-_MAX_BYTES = 32 * 1024 * 1024
-"""Longest file that is read, bytes; the longest that is written has 0.3 MB."""
 _NO_BRACKETS = str.maketrans("", "", "<>")
 """Takes away what `<locals>` would bring into a file's name."""
-_dumps: Any = serialize.dumps
 _rebuild: Any = compiler.CompileResult._rebuild
 
 
@@ -41,7 +39,8 @@ class KernelCache(_Cache):
         self._turns = turns
         self._source = Path(function.__code__.co_filename).absolute()
         self._enabled = self._source.is_file()
-        self._prefix = ""
+        name = f"{self._source.stem}.{function.__qualname__}".translate(_NO_BRACKETS)
+        self._every_version = f"{name}.{sys.implementation.cache_tag}-"
 
     @property
     def cache_path(self) -> str:
@@ -76,62 +75,79 @@ class KernelCache(_Cache):
         """Keep code in the first folder that can be written, or nowhere."""
         not_kept = ""
         if self._enabled and not data.library.has_dynamic_globals and not data.lifted:
-            key = sig, data.codegen.magic_tuple()
-            not_kept = self._save(self._file_name(key), _dumps((key, data._reduce())))
+            not_kept = self._save((sig, data.codegen.magic_tuple()), data._reduce())
         self._turns.end_one(not_kept)
 
     def _load(self, key: Any, target_context: Any) -> Any:
         if not self._enabled:
             return None
-        name = self._file_name(key)
         for folder in folders_for(self._source):
             # Damaged, gone by now, or not to be looked at: it is compiled again.
             with suppress(Exception):
-                if not (folder / name).exists() or why_not_trusted(
-                        folder, self._source, folder / name):
-                    continue
-                kept, reduced = pickle.loads(  # noqa: S301 - nobody else can have written it
-                    read_bounded(folder / name, _MAX_BYTES))
-                if kept == key:
-                    code = _rebuild(target_context, *reduced)
-                    self._turns.folders.add(folder)
-                    return code
+                if not self._doubt(folder):
+                    reduced = self._files(folder).load(key)
+                    if reduced is not None:
+                        code = _rebuild(target_context, *reduced)
+                        self._turns.folders.add(folder)
+                        return code
         return None
 
-    def _save(self, name: str, code: bytes) -> str:
+    def _save(self, key: Any, code: Any) -> str:
         reasons = []
         for folder in folders_for(self._source):
             reason = why_not_writable(folder, self._source)
             if not reason:
                 try:
-                    write_whole(folder / name, [code], mode=0o644, synced=False)
+                    self._write(folder, key, code)
                 except OSError as error:
                     reason = f"{folder}: {error.strerror}"
                 else:
-                    self._remove_older(folder, name)
                     self._turns.folders.add(folder)
                     return ""
             reasons.append(reason)
         return "; ".join(reasons)
 
-    def _file_name(self, key: Any) -> str:
-        return f"{self._prefix_now()}{short_hash(str(key))}.nbc"
-
-    def _prefix_now(self) -> str:
-        """Give what the names begin with; known when all that the function calls is there."""
-        if not self._prefix:
-            function = f"{self._source.stem}.{self._function.__qualname__}".translate(_NO_BRACKETS)
-            self._prefix = (f"{function}.{sys.implementation.cache_tag}-"
-                            f"{fingerprint(self._function)}-")
-        return self._prefix
-
-    def _remove_older(self, folder: Path, name: str) -> None:
-        """Remove the code of earlier versions of this function."""
-        function = name[:name.index("-") + 1]
+    def _write(self, folder: Path, key: Any, code: Any) -> None:
+        """Keep code beside what there is; what is damaged, not trusted or older, goes."""
+        sound = False
+        with suppress(Exception):
+            if not self._doubt(folder):
+                self._files(folder).load(key)
+                sound = True
+        if not sound:
+            for one in self._kept(folder):
+                one.unlink(missing_ok=True)
+        self._files(folder).save(key, code)
         with suppress(OSError):
-            for one in folder.iterdir():
-                if one.name.startswith(function) and not one.name.startswith(self._prefix_now()):
+            for one in folder.glob(f"{self._every_version}*"):
+                if not one.name.startswith(self._base):
                     one.unlink(missing_ok=True)
+
+    def _doubt(self, folder: Path) -> str:
+        """Say why what is kept in a folder is not to be run; empty where it may be."""
+        return why_not_trusted(folder, self._source, *self._kept(folder))
+
+    def _kept(self, folder: Path) -> list[Path]:
+        return list(folder.glob(f"{self._base}.*"))
+
+    @cached_property
+    def _base(self) -> str:
+        """Give what the files' names begin with; known when all that the function calls is."""
+        return self._every_version + fingerprint(self._function)
+
+    def _files(self, folder: Path) -> Any:
+        new: Any = _Files  # numba has no types
+        return new(str(folder), self._base, None)
+
+
+class _Files(IndexDataCacheFile):
+    """numba's index and files of one function: whole, and for no other user to write."""
+
+    @contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[BytesIO]:
+        file = BytesIO()
+        yield file
+        write_whole(Path(filepath), [file.getvalue()], mode=0o644, synced=False)
 
 
 def folder_to_write() -> Path | None:

@@ -12,7 +12,7 @@ import numba
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
-__all__ = ["fingerprint", "short_hash"]
+__all__ = ["fingerprint"]
 
 _PLAIN = (bool, int, float, str, tuple, type(None), np.generic, np.dtype)
 """Constants of a module that end up in compiled code."""
@@ -26,12 +26,8 @@ def fingerprint(function: Callable[..., Any]) -> str:
     """
     made_of = sorted({f"{kind} {name} {value}"
                       for one in _reached(function, set()) for kind, name, value in _parts(one)})
-    return short_hash(sys.version, numba.__version__, np.__version__, *made_of)
-
-
-def short_hash(*texts: str) -> str:
-    """Give 16 hexadecimal digits that stand for some texts."""
-    return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:16]
+    text = "\0".join([sys.version, numba.__version__, np.__version__, *made_of])
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def _reached(function: Callable[..., Any], seen: set[Any]) -> set[Any]:
