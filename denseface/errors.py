@@ -11,8 +11,24 @@ Each is also the builtin kind that a caller would expect to catch: `CalibrationE
 `TypeError`, and what the system refuses where a file is written an `OSError`.
 """
 
+from typing import Any
+
 __all__ = ["DensefaceError"]
 
 
 class DensefaceError(Exception):
     """Base of every error raised by denseface."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Come whole out of another process, whatever the parameters of `__init__`."""
+        return _again, (type(self), self.args, self.__dict__)
+
+
+def _again(kind: type[DensefaceError], args: tuple[Any, ...], state: dict[str, Any]
+           ) -> DensefaceError:
+    # Of a kind with two builtin bases, Python finds the wrong one's `__new__` by itself.
+    new = OSError.__new__ if issubclass(kind, OSError) else Exception.__new__
+    error = new(kind, *args)
+    error.args = args
+    error.__dict__.update(state)
+    return error

@@ -2,7 +2,9 @@
 
 import ast
 import builtins
+import copy
 import inspect
+import pickle
 import re
 import subprocess
 import sys
@@ -13,6 +15,7 @@ import pytest
 
 import denseface
 from denseface import errors
+from denseface.service import errors as service_errors
 
 PUBLIC = sorted({*denseface.__all__} - {"__version__"})
 ALIASES = {"Published"}
@@ -92,6 +95,23 @@ def test_all_errors_have_one_base_and_are_documented():
     assert bases <= set(re.findall(r"`(\w+)`", errors.__doc__))
     page = (Path(__file__).resolve().parents[3] / "docs" / "python.md").read_text()
     assert {*ERRORS} <= set(re.findall(r"`(\w+Error)`", page))
+
+
+MADE = {"PressRefusedError": ("press refused: too far", "quality", ("too_far",), "come closer"),
+        "CaptureFailedError": ("a1", "NoFaceError", "no face"),
+        "DamagedFaceError": ("a1", "cut short")}
+"""What errors are made of that take more than a text."""
+
+
+@pytest.mark.parametrize("name", [*ERRORS, "DamagedFaceError"])
+def test_an_error_comes_whole_out_of_another_process(name):
+    """As `concurrent.futures` brings it; one that cannot be made again would break the pool."""
+    error = getattr(service_errors if name == "DamagedFaceError" else denseface, name)(
+        *MADE.get(name, ("x.npz: cut short",)))
+    again = pickle.loads(pickle.dumps(error))  # noqa: S301
+    assert type(again) is type(error)
+    assert (str(again), again.args, vars(again)) == (str(error), error.args, vars(error))
+    assert str(copy.copy(error)) == str(error)
 
 
 def test_every_error_that_a_call_documents_is_public():
