@@ -4,14 +4,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
+from denseface.validation import complaint
+
 __all__ = ["FLATTENED", "CheckedModel", "first_line"]
 
 FLATTENED = BeforeValidator(
     lambda given: given.ravel().tolist() if hasattr(given, "ravel") else given)
 """An array of any shape is as good as a list: OpenCV gives rows and columns."""
-
-_MAX_FOUND = 60
-"""Characters of what was found."""
 
 
 class CheckedModel(BaseModel):
@@ -46,9 +45,8 @@ def first_line(error: ValidationError, whole: str = "") -> str:
 
     `whole` is the name where all is refused.
     """
-    first = error.errors(include_url=False, include_context=False)[0]
+    first = error.errors(include_url=False)[0]
     where = ".".join(map(str, first["loc"])) or whole
-    line = f"{where}: {first['msg']}" if where else first["msg"]
-    if first["type"] in ("missing", "extra_forbidden", "json_invalid"):
-        return line
-    return f"{line}, found {str(first['input'])[:_MAX_FOUND]!r}"
+    said = complaint(first, found=first["type"] not in (
+        "missing", "extra_forbidden", "json_invalid", "value_error"))
+    return f"{where}: {said}" if where else said

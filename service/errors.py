@@ -3,9 +3,12 @@
 Each error is also the builtin kind that a caller would expect to catch.
 """
 
+import errno
+import os
 from typing import TYPE_CHECKING
 
 from denseface.errors import DensefaceError
+from denseface.validation import complaint
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -169,16 +172,25 @@ class UsageError(ServiceError, ValueError):
     """What is asked for does not exist, or is not to be had there."""
 
 
+_REASONS = {
+    errno.EISDIR: "is a folder, expected a file",
+    errno.ENOTDIR: "lies in what is a file, expected a folder",
+    errno.ENAMETOOLONG: "the name is too long",
+}
+"""What the system says in words that leave out what was expected."""
+
+
 def first_error(error: "ValidationError", *, found: bool = False) -> tuple[str, str]:
     """Give the first field that pydantic refuses, its path with dots, and why, in one sentence.
 
     The field is empty where the whole is refused; `found` adds the value that it had.
     """
-    first = error.errors(include_url=False, include_context=False, include_input=found)[0]
-    message = f"{first['msg']}, found {first['input']!r}" if found else first["msg"]
-    return ".".join(map(str, first["loc"])), message
+    first = error.errors(include_url=False)[0]
+    return ".".join(map(str, first["loc"])), complaint(first, found=found)
 
 
 def reason_of(error: BaseException) -> str:
     """Say what went wrong; of an error of the system without its number and file."""
-    return getattr(error, "strerror", None) or str(error)
+    said = getattr(error, "strerror", None) or str(error)
+    number = getattr(error, "errno", None)
+    return _REASONS.get(number, said) if number and said == os.strerror(number) else said

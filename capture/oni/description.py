@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, StringConstraints, ValidationError, 
 from denseface.capture.calibration import Calibration
 from denseface.capture.errors import UnreadableSourceError
 from denseface.capture.frame import DepthRounding, RgbdFrame
+from denseface.validation import complaint
 
 __all__ = ["Description"]
 
@@ -56,4 +57,4 @@ class Description(BaseModel):
             first = error.errors(include_url=False)[0]
             where = ".".join(map(str, first["loc"])) or "JSON"
             raise UnreadableSourceError(
-                f"{name}: its description: {where}: {first['msg']}") from error
+                f"{name}: its description: {where}: {complaint(first)}") from error

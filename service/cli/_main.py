@@ -5,7 +5,9 @@ another try would end the same; 129, 130 and 143 after SIGHUP, Ctrl-C and SIGTER
 reader of stdout left. The same where stderr cannot be written.
 """
 
+import errno
 import os
+import re
 import sys
 from collections.abc import Sequence
 
@@ -25,6 +27,8 @@ from denseface.service.runtime.terminal import (
 
 _FAILED, _CTRL_C, _BROKEN_PIPE = 1, 130, 141
 """Exit statuses; above 128, 128 and the number of the signal, as a shell has it."""
+_LONGEST = 400
+"""Characters of a word that are shown: a path of a system's longest is no line."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -52,9 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if sys.excepthook is sys.__excepthook__:
                 sys.excepthook = complain_of
             raise
-        line = " ".join(str(error).split()) or type(error).__name__
-        if isinstance(error, ImportError):
-            line += f"; the installation in {sys.prefix} is incomplete: install denseface again"
+        line = _line(error)
         if getattr(args, "log", "text") == "json":
             import structlog
 
@@ -65,6 +67,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     finally:
         discard_unless_flushed(sys.stdout)
     return status
+
+
+def _line(error: Exception) -> str:
+    from denseface.service.errors import reason_of
+
+    said = str(error)
+    if isinstance(error, OSError) and error.strerror and said.startswith("[Errno "):
+        names = [str(one) for one in (error.filename, error.filename2) if one is not None]
+        said = ": ".join([*names, reason_of(error)])
+    said = " ".join(said.split()) or type(error).__name__
+    if isinstance(error, ImportError):
+        said += f"; the installation in {sys.prefix} is incomplete: install denseface again"
+    return re.sub(rf"\S{{{_LONGEST}}}\S+", lambda long: f"{long[0][:_LONGEST]}...", said)
 
 
 def _exit_status(error: Exception) -> int:
@@ -79,4 +94,6 @@ def _exit_status(error: Exception) -> int:
     wrong_input = (CalibrationError, DriverError, FrameError, UnreadableSourceError,
                    errors.FormatError, errors.FrameTooLargeError, errors.LocalProtocolError,
                    errors.SettingsError, errors.UsageError, ImportError)
-    return USAGE if isinstance(error, wrong_input) else _FAILED
+    named_wrongly = any(getattr(one, "errno", None) in (errno.ENAMETOOLONG, errno.ENOTDIR)
+                        for one in (error, error.__cause__))
+    return USAGE if named_wrongly or isinstance(error, wrong_input) else _FAILED

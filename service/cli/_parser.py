@@ -70,7 +70,9 @@ class _Parser(argparse.ArgumentParser):
         return parsed, []
 
     def error(self, message: str) -> NoReturn:
-        complain(f"{self.prog}: {message.removeprefix('argument ')} (see {self.prog} --help)")
+        message = message.removeprefix("argument ").replace(
+            "expected one argument", "expected a value; one that begins with - goes after a =")
+        complain(f"{self.prog}: {message} (see {self.prog} --help)")
         self.exit(USAGE)
 
     def _unknown(self, argument: str) -> str:
@@ -78,6 +80,14 @@ class _Parser(argparse.ArgumentParser):
             return f"{argument!r}: expected nothing more"
         flag = argument.partition("=")[0]
         return f"unknown flag {flag}{_suggestion(flag, self._option_string_actions)}"
+
+    def _get_value(self, action: argparse.Action, arg_string: str) -> Any:
+        if not arg_string and not isinstance(action, argparse._SubParsersAction):
+            # As of a shell's variable that is not set.
+            expected = (_listed(action.choices) if action.choices else
+                        action.metavar if action.option_strings else "a word")
+            raise argparse.ArgumentError(action, f"expected {expected}, found ''")
+        return super()._get_value(action, arg_string)
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is None or value in action.choices:

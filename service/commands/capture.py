@@ -8,7 +8,7 @@ from denseface.service.commands import _options
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     _options.add_client(parser)
     _options.add_source(parser)
-    parser.add_argument("--name", metavar="NAME",
+    parser.add_argument("--name", type=_options.sensor_name, metavar="NAME",
                         help="name of the sensor, for `press --sensor` (default: made of what is "
                              "known of it: its serial number, USB port or address)")
     _options.add_log(parser)

@@ -9,9 +9,11 @@ from denseface.service.runtime.terminal import say
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     _options.add_client(parser)
     parser.add_argument("action", choices=("list", "retry", "drop"),
+                        metavar="list|retry|drop",
                         help="list: sequence number, id, time, attempts, reason; retry: all "
                              "attempts again; drop: remove frame, error and row")
-    parser.add_argument("ids", nargs="*", metavar="ID", help="captures to retry or drop")
+    parser.add_argument("ids", nargs="*", default=[], metavar="ID",
+                        help="captures to retry or drop")
     parser.add_argument("--all", action="store_true", help="retry or drop all of them")
 
 
@@ -19,9 +21,9 @@ def run(args: argparse.Namespace) -> int:
     from denseface.service.errors import UsageError
 
     if args.action == "list" and (args.ids or args.all):
-        raise UsageError("dead list: takes neither ids nor --all")
+        raise UsageError("list: expected neither ids nor --all")
     if args.action != "list" and bool(args.ids) == args.all:
-        raise UsageError(f"dead {args.action}: expected ids, or --all")
+        raise UsageError(f"{args.action}: expected ids, or --all")
     with _options.operator(args) as operator:
         if args.action == "list":
             for letter in operator.dead():

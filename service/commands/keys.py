@@ -2,6 +2,7 @@
 
 import argparse
 import os
+from contextlib import suppress
 
 from denseface.service.commands import _options
 from denseface.service.runtime.terminal import say
@@ -10,7 +11,7 @@ _ROLES = ("sensor", "worker", "presser", "subscriber", "operator")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    actions = parser.add_subparsers(dest="action", metavar="new|allow|revoke|list", required=True)
     new = actions.add_parser("new", help="make a pair: NAME.secret and NAME.public", description=(
         "Make a pair of keys. `hub` is the name of the hub's own."))
     new.add_argument("name", metavar="NAME")
@@ -47,6 +48,8 @@ def run(args: argparse.Namespace) -> int:
             security.revoke(folder, args.name)
             say(f"{args.name} may connect no more")
         case "list":
+            with suppress(FileNotFoundError):
+                next((folder / "allowed").iterdir(), None)  # what cannot be read is no empty list
             for one in sorted(security.AllowList(folder), key=lambda one: one.name):
                 say(f"{one.name:20} {one.fingerprint}  {', '.join(sorted(one.roles))}")
     return 0

@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="longest wait for the frame, and from then on for the face, seconds "
                              "(default: 60); for a hub that is not there at most "
                              f"{_options.CONNECT_S:g}")
-    parser.add_argument("--sensor", metavar="NAME",
+    parser.add_argument("--sensor", type=_options.sensor_name, metavar="NAME",
                         help="take the frame of this one; `denseface status` names them "
                              "(default: the one that is best off)")
     parser.add_argument("--gate", choices=("off", "wait", "refuse", "best"), default="off",
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "take the best of --gate-timeout seconds (default: off)")
     parser.add_argument("--gate-timeout", type=_options.seconds, default=10.0, metavar="S",
                         help="longest wait for a good frame, seconds (default: 10)")
-    parser.add_argument("--frames", type=_options.count, default=1, metavar="N",
+    parser.add_argument("--frames", type=_options.burst, default=1, metavar="N",
                         help="make one of N consecutive frames, at most 32 (default: 1)")
     _options.add_outputs(parser, "--save")
     _options.add_mode(parser)

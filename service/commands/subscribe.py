@@ -18,7 +18,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="of the files that --save writes; may be repeated (default: ply)")
     _options.add_mode(parser)
     parser.add_argument("--count", type=_options.count, metavar="N", help="end after N captures")
-    parser.add_argument("--sensor", metavar="NAME", help="with --hints: of this sensor alone")
+    parser.add_argument("--sensor", type=_options.sensor_name, metavar="NAME",
+                        help="with --hints: of this sensor alone")
     start = parser.add_mutually_exclusive_group()
     start.add_argument("--hints", action="store_true",
                        help="follow what could be better in front of the sensor, a line for each "

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from denseface.files import read_bounded
 from denseface.service.errors import SettingsError, first_error, reason_of
+from denseface.service.kiosk.installed import LANGUAGES
 from denseface.service.kiosk.page_messages import Language
 from denseface.service.kiosk.settings import KioskSettings
 
@@ -59,5 +60,11 @@ def check_files(settings: KioskSettings) -> None:
     """Raise at once what the kiosk would raise later of the files that are named: SettingsError."""
     settings.tls()
     settings.lan_tls()
+    if settings.folder.exists() and not settings.folder.is_dir():
+        raise SettingsError(f"--kiosk-folder: {settings.folder}: is a file, expected a folder")
+    known = sorted(one.stem for one in LANGUAGES.glob("*.json"))
+    if unknown := [one for one in settings.languages if one not in known]:
+        raise SettingsError(
+            f"--kiosk-languages: expected some of {', '.join(known)}, found {unknown[0]!r}")
     if settings.consent_text is not None:
         load_consent_text(settings.consent_text, settings.languages)

@@ -170,7 +170,6 @@ class KioskSettings(BaseModel):
         except ValidationError as error:
             field, message = first_error(error, found=bool(error.errors()[0]["loc"]))
             name = field.partition(".")[0]
-            message = message.removeprefix("Value error, ")
             if not name:  # of several settings together, which it names
                 raise SettingsError(f"{_FLAG}address: {message}" if "reached" in message
                                     else message) from error

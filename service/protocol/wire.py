@@ -20,6 +20,7 @@ from denseface.service.protocol.message_base import VERSION, BaseMessage, FromHu
 from denseface.service.protocol.messages import FROM_HUB, TO_HUB
 from denseface.service.protocol.payload import Arrays
 from denseface.service.runtime.terminal import printable
+from denseface.validation import complaint
 
 MAX_HEADER_BYTES = 256 * 1024
 """Longest header, from the hub or stored, bytes."""
@@ -193,8 +194,8 @@ def _complaint(error: ValidationError) -> str:
         case "extra_forbidden":
             return f"{field}: no such field{found}"
         case "missing" | "value_error" | "assertion_error":
-            return f"{field}: {first['msg']}"
-    return f"{field}: {first['msg']}{found}"
+            return f"{field}: {complaint(first)}"
+    return f"{field}: {complaint(first)}{found}"
 
 
 def _shown(value: object) -> str:

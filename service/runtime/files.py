@@ -165,6 +165,8 @@ def _own_folder(path: Path) -> int:
     try:
         path.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = path.lstat()
+    except FileExistsError as error:
+        raise SettingsError(f"{path}: is a file, expected a folder") from error
     except OSError as error:
         raise SettingsError(f"{path}: {reason_of(error)}") from error
     if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():

@@ -170,6 +170,8 @@ def _writing(out: Path, mode: int) -> Iterator[_Writer]:
     folder = out.is_dir() or not out.suffix
     if not folder and out.suffix.lower() != ".oni":
         raise UsageError(f"{out}: expected NAME.oni or a folder")
+    if folder and out.exists() and not out.is_dir():
+        raise UsageError(f"{out}: is a file, expected a folder")
     check_outside_hub(out / "000000.npz" if folder else out)
     try:
         make_folder(out.absolute().parent, mode)

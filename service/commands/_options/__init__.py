@@ -4,6 +4,7 @@ import argparse
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from denseface.service.commands._options.values import (
     count,
     file_mode,
     seconds,
+    sensor_name,
     timestamp,
     whole,
 )
@@ -21,7 +23,8 @@ from denseface.service.export import FORMATS
 __all__ = [
     "add_client", "add_hub", "add_keys", "add_log", "add_mode", "add_outputs", "add_recon",
     "add_rotation", "add_source", "burst", "client", "count", "file_mode", "operator",
-    "recon_settings", "repeated", "seconds", "service_settings", "timestamp", "warn", "whole",
+    "recon_settings", "repeated", "seconds", "sensor_name", "service_settings", "timestamp",
+    "warn", "whole",
 ]
 
 if TYPE_CHECKING:
@@ -149,7 +152,9 @@ def recon_settings(args: argparse.Namespace) -> "Settings":
     for change in args.set:
         name, equals, value = change.partition("=")
         if not equals or name not in Settings.model_fields:
-            raise UsageError(f"--set {change}: expected NAME=VALUE with NAME one of "
+            near = get_close_matches(name, Settings.model_fields, n=1)
+            meant = f"did you mean {near[0]}? " if equals and near else ""
+            raise UsageError(f"--set {change}: {meant}expected NAME=VALUE with NAME one of "
                              f"{', '.join(Settings.model_fields)}")
         given[name] = value
     try:

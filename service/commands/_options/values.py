@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 from datetime import datetime
 
-__all__ = ["burst", "count", "file_mode", "seconds", "timestamp", "wanted", "whole"]
+__all__ = ["burst", "count", "file_mode", "seconds", "sensor_name", "timestamp", "wanted", "whole"]
 
 _MOST = 10**12
 """Largest whole number that anything takes."""
@@ -55,6 +55,13 @@ def burst(text: str) -> int:
     from denseface.capture import MAX_BURST
 
     return whole(1, MAX_BURST)(text)
+
+
+def sensor_name(text: str) -> str:
+    """Read the name of a sensor, as a hub takes it."""
+    if not re.fullmatch("[!-~]{1,100}", text):
+        raise wanted("1 to 100 ASCII characters without spaces", text)
+    return text
 
 
 def timestamp(text: str) -> datetime:

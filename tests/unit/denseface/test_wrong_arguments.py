@@ -120,16 +120,16 @@ WRONG = [
     (lambda: d.Calibration.from_json(Path("c.json")),
      "calibration: JSON: JSON input should be string, bytes or bytearray, found 'c.json': "
      "load_calibration(path) reads a file"),
-    (lambda: d.Calibration(depth=None), "depth: Input should be a valid dictionary or instance of "
-                                        "CameraModel, found 'None'"),
+    (lambda: d.Calibration(depth=None), "depth: expected a CameraModel, or its fields by name, "
+                                        "found None"),
     (lambda: d.CameraModel(width=640), "height: Field required"),
     (lambda: d.CameraModel(**CAMERA | {"width": "a"}),
-     "width: Input should be a valid integer, unable to parse string as an integer, found 'a'"),
+     "width: expected a whole number, found 'a'"),
     (lambda: d.CameraModel(**CAMERA, k1=0),
      "k1: no such field, expected one of width, height, fx, fy, cx, cy, distortion"),
     (lambda: d.CameraModel(**CAMERA, distortion=[0, 0, 0, 0]), "distortion.4: Field required"),
     (lambda: d.DepthToColor(translation_mm=1),
-     "translation_mm: Input should be a valid tuple, found '1'"),
+     "translation_mm: expected a list, found 1"),
     (lambda: CALIBRATION.depth.project([1, 2]),
      "points must have shape (..., 3), found (2,)"),
     (lambda: d.PointCloud(None, None), "points must be an array, found None"),
@@ -137,7 +137,7 @@ WRONG = [
     (lambda: d.PointCloud(np.zeros((2, 3)), COLOR),
      "points must be float32 (2, 3), found float64 (2, 3)"),
     (lambda: d.Settings.of("best", ratio=None),
-     "ratio: Input should be a valid number, found 'None'"),
+     "ratio: expected a number, found None"),
 ]
 
 
@@ -163,11 +163,11 @@ ASKED = [
     (lambda o: o.press(timeout="1"), "timeout: expected seconds, found str '1'"),
     (lambda o: o.press(timeout=float("nan")), "timeout: expected seconds, found float nan"),
     (lambda o: o.press(gate="good"),
-     "gate: Input should be 'off', 'wait', 'refuse' or 'best', found 'good'"),
-    (lambda o: o.press(frames=0), "frames: Input should be greater than or equal to 1, found 0"),
+     "gate: expected 'off', 'wait', 'refuse' or 'best', found 'good'"),
+    (lambda o: o.press(frames=0), "frames: expected at least 1, found 0"),
     (lambda o: o.press(consent="yes"),
-     "consent: Input should be a valid dictionary or instance of Consent, found 'yes'"),
-    (lambda o: o.press(sensor=5), "sensor: Input should be a valid string, found 5"),
+     "consent: expected a Consent, or its fields by name, found 'yes'"),
+    (lambda o: o.press(sensor=5), "sensor: expected a text, found 5"),
     (lambda o: o.get(None), f"capture id None{NO_ID}"),
     (lambda o: o.get("a", timeout=None), "timeout: expected seconds, found None"),
     (lambda o: o.get_frame("a b"), f"capture id 'a b'{NO_ID}"),
@@ -178,7 +178,7 @@ ASKED = [
     (lambda o: next(o.published(after=-1)),
      "after: expected a sequence number, 0 or more, found -1"),
     (lambda o: next(o.published(last=0)),
-     "last: Input should be greater than or equal to 1, found 0"),
+     "last: expected at least 1, found 0"),
     (lambda o: next(o.published(since=NOW)), f"since: {NOW}{NO_ZONE.format('since')}"),
     (lambda o: next(o.faces(since="2026-01-01")),
      "since: expected datetime with a zone, found str '2026-01-01'"),
@@ -193,9 +193,9 @@ ASKED = [
     (lambda o: o.purge(capture_id="a b"), f"capture id 'a b'{NO_ID}"),
     (lambda o: o.captures(51), "last: expected 1 to 50, found 51"),
     (lambda o: o.retry(None), f"capture id None{NO_ID}"),
-    (lambda o: o.restart_sensor(None), "sensor: Input should be a valid string, found None"),
+    (lambda o: o.restart_sensor(None), "sensor: expected a text, found None"),
     (lambda _: d.Consent(text_version="1", language="en", at=NOW),
-     f"at: Input should have timezone info, found '{NOW}'"),
+     f"at: expected a time with its zone, found '{NOW}'"),
 ]
 
 

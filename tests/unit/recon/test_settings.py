@@ -71,10 +71,10 @@ def test_settings_do_not_change():
 @pytest.mark.parametrize(("given", "name", "message"), [
     ({"preset": "fastest"}, "preset", "'paper', 'faithful' or 'best'"),
     ({"r0": 6}, "r0", "no such field, expected one of preset, r0_factor, "),
-    ({"r0_factor": 1.9}, "r0_factor", "greater than or equal to 2"),
-    ({"r0_factor": 41}, "r0_factor", "less than or equal to 40"),
-    ({"r0_factor": float("nan")}, "r0_factor", "Input should be"),
-    ({"r0_factor": 0.0}, "r0_factor", "greater than or equal to 2"),
+    ({"r0_factor": 1.9}, "r0_factor", "at least 2"),
+    ({"r0_factor": 41}, "r0_factor", "at most 40"),
+    ({"r0_factor": float("nan")}, "r0_factor", "at most 40"),
+    ({"r0_factor": 0.0}, "r0_factor", "at least 2"),
     ({"smoothing": 0}, "smoothing", "0.05"),
     ({"smoothing": float("inf")}, "smoothing", "1000"),
     ({"detail_factor": 0.4}, "detail_factor", "0.5"),
@@ -82,7 +82,7 @@ def test_settings_do_not_change():
     ({"neighbors": "guessed"}, "neighbors", "'randomized', 'exact' or 'lattice'"),
     ({"ratio": 0}, "ratio", "1"),
     ({"ratio": 1000}, "ratio", "100"),
-    ({"ratio": "ten"}, "ratio", "valid number"),
+    ({"ratio": "ten"}, "ratio", "a number"),
 ])
 def test_what_is_wrong_is_named(given, name, message):
     with pytest.raises(ImpossibleSettingsError) as caught:
@@ -99,13 +99,13 @@ def test_a_list_is_no_settings():
 
 
 @pytest.mark.parametrize(("given", "line"), [
-    ({"preset": "fast"}, "preset: Input should be 'paper', 'faithful' or 'best', found 'fast'"),
-    ({"preset": None}, "preset: Input should be 'paper', 'faithful' or 'best', found 'None'"),
+    ({"preset": "fast"}, "preset: expected 'paper', 'faithful' or 'best', found 'fast'"),
+    ({"preset": None}, "preset: expected 'paper', 'faithful' or 'best', found None"),
     ({"smooting": 3}, "smooting: no such field, expected one of preset, r0_factor, smoothing, "
                       "detail_factor, symmetry, shading, neighbors, ratio"),
-    ({"ratio": 1e9}, "ratio: Input should be less than or equal to 100, found '1000000000.0'"),
+    ({"ratio": 1e9}, "ratio: expected at most 100, found 1000000000.0"),
     ({"preset": "paper", "neighbors": [1]},
-     "neighbors: Input should be 'randomized', 'exact' or 'lattice', found '[1]'"),
+     "neighbors: expected 'randomized', 'exact' or 'lattice', found [1]"),
 ])
 def test_a_wrong_change_is_one_line(given, line):
     with pytest.raises(ImpossibleSettingsError) as caught:

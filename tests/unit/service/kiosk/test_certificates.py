@@ -31,7 +31,7 @@ def test_a_good_one_is_taken(folder):
 @pytest.mark.parametrize(("certificate", "key", "words"), [
     ("none.pem", "good.key", r"none\.pem: No such file"),
     ("good.pem", "none.key", r"none\.key: No such file"),
-    (".", "good.key", "directory"),
+    (".", "good.key", "is a folder"),
     ("text.pem", "good.key", r"text\.pem: no certificate in PEM form"),
     ("good.key", "good.key", r"good\.key: no certificate in PEM form"),
     ("good.pem", "text.pem", r"text\.pem: no secret key in PEM form"),
