@@ -18,7 +18,7 @@ _VIEWERS = {
     ".pcd": "CloudCompare and the Point Cloud Library open it",
     ".npz": "load_face() of denseface reads it, and so does numpy.load()",
     ".obj": "MeshLab and Blender open it",
-    ".glb": "Blender and Windows 3D Viewer open it",
+    ".glb": "Blender, MeshLab and Windows 3D Viewer open it",
     ".stl": "MeshLab, Blender and slicers for 3D printing open it",
     ".png": "any browser or image viewer opens it",
     ".json": "",
