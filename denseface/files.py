@@ -58,18 +58,18 @@ def read_bounded(path: str | Path, max_bytes: int) -> bytes:
 
 def write_whole(
     path: Path, chunks: Sequence[bytes | memoryview], *, mode: int | None = None,
-    synced: bool = True,
+    synced: bool = True, folders: bool = True,
 ) -> None:
     """Write a file so that `path` has either its old contents or all of the new.
 
     That all of it was taken is asked of the system: each write, the sync, the size and the closing
-    may say that it was not. Where one does, nothing of the new contents is left. Folders that are
-    missing are made, for those who may read the file.
+    may say that it was not. Where one does, nothing of the new contents is left.
 
     Parameters
     ----------
     mode : of the file, exactly; None for 666 less the umask
     synced : wait until the contents are on the disk; the name may follow later
+    folders : make those that are missing, for those who may read the file
 
     Raises
     ------
@@ -78,7 +78,8 @@ def write_whole(
     """
     temporary = path.with_name(f".{secrets.token_hex(8)}.tmp")
     try:
-        make_folder(path.absolute().parent, mode)
+        if folders:
+            make_folder(path.absolute().parent, mode)
         descriptor = os.open(temporary, _NEW, 0o666 if mode is None else mode)
         try:
             _fill(descriptor, chunks, mode, synced=synced)

@@ -25,14 +25,12 @@ _WRITABLE = 0o022
 
 
 def write_atomically(
-    path: Path, chunks: Sequence[bytes | memoryview], *, sync_name: bool = True,
-    mode: int | None = None,
+    path: Path, chunks: Sequence[bytes | memoryview], *, mode: int | None = None
 ) -> None:
-    """Write a file as `write_whole` does, synced.
+    """Write a file of this program's own as `write_whole` does, and sync its folder.
 
     Parameters
     ----------
-    sync_name : sync the folder too
     mode : of the file, exactly; None for 666 less the umask
 
     Raises
@@ -40,9 +38,8 @@ def write_atomically(
     OSError
         As from the system, and it names `path`. The old contents, or all of the new, are left.
     """
-    write_whole(path, chunks, mode=mode)
-    if sync_name:
-        sync_folder(path.parent)
+    write_whole(path, chunks, mode=mode, folders=False)
+    sync_folder(path.parent)
 
 
 def write_synced(path: Path, chunks: Sequence[bytes | memoryview], *, failpoints: str = "") -> None:
@@ -96,7 +93,7 @@ def check_outside_hub(path: Path) -> None:
     UsageError
         It is.
     """
-    for folder in path.resolve().parents:
+    for folder in Path(os.path.realpath(path)).parents:  # a loop of links ends it, too
         with suppress(OSError):
             if all((folder / name).exists() for name in _OF_A_HUB):
                 raise UsageError(

@@ -123,11 +123,11 @@ def _board(args: argparse.Namespace) -> "Board":
 
 
 def _write(path: Path, data: bytes) -> None:
+    from denseface.files import write_whole
     from denseface.service.errors import StoreError, reason_of
-    from denseface.service.runtime.files import write_atomically
 
     try:
-        write_atomically(path, [data], sync_name=False)
+        write_whole(path, [data])
     except OSError as error:
         raise StoreError(f"{path}: {reason_of(error)}") from error
 
