@@ -31,7 +31,7 @@ def test_a_face_that_cannot_be_saved_is_told_and_the_next_is_saved(tmp_path):
     another = PublishedFace("e", 3, "c", FACE)
     a, b, c = follow([*OUTCOMES, another], folder)
     assert a.lost
-    assert a.line.startswith(f"1 a not saved: {tmp_path / 'a.ply'}: Is a directory; ")
+    assert a.line.startswith(f"1 a not saved: {tmp_path / 'a.ply'}: is a folder, expected a file; ")
     assert "denseface get a --save FILE" in a.line
     assert [b.lost, c.lost] == [False, False]
     assert {path.name for path in tmp_path.iterdir()} == {"a.ply", "c.ply", "c.json"}
