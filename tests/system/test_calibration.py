@@ -10,16 +10,13 @@ import pytest
 
 from bench.calibration_samples import Samples, sample
 from denseface.recon import Preset
-from tests.simulator import Truth
-from tests.system.test_accuracy import BOUNDS, first_frame
-from tests.virtual_sensor.fixtures import FOLDER
+from tests.system.test_accuracy import BOUNDS, take
 
 
 @pytest.fixture(scope="module")
 def shots():
     """The first frame of each recording, and its truth."""
-    return {name: (first_frame(name), Truth.load(FOLDER / f"{name}.truth.npz"))
-            for name in BOUNDS}
+    return {name: (take(name).frame, take(name).truth) for name in BOUNDS}
 
 
 @pytest.fixture(scope="module", params=list(Preset))

@@ -11,13 +11,13 @@ from denseface.capture.npz import save_frame
 from denseface.service.export import load_face
 from tests.simulator import Truth, measure
 from tests.system.running import denseface
-from tests.system.test_accuracy import BOUNDS, FOLDER, first_frame
+from tests.system.test_accuracy import BOUNDS, FOLDER, take
 from tests.unit.capture.image_pair.files import write
 
 
 @pytest.fixture(scope="module")
 def frame() -> RgbdFrame:
-    return first_frame("frontal_700")
+    return take("frontal_700").frame
 
 
 @pytest.fixture(scope="module")
