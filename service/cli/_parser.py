@@ -113,7 +113,9 @@ def _parser() -> _Parser:
             "--debug", action="store_true", help="show a traceback where something goes wrong")
         load(name).add_arguments(command)
     helping = commands.add_parser("help", help="show the help of a command")
-    helping.add_argument("words", nargs="*", metavar="COMMAND")
+    helping.add_argument("words", nargs="*", metavar="COMMAND",
+                         help="the command; of one with commands of its own, such as keys, also "
+                              "that (default: all commands)")
     return parser
 
 

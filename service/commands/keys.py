@@ -14,16 +14,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="new|allow|revoke|list", required=True)
     new = actions.add_parser("new", help="make a pair: NAME.secret and NAME.public", description=(
         "Make a pair of keys. `hub` is the name of the hub's own."))
-    new.add_argument("name", metavar="NAME")
+    new.add_argument("name", metavar="NAME",
+                     help="letters, digits, - and _, at most 64; also of its files")
     allow = actions.add_parser("allow", help="let a public key in", description=(
         "Let a public key in, with one or more roles. A hub that runs takes note at once."))
-    allow.add_argument("name", metavar="NAME")
+    allow.add_argument("name", metavar="NAME", help="what the key is to be called here")
     allow.add_argument("public", metavar="KEY", help="its file NAME.public, or its 40 characters")
     allow.add_argument("roles", metavar="ROLE", nargs="+", choices=_ROLES,
                        help=", ".join(_ROLES))
     revoke = actions.add_parser("revoke", help="let a key in no more", description=(
         "Let a key in no more. A hub that runs cuts off at once whoever uses it."))
-    revoke.add_argument("name", metavar="NAME")
+    revoke.add_argument("name", metavar="NAME", help="as `denseface keys list` shows it")
     listed = actions.add_parser("list", help="say which keys may connect")
     for action in (new, allow, revoke, listed):
         _options.add_keys(action)

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 from denseface.service.commands import _options
@@ -9,6 +10,7 @@ from denseface.service.commands._options.kiosk import add_kiosk, kiosk_settings,
 
 KIOSK_VARIABLE = "DENSEFACE_KIOSK"
 """`off` stands for `--no-kiosk`."""
+_STDERR = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,9 +46,22 @@ def run(args: argparse.Namespace) -> int:
         hub=_options.repeated(args, "data", "keys", "key", "listen", "retention", "metrics",
                               "preset", "set"),
         captures=_captures(args.source or ["openni2:"], args.calibration or [], args.rotate or []),
-        kiosk=_kiosk(args))
-    with ServiceManager(os.environ) as manager:
+        kiosk=(kiosk := _kiosk(args)))
+    with ServiceManager(os.environ) as manager, _welcome(args, settings.address, kiosk):
         return Supervisor(table, max(settings.hang_timeout_s, settings.silence_s), manager).run()
+
+
+def _welcome(
+    args: argparse.Namespace, address: str, kiosk: list[str] | None
+) -> AbstractContextManager[None]:
+    """Say on a terminal when presses can be made, and what to type."""
+    from denseface.service.tools.welcome import next_steps, welcoming
+
+    if not os.isatty(_STDERR) or args.log == "json":
+        return nullcontext()
+    page = None if kiosk is None else kiosk_settings(args)
+    shown = page.url if page and page.address[1] else ""  # a free port is told by the log
+    return welcoming(address, next_steps(address, shown))
 
 
 def _kiosk(args: argparse.Namespace) -> list[str] | None:

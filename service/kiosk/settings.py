@@ -145,6 +145,12 @@ class KioskSettings(BaseModel):
         """Of the page."""
         return "https" if self.certificate else "http"
 
+    @property
+    def url(self) -> str:
+        """Where the page is; its port is 0 where that is any free one."""
+        host, port = self.address
+        return f"{self.scheme}://{f'[{host}]' if ':' in host else host}:{port}"
+
     def tls(self) -> ssl.SSLContext | None:
         """Give what the page is served by; None without a certificate. Raises SettingsError."""
         return _tls(self.certificate, self.key, "certificate")

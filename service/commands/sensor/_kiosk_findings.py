@@ -31,10 +31,9 @@ def look_at_kiosk(environment: Mapping[str, str] = os.environ) -> Iterator[Findi
     except SettingsError as error:
         yield problem(_WHAT, str(error), "correct the variable: `denseface up` refuses it")
         return
-    host, port = settings.address
-    shown = f"[{host}]" if ":" in host else host
-    url = f"{settings.scheme}://{shown}:{port}"
-    asks = _ask(f"{url}/healthz") if is_loopback(settings.address) and port else None
+    url = settings.url
+    asks = (_ask(f"{url}/healthz") if is_loopback(settings.address) and settings.address[1]
+            else None)
     if asks is None:
         yield ok(_WHAT, f"can be served at {url}; none answers there now")
     else:
