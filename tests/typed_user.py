@@ -61,7 +61,7 @@ def lengths(face: Face) -> tuple[int, float, NDArray[np.float32], tuple[str, ...
 
 def press(save: Path) -> str:
     """Press, get, follow."""
-    with Client("tcp://hub:5700", key=save, hub_key=save) as client:
+    with Client("tcp://hub:5700", key=save, hub_key="hub.public") as client:
         name: str = client.press(gate="wait", frames=4)
         save_face(client.get(name, timeout=60), save)
         for outcome in client.published(last=3):

@@ -32,7 +32,8 @@ class BaseClient:
     """The socket for requests, and how subscriptions are opened; see `Client`."""
 
     def __init__(
-        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None,
+        self, address: str | None = None, *, key: str | Path | None = None,
+        hub_key: str | Path | None = None,
         connect_timeout: float | None = None, on_waiting: Callable[[str], None] | None = None,
     ) -> None:
         settings = ServiceSettings.of(os.environ, address=address, key=key, hub_key=hub_key)

@@ -48,7 +48,8 @@ class AsyncClient(BaseClient):
     """
 
     def __init__(
-        self, address: str | None = None, *, key: Path | None = None, hub_key: Path | None = None,
+        self, address: str | None = None, *, key: str | Path | None = None,
+        hub_key: str | Path | None = None,
         connect_timeout: float | None = None, on_waiting: Callable[[str], None] | None = None,
     ) -> None:
         super().__init__(address, key=key, hub_key=hub_key, connect_timeout=connect_timeout,
