@@ -46,7 +46,12 @@ class Credentials:
         if key is None or hub is None:
             missing = "--hub-key FILE, the hub's public one" if key else "--key FILE, your own"
             raise KeyFileError(f"{settings.address}: one key without the other: expected {missing}")
-        return cls(read_pair(key), read_public(hub))
+        pair, public = read_pair(key), read_public(hub)
+        if public in (pair.public, pair.secret):
+            raise KeyFileError(f"--hub-key is the {'public' if public == pair.public else 'secret'}"
+                               f" key of {key}, your own: expected the hub's public one, "
+                               "hub.public of its machine")
+        return cls(pair, public)
 
     def apply(self, socket: Socket) -> None:
         """Set them on a socket before it connects."""

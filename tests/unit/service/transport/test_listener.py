@@ -11,7 +11,7 @@ from denseface.service.errors import AddressError, KeyFileError
 from denseface.service.monitoring import Counters, Rejections
 from denseface.service.protocol.roles import Role
 from denseface.service.runtime.limits import MemoryWatch
-from denseface.service.security import KeyPair, allow, new_pair, read_public, revoke
+from denseface.service.security import KeyPair, allow, new_pair, read_pair, read_public, revoke
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport._descriptor_guard import DescriptorGuard
 from denseface.service.transport.connection import Credentials, connect
@@ -249,8 +249,12 @@ def test_keys_are_for_other_machines(tmp_path):
     for half, missing in (({"key": secret}, "--hub-key"), ({"hub_key": public}, "--key")):
         with pytest.raises(KeyFileError, match=f"expected {missing} FILE"):
             Credentials.of(ServiceSettings(**away, **half))
-    both = Credentials.of(ServiceSettings(**away, key=secret, hub_key=public))
-    assert both.hub == both.pair.public
+    _, hub = new_pair(tmp_path, "hub")
+    both = Credentials.of(ServiceSettings(**away, key=secret, hub_key=hub))
+    assert (both.pair, both.hub) == (read_pair(secret), read_public(hub))
+    for own, which in ((public, "public"), (read_pair(secret).secret, "secret")):
+        with pytest.raises(KeyFileError, match=f"--hub-key is the {which} key of .*a.secret"):
+            Credentials.of(ServiceSettings(**away, key=secret, hub_key=own))
     assert Credentials.of(ServiceSettings(address="ipc:///run/hub", key=secret)) is None
 
 
