@@ -31,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from denseface.service.errors import StoreError
     from denseface.service.export import FaceFiles
     from denseface.service.export.written import describe
     from denseface.service.tools.fetch import fetch_face
@@ -42,7 +43,11 @@ def run(args: argparse.Namespace) -> int:
             gate_timeout=args.gate_timeout, frames=args.frames)
         say(capture_id, flush=True)
         face = fetch_face(client, capture_id, files, args.timeout)
-    files.write(face)
+    try:
+        files.write(face)
+    except StoreError as error:
+        raise StoreError(f"{error}; the hub has the face until its retention ends: denseface get "
+                         f"{capture_id} --save FILE") from error
     _options.warn(face)
     for line in describe(files, face):
         complain(line)  # stdout has the id, and nothing else
