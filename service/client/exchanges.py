@@ -173,7 +173,7 @@ class Exchanges:
                     if time.monotonic() >= until:
                         raise errors.ClientTimeoutError(
                             f"capture {capture_id}: accepted, no face within {timeout:g} s: it is "
-                            "pending, ask again")
+                            "pending (does `denseface status` show a worker?)")
                 case _:
                     outcome = outcome_of(answer)
                     if isinstance(outcome, PublishedFailure):
