@@ -24,7 +24,7 @@ _VIEWERS = {
     ".json": "",
     ".csv": "any spreadsheet opens it",
 }
-"""By a file's ending: with what to look at it."""
+"""By a file's ending, where it is known: with what to look at it."""
 _MESHES = {".obj", ".glb", ".stl"}
 
 
@@ -67,7 +67,7 @@ def _line(path: Path, what: str) -> str:
 
 
 def _viewers(ending: str) -> str:
-    return f"; {viewers}" if (viewers := _VIEWERS[ending]) else ""
+    return f"; {viewers}" if (viewers := _VIEWERS.get(ending)) else ""
 
 
 def _in_words(size: float) -> str:
