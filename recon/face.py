@@ -111,9 +111,9 @@ class DenseCloud(PointCloud):
             f"grid {rows}x{columns} every {self.grid_step_mm:.2f} mm")
 
 
-MAX_STEP = 15.0
+MAX_STEP = 20.0
 """Largest step in depth within a triangle of neighbours of the grid, in grid steps: more is a gap
-between two surfaces. A slope of ten, the steepest bridge that is kept, makes 14 along a diagonal.
+between two surfaces. A slope of 14, the steepest bridge that is kept, makes that along a diagonal.
 """
 STAGES = ("overview", "detection", "registration", "segmentation", "neighbors", "rbf",
           "propagation")

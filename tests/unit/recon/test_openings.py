@@ -33,7 +33,7 @@ def test_holes_are_counted_and_the_longest_is_measured():
     gone = (((row >= 10) & (row < 13) & (column >= 8) & (column < 20))  # 12 x 3 places of 2 mm
             | ((row == 20) & (column == 20)) | ((row == 21) & (column == 21))  # one, by a corner
             | ((row >= 28) & (column == 5)))  # reaches the outline
-    assert openings(without(cloud, gone)) == (2, (24.0, 6.0))
+    assert openings(without(cloud, gone)) == (2, (26.0, 8.0))
 
 
 def test_what_meets_the_outside_at_a_corner_is_open_and_no_hole():
@@ -57,7 +57,6 @@ def test_a_step_within_the_surface_is_a_hole_though_no_point_is_missing():
 @settings(deadline=None, max_examples=40)
 @given(seed=st.integers(0, 999), share=st.floats(0, 0.5))
 def test_the_count_is_that_of_the_triangles(seed, share):
-    """Other points than those of triangles do not count: they are no surface."""
     cloud = small_face(16, 14).dense
     cloud = without(cloud, np.random.default_rng(seed).random(len(cloud)) < share)
     triangles = triangulate(cloud)
@@ -73,5 +72,4 @@ def test_the_count_is_that_of_the_triangles(seed, share):
     _, parts, _ = mesh.cluster_connected_triangles()
     # A part that touches another in a point alone is two to Open3D, and one here.
     assert len(parts) - mesh.euler_poincare_characteristic() >= faults.holes
-    if share < 0.1:
-        assert openings(cloud).holes == faults.holes
+    assert openings(cloud).holes == faults.holes

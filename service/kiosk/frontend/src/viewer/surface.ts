@@ -19,7 +19,7 @@ export interface Surface {
 export const RIM_STEPS = 8;
 /** Largest step in depth between neighbours, in grid steps: more is a gap between two surfaces. The
  * files that the service writes have the same limit. */
-const MAX_STEP = 15;
+const MAX_STEP = 20;
 /** How far behind the middle of the face's depth it turns on, as a part of that depth. */
 const PIVOT_BEHIND = 0.15;
 const UNIT = 32767;
