@@ -12,7 +12,7 @@ from denseface.capture.npz import load_frame, save_frame
 from denseface.capture.rotation import rotate_frame
 from tests.faults import FAULTS, registered_depth
 from tests.simulator import KINECT_DEFAULT, Person, Scene, shared_folder, simulate
-from tests.system.running import RECORDINGS, denseface
+from tests.system.running import RECORDINGS, run_here
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.control import Control, Honesty
 from tests.virtual_sensor.fixtures import FIXTURES
@@ -81,14 +81,14 @@ def test_a_recording_made_with_registration_on_is_put_right_and_said_to_be(tmp_p
     write_clip(tmp_path / "clip", [(registered_depth(frame).depth, frame.color)
                                    for frame in right])
     record_clip(tmp_path / "clip", tmp_path / "on.oni", len(right))
-    done = denseface("reconstruct", tmp_path / "on.oni", "--report", tmp_path / "r.json")
+    done = run_here("reconstruct", tmp_path / "on.oni", "--report", tmp_path / "r.json")
     assert done.returncode == 0
     (line,) = done.stderr.splitlines()
     assert line.startswith("warning: depth is in the colour camera's pixels already")
     report = json.loads((tmp_path / "r.json").read_text())
     assert report["registered"] is True
     assert line.removeprefix("warning: ") in report["warnings"]
-    good = denseface("reconstruct", RECORDINGS / "frontal_700.oni", "--report", tmp_path / "g.json")
+    good = run_here("reconstruct", RECORDINGS / "frontal_700.oni", "--report", tmp_path / "g.json")
     assert (good.returncode, good.stderr) == (0, "")
     spacing = json.loads((tmp_path / "g.json").read_text())["mean_spacing_mm"]
     assert report["mean_spacing_mm"] == pytest.approx(spacing * 575.8 / 525, rel=0.03)
@@ -103,7 +103,7 @@ def test_what_the_user_says_of_registration_is_taken_and_measured(tmp_path, said
     record_clip(tmp_path / "clip", tmp_path / "on.oni", len(right))
     beside = json.loads(right[0].calibration.to_json()) | {"registered": said}
     (tmp_path / "on.calibration.json").write_text(json.dumps(beside))
-    done = denseface("reconstruct", tmp_path / "on.oni", "--report", tmp_path / "r.json")
+    done = run_here("reconstruct", tmp_path / "on.oni", "--report", tmp_path / "r.json")
     assert done.returncode == 0
     assert json.loads((tmp_path / "r.json").read_text())["registered"] is True
     assert len(done.stderr.splitlines()) == (0 if said else 1)
@@ -124,12 +124,12 @@ def test_a_sensor_that_mirrors_without_a_word_is_turned_back(tmp_path):
 def test_a_recording_on_its_side_is_turned(tmp_path):
     upright = frames_of("wall_close")[0]
     save_frame(rotate_frame(upright, 270), tmp_path / "lying.npz")
-    done = denseface("reconstruct", tmp_path / "lying.npz")
+    done = run_here("reconstruct", tmp_path / "lying.npz")
     assert done.returncode == 1
     assert "--rotate 90" in done.stderr
-    done = denseface("reconstruct", tmp_path / "lying.npz", "--rotate", 90)
+    done = run_here("reconstruct", tmp_path / "lying.npz", "--rotate", 90)
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.split("points")[0] == denseface(
+    assert done.stdout.split("points")[0] == run_here(
         "reconstruct", RECORDINGS / "wall_close.oni").stdout.split("points")[0]
 
 
@@ -138,7 +138,7 @@ def test_a_frame_that_fits_in_no_way_is_refused_by_name(tmp_path):
     save_frame(replace(
         frames_of("two_people")[0], color=np.ascontiguousarray(room.color[::-1])),
         tmp_path / "odd.npz")
-    done = denseface("reconstruct", tmp_path / "odd.npz")
+    done = run_here("reconstruct", tmp_path / "odd.npz")
     assert (done.returncode, done.stdout) == (2, "")
     (line,) = done.stderr.splitlines()
     assert "odd.npz: depth and colour do not belong together" in line

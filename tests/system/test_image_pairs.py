@@ -10,7 +10,7 @@ from denseface.capture import RgbdFrame
 from denseface.capture.npz import save_frame
 from denseface.service.export import load_face
 from tests.simulator import Truth, measure
-from tests.system.running import denseface
+from tests.system.running import run_here
 from tests.system.test_accuracy import BOUNDS, FOLDER, take
 from tests.unit.capture.image_pair.files import write
 
@@ -36,7 +36,7 @@ def files(frame, tmp_path_factory):
 @pytest.mark.parametrize(("depth", "color", "more"), [
     ("mm.png", "color.jpg", ["--unit", "mm", "--rounding", "cut"]), ("m.exr", "color.png", [])])
 def test_a_pair_of_files_is_as_good_as_the_recording(tmp_path, frame, files, depth, color, more):
-    done = denseface(
+    done = run_here(
         "reconstruct", "--depth", files / depth, "--color", files / color, "--calibration",
         files / "mine.json", "--registered", "no", *more, "-o", tmp_path / "f.npz", "--report",
         tmp_path / "r.json")
@@ -56,7 +56,7 @@ def test_a_pair_of_files_is_as_good_as_the_recording(tmp_path, frame, files, dep
 
 def test_a_pair_of_which_nothing_is_said_is_measured_and_put_right(tmp_path, files):
     """Both images have one size, but each is as its own camera sees it."""
-    done = denseface("reconstruct", "--depth", files / "mm.png", "--color", files / "color.png",
+    done = run_here("reconstruct", "--depth", files / "mm.png", "--color", files / "color.png",
                      "--report", tmp_path / "r.json")
     assert done.returncode == 0, done.stderr
     report = json.loads((tmp_path / "r.json").read_text())
@@ -85,13 +85,13 @@ def test_registered_depth_of_vga_and_a_colour_of_1280x1024(tmp_path, frame):
     cv2.imwrite(str(tmp_path / "d.png"), registered)
     cv2.imwrite(str(tmp_path / "c.png"), large[..., ::-1])
     (tmp_path / "d.calibration.json").write_text(both.to_json())
-    done = denseface("reconstruct", "--depth", tmp_path / "d.png", "--color", tmp_path / "c.png",
+    done = run_here("reconstruct", "--depth", tmp_path / "d.png", "--color", tmp_path / "c.png",
                      "--registered", "yes", "--unit", "mm", "-o", tmp_path / "f.npz")
     assert (done.returncode, done.stderr) == (0, "")
     small = RgbdFrame(registered, frame.color, 0, 0, both, registered=True)
     save_frame(small, tmp_path / "small.npz")
     (tmp_path / "d.calibration.json").unlink()
-    assert denseface("reconstruct", tmp_path / "small.npz", "-o", tmp_path / "s.npz"
+    assert run_here("reconstruct", tmp_path / "small.npz", "-o", tmp_path / "s.npz"
                      ).returncode == 0
     one, other = (load_face(tmp_path / name).initial for name in ("f.npz", "s.npz"))
     assert len(one) == pytest.approx(len(other), rel=0.02)
@@ -118,10 +118,10 @@ def test_a_folder_of_a_data_set_needs_no_word(tmp_path, frame):
         if name == "color":
             pose[:3, 3] = -np.array(calib.depth_to_color.translation_mm) / 1000
         np.savetxt(tmp_path / f"intrinsic/extrinsic_{name}.txt", pose)
-    done = denseface("reconstruct", tmp_path, "--frame", 2, "--report", tmp_path / "r.json")
+    done = run_here("reconstruct", tmp_path, "--frame", 2, "--report", tmp_path / "r.json")
     assert (done.returncode, done.stderr) == (0, "")
     assert json.loads((tmp_path / "r.json").read_text())["initial_points"] > 13_000
-    done = denseface("reconstruct", tmp_path, "--frame", 3)
+    done = run_here("reconstruct", tmp_path, "--frame", 3)
     assert done.returncode == 2
     assert "has 3 frames (0 to 2), --frame asks for 3" in done.stderr
 
@@ -135,7 +135,7 @@ def test_a_folder_of_a_data_set_needs_no_word(tmp_path, frame):
     (["docs"], "docs: a folder without image pairs; expected depth/"),
 ])
 def test_wrong_input_is_one_line_and_status_2(arguments, message):
-    done = denseface("reconstruct", *arguments)
+    done = run_here("reconstruct", *arguments)
     assert (done.returncode, done.stdout) == (2, "")
     line, = done.stderr.splitlines()
     assert message in line
