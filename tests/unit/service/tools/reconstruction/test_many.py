@@ -123,13 +123,14 @@ def test_a_file_that_cannot_be_written_ends_it(take, tmp_path, capsys):
     status, out, err = run(capsys, take, "--all-frames", "-o", f"{tmp_path}/out/")
     assert status == 1
     assert "0 faces; stopped before the end" in out
-    assert err[-1] == f"denseface reconstruct: {tmp_path}/out/take_0000.ply: Is a directory"
+    assert err[-1] == (f"denseface reconstruct: {tmp_path}/out/take_0000.ply: is a folder, "
+                       "expected a file")
 
 
 def test_where_nothing_can_be_written_no_frame_is_read(take, tmp_path, capsys):
     (tmp_path / "file").touch()
     status, out, (line,) = run(capsys, take, "--all-frames", "-o", f"{tmp_path}/file/out/")
-    assert (status, out) == (1, [])
+    assert (status, out) == (2, [])
     assert line.startswith(f"denseface reconstruct: {tmp_path}/file/out/take.ply: ")
 
 
@@ -159,8 +160,7 @@ def test_nothing_replaces_what_is_read(take, tmp_path, capsys, arguments):
     (["--all-frames", "--frame", "1"], "not allowed with"),
     (["--all-frames", "--frames", "2"], "--frames is given with --all-frames"),
     (["--table", "t.txt"], "t.txt: expected a name that ends in .csv"),
-    (["-o", "", "--all-frames"], "-o : expected a folder"),
-    (["-o", ""], "expected one of .ply"),
+    (["-o", ""], "expected OUT|DIR/, found ''"),
     (["--format", "stl"], "--format stl: expected with a folder"),
     (["--format", "stl", "-o", "face.glb"], "--format stl: expected with a folder"),
     (["--depth", "d.png"], "found both"),

@@ -17,8 +17,8 @@ def test_each_file_is_named_with_what_it_is_and_what_opens_it(take, tmp_path, ca
     size = (tmp_path / "f.glb").stat().st_size
     assert status == 0
     assert out[:2] == ["26 measured points, 102 dense points, 1 ms",
-                       f"{tmp_path}/f.glb: mesh of 102 points, {size / 1000:.1f} kB; Blender and "
-                       "Windows 3D Viewer open it"]
+                       f"{tmp_path}/f.glb: mesh of 102 points, {size / 1000:.1f} kB; Blender, "
+                       "MeshLab and Windows 3D Viewer open it"]
     assert out[2].startswith(f"{tmp_path}/r.json: report, ")
     assert out[3].startswith(f"{tmp_path}/p.png: picture of the face, ")
     assert len(out) == 4
