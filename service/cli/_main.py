@@ -22,6 +22,7 @@ from denseface.service.runtime.terminal import (
     complain_of,
     discard_unless_flushed,
     fill_standard_descriptors,
+    flush_stdout,
     reader_left,
 )
 
@@ -36,15 +37,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     fill_standard_descriptors()
     forbid_core_dumps()
     tell_of_kernels(KernelLines())
-    args = parse(arguments)
+    try:
+        args = parse(arguments)
+    except OSError as error:  # there is no place for the help
+        discard_unless_flushed(sys.stdout)
+        if isinstance(error, BrokenPipeError):
+            return _BROKEN_PIPE
+        complain(f"denseface: {_line(error)}")
+        return _FAILED
     # Once: not by each process that `denseface up` starts.
     if (doubt := untried_python()) and PARENT_VARIABLE not in os.environ:
         complain(f"denseface: {doubt}")
     try:
         with Interruption():
             status: int = load(args.command).run(args)
-            if sys.stdout is not None:
-                sys.stdout.flush()
+            flush_stdout()
     except KeyboardInterrupt:
         return _CTRL_C
     except Exception as error:

@@ -69,6 +69,10 @@ class _Parser(argparse.ArgumentParser):
             self.error(self._unknown(unknown[0]))
         return parsed, []
 
+    def _print_message(self, message: str, file: Any = None) -> None:  # noqa: ARG002
+        # argparse leaves out what cannot be written.
+        say(*message.rstrip("\n").split("\n"), flush=True)
+
     def error(self, message: str) -> NoReturn:
         message = message.removeprefix("argument ").replace(
             "expected one argument", "expected a value; one that begins with - goes after a =")
@@ -126,7 +130,7 @@ class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
         from importlib.metadata import version
 
-        say(version("denseface"))
+        say(version("denseface"), flush=True)
         parser.exit()
 
 

@@ -1,7 +1,6 @@
 """Record a source, so that whatever ends it what was recorded can be played."""
 
 import shutil
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -19,7 +18,7 @@ from denseface.service.errors import StoreError, UsageError, reason_of
 from denseface.service.log.output import exit_now
 from denseface.service.runtime.files import check_outside_hub
 from denseface.service.runtime.signals import StopSignal
-from denseface.service.runtime.terminal import complain, say
+from denseface.service.runtime.terminal import complain, flush_stdout, say
 from denseface.service.runtime.terminal.progress import Progress
 from denseface.service.tools._recording import FrameReader
 
@@ -90,7 +89,7 @@ def run(
     lost = f", {reader.lost} were lost" if reader.lost else ""
     say(f"{out}: {held}{lost}; {end.why}")
     if hangs:
-        sys.stdout.flush()
+        flush_stdout()
         exit_now(end.status)
     return end.status
 

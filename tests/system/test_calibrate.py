@@ -46,12 +46,17 @@ def check_pose(found: Calibration) -> None:
         assert camera.fy == pytest.approx(other.fy, rel=0.002)
 
 
+def complaints(done):
+    """Give what is on stderr, but for a line of progress on a slow machine."""
+    return [line for line in done.stderr.splitlines() if not line.endswith(" ...")]
+
+
 def test_a_checkerboard_gives_both_cameras_and_their_pose(tmp_path, checkerboard):
     done = denseface(
         "calibrate", *checkerboard, *CHECKERBOARD, "-o", tmp_path / "s.calibration.json",
         "--picture", tmp_path / "p.png", "--report", tmp_path / "r.json", "--sensor", "B00362",
         DENSEFACE_CALIBRATIONS=str(tmp_path / "sensors"))
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, complaints(done)) == (0, [])
     text = (tmp_path / "s.calibration.json").read_text()
     check_pose(Calibration.from_json(text))
     assert (tmp_path / "sensors/B00362.calibration.json").read_text() == text
@@ -77,7 +82,7 @@ def test_too_few_views_are_one_line_and_status_1(tmp_path, checkerboard):
     few = ["--infrared", *sorted(infrared.iterdir())[:4], "--color", *sorted(color.iterdir())[:4]]
     done = denseface("calibrate", *few, *CHECKERBOARD, "-o", tmp_path / "s.calibration.json")
     assert (done.returncode, done.stdout) == (1, "")
-    line, = done.stderr.splitlines()
+    line, = complaints(done)
     assert "both cameras see the board in 4 of 4 pairs of images, expected 6 or more" in line
     assert list(tmp_path.iterdir()) == []
 
@@ -85,8 +90,8 @@ def test_too_few_views_are_one_line_and_status_1(tmp_path, checkerboard):
 @pytest.mark.parametrize(("arguments", "message"), [
     ([*CHECKERBOARD], "-o FILE or --sensor SERIAL"),
     ([*CHECKERBOARD, "-o", "x.json"], "x.json: expected a name that ends in .calibration.json"),
-    (["--board", "9", "--square", "25"], "'9': expected columns and rows such as 9x6"),
-    ([*CHECKERBOARD[:2], "--square", "0.025"], "'0.025': expected millimetres, 1 to 500"),
+    (["--board", "9", "--square", "25"], "such as 9x6, 3 to 60 each, found '9'"),
+    ([*CHECKERBOARD[:2], "--square", "0.025"], "expected millimetres, 1 to 500, found '0.025'"),
     ([*CHARUCO[:4], "--marker", "30", "-o", "x.calibration.json"], "expected less than --square"),
     (["--charuco", "20x20", "--square", "28", "-o", "x.calibration.json"],
      "--charuco 20x20 has 200 markers, --dictionary 4X4_50 has 50"),
@@ -94,5 +99,5 @@ def test_too_few_views_are_one_line_and_status_1(tmp_path, checkerboard):
 def test_wrong_usage_is_one_line_and_status_2(arguments, message):
     done = denseface("calibrate", "--infrared", "docs", "--color", "docs", *arguments)
     assert (done.returncode, done.stdout) == (2, "")
-    line, = done.stderr.splitlines()
+    line, = complaints(done)
     assert message in line

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from denseface.service.commands import _options
 from denseface.service.commands._options.values import wanted
 from denseface.service.runtime.terminal import complain, say
+from denseface.service.runtime.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from denseface.service.tools.calibration import Board, Solution
@@ -53,10 +54,11 @@ def run(args: argparse.Namespace) -> int:
     from denseface.service.tools import calibration as tool
 
     outputs, board = _outputs(args), _board(args)
-    views, depth_size, color_size = tool.look_for_board(
-        tool.paired_files(args.infrared, args.color), board,
-        _options.service_settings(args).max_frame_pixels)
-    solution = tool.solve(views, board, depth_size, color_size)
+    pairs = tool.paired_files(args.infrared, args.color)
+    with Progress(f"calibrating by {len(pairs)} pairs of images"):
+        views, depth_size, color_size = tool.look_for_board(
+            pairs, board, _options.service_settings(args).max_frame_pixels)
+        solution = tool.solve(views, board, depth_size, color_size)
     warnings = doubts_of(solution.calibration)
     report = tool.CalibrationReport.of(solution, warnings)
     for path in outputs:

@@ -7,6 +7,7 @@ from denseface.service.runtime.terminal._lines import (
     complain_of,
     discard_unless_flushed,
     fill_standard_descriptors,
+    flush_stdout,
     printable,
     reader_left,
     say,
@@ -14,5 +15,5 @@ from denseface.service.runtime.terminal._lines import (
 
 __all__ = [
     "ask", "can_ask", "complain", "complain_of", "discard_unless_flushed",
-    "fill_standard_descriptors", "printable", "reader_left", "say",
+    "fill_standard_descriptors", "flush_stdout", "printable", "reader_left", "say",
 ]

@@ -7,14 +7,14 @@ sequences: names, reasons and file names may hold any of them.
 import os
 import select
 import sys
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext, suppress
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from types import TracebackType
 from typing import TextIO
 
 __all__ = [
     "ask", "can_ask", "complain", "complain_of", "discard_unless_flushed",
-    "fill_standard_descriptors", "printable", "reader_left", "say", "step_aside_by",
+    "fill_standard_descriptors", "flush_stdout", "printable", "reader_left", "say", "step_aside_by",
 ]
 
 _aside: Callable[[], AbstractContextManager[object]] = nullcontext
@@ -35,10 +35,25 @@ def printable(text: str) -> str:
 
 
 def say(*lines: str, flush: bool = False) -> None:
-    """Print lines on stdout, escaped; raises as `print` does."""
-    with _aside():
+    """Print lines on stdout, escaped; OSError, which names stdout, where that fails."""
+    with _aside(), _named():
         for line in lines:
             print(printable(line), flush=flush)
+
+
+def flush_stdout() -> None:
+    """Write what is still to be written on stdout, where there is one; OSError as of `say`."""
+    if sys.stdout is not None:
+        with _named():
+            sys.stdout.flush()
+
+
+@contextmanager
+def _named() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, "stdout") from error
 
 
 def complain(line: str) -> None:
