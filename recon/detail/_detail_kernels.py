@@ -18,13 +18,14 @@ def with_slopes(heights: Floats, step: float) -> Floats:
     """
     rows, columns = heights.shape
     out = np.empty((3, rows, columns), np.float32)
-    out[0] = heights
     half = np.float32(0.5 / step)
     last = np.uint64(columns - 1)
     for row in range(rows):
         line = heights[row]
         above, below = heights[max(row - 1, 0)], heights[min(row + 1, rows - 1)]
-        along_x, along_y = out[1, row], out[2, row]
+        same, along_x, along_y = out[0, row], out[1, row], out[2, row]
+        for j in range(np.uint64(columns)):  # `out[0] = heights` takes a second to compile
+            same[j] = line[j]
         for j in range(np.uint64(columns)):
             along_y[j] = half * (below[j] - above[j])
         for j in range(_1, last):

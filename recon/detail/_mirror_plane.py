@@ -61,7 +61,7 @@ def find_plane(field: kernels.HeightField) -> MirrorPlane | None:
     middle = points.mean(axis=0)
     points -= middle
     centered = field._replace(origin=field.origin - middle)
-    some = points[::round((_SPARSE_MM / _DENSE_MM) ** 2)]
+    some = np.ascontiguousarray(points[::round((_SPARSE_MM / _DENSE_MM) ** 2)])
     start = _coarse_plane(centered, some)
     if start is None:
         return None

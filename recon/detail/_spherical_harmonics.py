@@ -72,7 +72,8 @@ def fit_lighting(basis: Doubles, samples: Doubles) -> tuple[Floats, float]:
         weights[i] = 1.0 if samples[i] > _DARK * median else 0.0
     for fit in range(1 + _REFITS):
         if fit > 0:
-            weights[:] = samples
+            for i in range(len(samples)):  # `weights[:] = samples` takes a second to compile
+                weights[i] = samples[i]
             for j in range(_TERMS):
                 term, part = basis[j], lighting[j]
                 for i in range(len(samples)):

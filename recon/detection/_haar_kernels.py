@@ -100,7 +100,7 @@ def passing_windows(
                 skipped = False
             elif scale[k] > 0:
                 if rejected_by[k] == len(trees.stage_thresholds):
-                    found[count] = k * grid.step, y
+                    found[count, 0], found[count, 1] = k * grid.step, y
                     count += 1
                 # As OpenCV does: the window after one that the first stage rejects is skipped.
                 skipped = rejected_by[k] == 0
