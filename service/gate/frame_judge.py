@@ -5,6 +5,7 @@ from collections.abc import Callable
 import structlog
 
 from denseface.capture.frame import RgbdFrame
+from denseface.recon.numerics.compilation.progress import compiling
 from denseface.recon.pipeline import ends_the_same
 from denseface.recon.quality import Quality, measure
 from denseface.service.gate.hinting import Hinting, Judged
@@ -39,7 +40,8 @@ class FrameJudge:
         if self._last is not None and self._last[0] is frame:
             return self._last[1]
         try:
-            self._quality = measure(frame, self._quality, at_us)
+            with compiling.session():  # the first frame may have to wait for kernels: that is said
+                self._quality = measure(frame, self._quality, at_us)
         except Exception as error:
             if not ends_the_same(error):
                 raise
