@@ -98,6 +98,9 @@ def _read_members(
     optional: Collection[str], others: Mapping[str, str],
 ) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {}
+    places = [member.header_offset for member in archive.infolist()]
+    if len(set(places)) < len(places):  # some versions of `zipfile` would warn, others raise
+        raise UnreadableSourceError(f"{path}: entries of it lie over each other")
     for member in archive.infolist():
         name = member.filename
         key = name.removesuffix(".npy")
