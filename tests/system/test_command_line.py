@@ -28,7 +28,7 @@ def test_a_recording_becomes_a_face_a_report_and_a_picture(tmp_path):
     face = load_face(tmp_path / "face.npz")
     assert (report["settings"]["preset"], report["settings"]["ratio"]) == ("faithful", 9)
     assert report["initial_points"] == len(face.initial)
-    assert f"{len(face.dense)} dense points" in done.stdout
+    assert f"{len(face.dense):,} dense points" in done.stdout
     assert (tmp_path / "face.png").stat().st_size > 50_000
 
 

@@ -69,6 +69,6 @@ def reconstruct_one(taken: Taken, settings: Settings, outputs: Outputs) -> tuple
     files.write(face)
     report = face.report
     return face, [
-        f"{report.initial_points} measured points, {report.dense_points} dense points, "
+        f"{report.initial_points:,} measured points, {report.dense_points:,} dense points, "
         f"{report.timings_ms['total']:.0f} ms",
         *(describe(files, face) or [NOTHING_WRITTEN])]
