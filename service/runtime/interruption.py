@@ -141,7 +141,8 @@ def _again(*_: object) -> None:
 
 
 def _unraisable(lost: "sys.UnraisableHookArgs") -> None:
-    if _received and isinstance(lost.exc_value, KeyboardInterrupt | SystemExit):
-        _try_again()
-    else:
+    if not _received:
         sys.__unraisablehook__(lost)
+    elif isinstance(lost.exc_value, KeyboardInterrupt | SystemExit):
+        _try_again()
+    # Else it comes of the signal: what was half made cannot be unmade.

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 
 import pytest
 
@@ -100,6 +101,22 @@ def test_what_a_finaliser_raises_otherwise_is_told(monkeypatch):
         del one
         gc.collect()
     assert [type(one.exc_value) for one in told] == [ValueError]
+
+
+def test_what_a_half_made_thing_raises_after_a_signal_is_not_told(capfd):
+    class HalfMade:
+        def __init__(self):
+            signal.raise_signal(signal.SIGINT)
+            self.made = True
+
+        def __del__(self):
+            assert self.made
+
+    with Interruption():
+        with suppress(KeyboardInterrupt):
+            HalfMade()
+        gc.collect()
+    assert capfd.readouterr() == ("", "")
 
 
 def test_another_handler_that_came_meanwhile_gets_the_signal(module):
