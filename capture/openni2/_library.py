@@ -130,6 +130,10 @@ class _Leaving:
             os._exit(1)
 
     def _close_all(self) -> None:
+        # At the first call of a thread, OpenNI2 asks whether those that called before still live
+        # (pthread_kill), and crashes where the memory of one is gone: seen at the end, on Python
+        # 3.13. So this thread makes its first call while they all do.
+        c_api.oniGetExtendedError()
         self._due.wait()
         try:
             for source in [*watched_sensors, *open_sources]:
