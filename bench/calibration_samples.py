@@ -119,7 +119,7 @@ def sample(frame: RgbdFrame, truth: Truth, preset: Preset, *, distance: bool) ->
                   else np.full(len(points), np.nan)),
         sigma=dense.sigma[chosen].astype(np.float64),
         z=points[:, 2].astype(np.float64),
-        components=recorded[0].at(points),
+        components=recorded[-1].at(points),  # any before are the warm-up's
         hole=case.hole[chosen],
         rim=_rim(case.face)[chosen],
         everywhere=everywhere[chosen],

@@ -8,7 +8,7 @@ from denseface.service.export.files import FaceFiles
 if TYPE_CHECKING:
     from denseface.recon.face import Face
 
-__all__ = ["NOTHING_WRITTEN", "WrittenFiles", "describe"]
+__all__ = ["NOTHING_WRITTEN", "WrittenFiles", "describe", "describe_file"]
 
 NOTHING_WRITTEN = ("nothing was written: -o writes the face, --preview a picture of it, --report "
                    "the report")
@@ -34,11 +34,11 @@ def describe(files: FaceFiles, face: "Face") -> list[str]:
     if files.output:
         points = f"{len(face.dense):,} points"
         what = f"mesh of {points}" if files.output.suffix.lower() in _MESHES else points
-        lines.append(_line(files.output, what))
+        lines.append(describe_file(files.output, what))
     if files.report:
-        lines.append(_line(files.report, "report"))
+        lines.append(describe_file(files.report, "report"))
     if files.rendering:
-        lines.append(_line(files.rendering, "picture of the face"))
+        lines.append(describe_file(files.rendering, "picture of the face"))
     return lines
 
 
@@ -61,7 +61,8 @@ class WrittenFiles:
                 for (folder, ending), (count, size) in self._kinds.items()]
 
 
-def _line(path: Path, what: str) -> str:
+def describe_file(path: Path, what: str) -> str:
+    """Say of a file that was written what it is, its size, and what opens it."""
     ending = path.suffix.lower()
     return f"{path}: {what}, {_in_words(path.stat().st_size)}{_viewers(ending)}"
 

@@ -44,12 +44,17 @@ def load_consent_text(path: Path, languages: tuple[str, ...]) -> ConsentText:
         One line that names the file and what is wrong with it.
     """
     try:
-        found = ConsentText.model_validate(json.loads(read_bounded(path, _MAX_BYTES)))
+        given = json.loads(read_bounded(path, _MAX_BYTES))
+    except (OSError, ValueError) as error:
+        raise SettingsError(f"--kiosk-consent-text: {path}: {reason_of(error)}") from error
+    if not isinstance(given, dict):
+        raise SettingsError(
+            f"--kiosk-consent-text: {path}: expected an object with version and text")
+    try:
+        found = ConsentText.model_validate(given)
     except ValidationError as error:
         field, message = first_error(error)
         raise SettingsError(f"--kiosk-consent-text: {path}: {field}: {message}") from error
-    except (OSError, ValueError) as error:
-        raise SettingsError(f"--kiosk-consent-text: {path}: {reason_of(error)}") from error
     if missing := [language for language in languages if language not in found.text]:
         raise SettingsError(f"--kiosk-consent-text: {path}: text: has no words in {missing[0]}, "
                             "which --kiosk-languages offers")

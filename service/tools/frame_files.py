@@ -9,6 +9,7 @@ from denseface.files import write_whole
 from denseface.service.errors import StoreError, UsageError, reason_of
 from denseface.service.export import check_outputs
 from denseface.service.export.photo import to_photo
+from denseface.service.export.written import describe_file
 
 __all__ = ["FrameFiles"]
 
@@ -70,5 +71,5 @@ class FrameFiles:
                          f"{self.frame}` makes a face of it, load_frame() reads it")
         if self.photo:
             height, width, _ = frame.rgb.shape
-            lines.append(f"{self.photo}: photo of {width}x{height}")
+            lines.append(describe_file(self.photo, f"photo of {width}x{height}"))
         return lines

@@ -39,7 +39,7 @@ def run(
         warm_ms = (time.perf_counter() - begun) * 1e3
         statistics = LiveStatistics()
         try:
-            with Progress(f"reconstructing {uri}, Ctrl-C ends it") as line:
+            with Progress(f"Ctrl-C ends it; reconstructing {uri}") as line:
                 for done in reconstruct_frames(source, settings):
                     statistics.add(done)
                     line.show(partial(status, done, statistics))

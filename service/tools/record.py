@@ -119,7 +119,7 @@ class _Limits:
 
 def _record(reader: FrameReader, writer: _Writer, stop: StopSignal, limits: _Limits) -> _End:
     notes: set[str] = set()
-    with Progress(f"recording {writer.path}, Ctrl-C ends it") as line:
+    with Progress(f"Ctrl-C ends it; recording {writer.path}") as line:
         while not stop:
             try:
                 frame = reader.next()

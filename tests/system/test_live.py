@@ -65,10 +65,13 @@ def test_a_signal_ends_it_with_the_summary(number, status):
         cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=theirs)
     os.close(theirs)
     shown = b""
-    while b"points in" not in shown:  # the status line: it is under way
-        shown += os.read(ours, 4096)
-    running.send_signal(number)
-    out, _ = running.communicate(timeout=LIMIT_S)
+    try:
+        while b"points in" not in shown:  # the status line: it is under way
+            shown += os.read(ours, 4096)
+        running.send_signal(number)
+        out, _ = running.communicate(timeout=LIMIT_S)
+    finally:
+        running.kill()
     os.close(ours)
     assert running.returncode == status
     assert json.loads(out)["frames"] >= 1

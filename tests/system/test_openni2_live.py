@@ -78,7 +78,7 @@ def test_an_argument_wins_over_what_the_sensor_says(clip, tmp_path):
             "    frame = next(iter(source))\n"
             "    print(frame.calibration.color.fx, frame.calibration_origin, source.frame_count)")
     done = run_python(code, path, env=environment(clip))
-    assert done.stdout == f"500.0 argument {path} None\n"
+    assert done.stdout == f"500.0 argument {path.name} None\n"
 
 
 def failing(uri: str, env: dict[str, str], code: str = "") -> tuple[str, str]:

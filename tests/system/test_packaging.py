@@ -3,6 +3,7 @@
 import importlib.metadata
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -110,7 +111,7 @@ def test_the_wheel_holds_the_package_alone_and_all_of_it(wheel):
     sources = {str(path.relative_to(REPOSITORY)) for part in ("capture", "recon", "service")
                for path in (REPOSITORY / part).glob("**/*.py")}
     assert {name.removeprefix("denseface/") for name in names if name.endswith(".py")} == (
-        sources | {"__init__.py", "__main__.py", "files.py"})
+        sources | {path.name for path in (REPOSITORY / "denseface").glob("*.py")})
 
 
 class Installed:
@@ -148,15 +149,14 @@ class Installed:
                 folder = self.packages / "denseface" / index.parent.relative_to(REPOSITORY)
                 folder.mkdir(exist_ok=True)
                 shutil.copy(index, folder)
-                # A kernel is of a source of that time and size.
-                times = source.stat()
-                os.utime(folder.parent / source.name, ns=(times.st_atime_ns, times.st_mtime_ns))
 
-    def run(self, *command: object) -> str:
+    def run(self, *command: object, said: str = "") -> str:
+        """Give stdout; `said` is a pattern of stderr."""
         done = subprocess.run(
             list(map(str, command)), cwd=self.user, env=self.environment, check=False,
             capture_output=True, text=True, timeout=_COMPILING_S)
-        assert (done.returncode, done.stderr) == (0, "")
+        assert done.returncode == 0, done.stderr
+        assert re.fullmatch(said, done.stderr)
         return done.stdout
 
 
@@ -177,7 +177,9 @@ def test_its_python_face_makes_a_face_and_kernels_are_kept_beside_it(installed):
             "with denseface.open_source(sys.argv[1]) as source:\n"
             "    face = denseface.reconstruct(next(iter(source)))\n"
             "print(json.dumps([denseface.__file__, len(face.dense)]))")
-    file, points = json.loads(installed.run(installed.python, "-c", code, _RECORDING))
+    file, points = json.loads(installed.run(
+        installed.python, "-c", code, _RECORDING,
+        said=r"compiling kernels, once on this machine: \d+ of \d+\nkernels ready after \d+ s\n"))
     assert Path(file).parent == installed.packages / "denseface"
     assert points > 1000
     assert list(installed.packages.glob("denseface/recon/surface/__pycache__/_trend.*.nbi"))
@@ -193,10 +195,10 @@ def test_the_service_runs_and_its_processes_bear_its_name(installed, tmp_path):
         family = [up]
         try:
             installed.run(installed.command, "status", "--address", address, "--wait",
-                          _COMPILING_S)
+                          _COMPILING_S, said="(denseface status: waiting for the hub at .*\n)?")
             family += up.children(recursive=True)
             installed.run(installed.command, "press", "--address", address, "--save",
-                          tmp_path / "face.ply")
+                          tmp_path / "face.ply", said=r".*face\.ply: [\d,]+ points, .*\n")
             assert all("denseface" in " ".join(one.cmdline()[1:]) for one in family)
             assert {"hub", "capture", "worker"} <= {
                 argument for one in family for argument in one.cmdline()}

@@ -26,6 +26,8 @@ _REFRESH_S = 0.2
 """Time between two writings of the line that moves, seconds."""
 _COLUMNS = 80
 """Of a terminal that does not know its own."""
+_LEAST_WHAT = 16
+"""Columns that are left to what is done, however much is told of it."""
 _WIDE = "WF"
 """East Asian widths that take two columns (Unicode Standard Annex 11)."""
 
@@ -98,12 +100,15 @@ class Progress:
 
     def text(self) -> str:
         """Give the line, as it moves."""
+        return f"{self._what}: {self._told()}"
+
+    def _told(self) -> str:
         elapsed_s = self._clock() - self._begun_s
         done, now = self._done, self._now
         parts = [] if done is None else self._parts(done, elapsed_s)
         if now is not None:
             parts.append(now())
-        return f"{self._what}: {', '.join(parts or [duration(elapsed_s)])}"
+        return ", ".join(parts or [duration(elapsed_s)])
 
     def _parts(self, done: int, elapsed_s: float) -> list[str]:
         unit = f" {self._unit}" if self._unit else ""
@@ -139,7 +144,13 @@ class Progress:
         return f"{self._what}{':' if total else ''}{total}{now} ..."
 
     def _draw(self) -> None:
-        line, width = _fit(printable(self.text()), _columns(self._stream) - 1)
+        columns = _columns(self._stream) - 1
+        what, told = printable(self._what), printable(f": {self._told()}")
+        # What moves is what is looked for: rather than its end, that of the beginning is cut.
+        room = max(columns - _width(told), _LEAST_WHAT)
+        if _width(what) > room:
+            what = f"{_fit(what, room - 3)[0]}..."
+        line, width = _fit(what + told, columns)
         self._write(f"\r{line}{' ' * (self._width - width)}")
         self._width = width
 
@@ -199,6 +210,10 @@ def _columns(stream: TextIO) -> int:
         return os.get_terminal_size(stream.fileno()).columns or _COLUMNS
     except (OSError, ValueError):
         return _COLUMNS
+
+
+def _width(text: str) -> int:
+    return _fit(text, 2 * len(text))[1]
 
 
 def _fit(text: str, columns: int) -> tuple[str, int]:

@@ -38,7 +38,9 @@ def test_frame_and_photo_are_written_where_there_is_no_face(hub, tmp_path, capfd
     assert main(both) == 0
     assert main([*both, "--save", str(tmp_path / "a.ply")]) == 1
     written = [f"{frame}: frame of 8x6; `denseface reconstruct {frame}` makes a face of it, "
-               "load_frame() reads it", f"{photo}: photo of 10x7"]
+               "load_frame() reads it",
+               f"{photo}: photo of 10x7, {photo.stat().st_size} bytes; any browser or image viewer "
+               "opens it"]
     out, said = capfd.readouterr()
     assert out == "a\n"
     assert said.splitlines() == [

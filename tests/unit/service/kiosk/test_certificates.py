@@ -17,7 +17,7 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tls")
     make_certificate(folder, "good")
     make_certificate(folder, "other")
-    make_certificate(folder, "old", days=-1)
+    make_certificate(folder, "old", days=0)
     subprocess.run(["openssl", "ec", "-in", folder / "good.key", "-aes128", "-passout", "pass:abcd",
                     "-out", folder / "locked.key"], check=True, capture_output=True)
     (folder / "text.pem").write_text("no certificate\n")

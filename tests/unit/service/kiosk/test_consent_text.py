@@ -23,7 +23,7 @@ def test_its_words_are_shown_and_its_version_is_stored(tmp_path):
 
 @pytest.mark.parametrize(("text", "message"), [
     ("{", "Expecting property name"),
-    ("[]", "valid dictionary"),
+    ("[]", "json: expected an object with version and text$"),
     (json.dumps(WORDS | {"more": 1}), "more: Extra inputs"),
     (json.dumps(WORDS | {"version": ""}), "version: "),
     (json.dumps(WORDS | {"text": {"en": []}}), "text.en: "),

@@ -139,6 +139,13 @@ def test_a_line_is_no_wider_than_the_terminal_and_does_nothing_to_it(terminal):
     assert terminal.screen() == [""]
 
 
+def test_of_a_long_line_what_moves_is_seen(terminal):
+    with Progress("reconstructing " + "a/" * 50 + "take.oni", total=9, unit="frames"):
+        until(lambda: "reconstructing a" in terminal.getvalue())
+        assert terminal.screen()[-1].rstrip().endswith("...: 0 of 9 frames (0 %)")
+    assert terminal.screen() == [""]
+
+
 @pytest.mark.parametrize("term", ["dumb", "", None])
 def test_a_terminal_that_cannot_write_over_gets_one_plain_line(terminal, monkeypatch, term):
     if term is None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 
 def make_certificate(folder: Path, name: str, days: int = 2, host: str = "127.0.0.1") -> None:
-    """Make NAME.pem and NAME.key, signed by itself; with negative days it has expired."""
+    """Make NAME.pem and NAME.key, signed by itself; with no days it has expired."""
     request = folder / f"{name}.csr"
     run = {"check": True, "capture_output": True}
     subprocess.run([
