@@ -24,6 +24,10 @@ def _split(given: object) -> object:
     return tuple(filter(None, given.split(","))) if isinstance(given, str) else given
 
 
+def _as_text(given: object) -> object:
+    return os.fspath(given) if isinstance(given, Path) else given
+
+
 def runtime_folder() -> Path:
     """Give this user's socket folder: `$XDG_RUNTIME_DIR/denseface`, else a temporary one.
 
@@ -62,8 +66,9 @@ class ServiceSettings(BaseModel):
     """Folder of the keys and of the hub's allow-list."""
     key: Path | None = None
     """File of this process's own secret key."""
-    hub_key: Path | None = None
-    """File of the hub's public key."""
+    # A text: a path would be another key where that has `//`, or ends in `/`.
+    hub_key: Annotated[str | None, BeforeValidator(_as_text)] = None
+    """The hub's public key: its file, or its 40 characters."""
     memory_mb: Annotated[int, Field(ge=64, le=2**20)] = 2048
     """Memory of the hub, MiB, beyond which it disconnects all other machines."""
     data: Path = Field(default_factory=lambda: platformdirs.user_data_path("denseface"))

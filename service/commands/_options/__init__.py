@@ -43,8 +43,9 @@ def add_client(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--key", type=Path, metavar="FILE",
                         help="one's own secret key, for a hub on another machine "
                              "(default: DENSEFACE_KEY)")
-    parser.add_argument("--hub-key", type=Path, metavar="FILE",
-                        help="the public key of that hub (default: DENSEFACE_HUB_KEY)")
+    parser.add_argument("--hub-key", metavar="FILE",
+                        help="the public key of that hub, or its 40 characters (default: "
+                             "DENSEFACE_HUB_KEY)")
 
 
 def add_hub(parser: argparse.ArgumentParser) -> None:

@@ -2,6 +2,7 @@
 
 import io
 import os
+import pty
 import signal
 import subprocess
 import sys
@@ -182,6 +183,21 @@ def test_ctrl_c_is_status_130(room, monkeypatch, capfd):
 
     monkeypatch.setattr("denseface.service.tools.reconstruction.single.reconstruct", interrupted)
     assert outcome(capfd, "reconstruct", room) == (130, "")
+
+
+@pytest.mark.parametrize(("typed", "status"), [(b"\x04", 1), (b"\n", 1), (b"n\n", 1), (b"y\n", 2)])
+def test_a_question_at_a_terminal_is_answered_by_yes_alone(monkeypatch, capfd, typed, status):
+    ours, theirs = pty.openpty()
+    with os.fdopen(theirs) as terminal:
+        monkeypatch.setattr(sys, "stdin", terminal)
+        os.write(ours, typed)  # Ctrl-D first
+        purge = ["purge", "--all", "--address", "ipc:///dev/null/no-hub"]
+        assert main(purge) == status
+    os.close(ours)
+    out, said = capfd.readouterr()
+    assert said.startswith("Remove all captures, with frame, face and report? [y/N] ")
+    assert out == ("nothing removed\n" if status == 1 else "")
+    assert "EOFError" not in said
 
 
 def test_help_imports_nothing_heavy():

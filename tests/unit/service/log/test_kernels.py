@@ -44,7 +44,7 @@ def test_a_terminal_has_one_line_that_moves(report, monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     tell_of_kernels(KernelLines())
     report(FIRST, SOME)
-    until(lambda: "compiling, once on this machine: 12 of 63 kernels" in sys.stderr.getvalue())
+    until(lambda: ": 12 of 63 kernels (19 %)" in sys.stderr.getvalue())
     report(LAST, END)
     assert sys.stderr.getvalue().endswith("kernels ready after 74 s\n")
 

@@ -256,6 +256,8 @@ def test_keys_are_for_other_machines(tmp_path):
         with pytest.raises(KeyFileError, match=f"--hub-key is the {which} key of .*a.secret"):
             Credentials.of(ServiceSettings(**away, key=secret, hub_key=own))
     assert Credentials.of(ServiceSettings(address="ipc:///run/hub", key=secret)) is None
+    pasted = "a//bcdefghijabcdefghijabcdefghijabcdefg/"  # no path: that would lose a slash
+    assert Credentials.of(ServiceSettings(**away, key=secret, hub_key=pasted)).hub == pasted
 
 
 @pytest.mark.parametrize("address", ["ipc:///run/x", "tcp://host", "tcp://0.0.0.0:70000"])
