@@ -151,7 +151,8 @@ ENDS: dict[str, tuple[Callable, int, str]] = {
 
 def without_progress(complaint, out):
     """The lines that are not about how far it is, of which there is one where it takes long."""
-    return [line for line in complaint.splitlines() if not line.startswith(f"Ctrl-C ends it; recording {out}: ")]
+    progress = f"Ctrl-C ends it; recording {out}: "
+    return [line for line in complaint.splitlines() if not line.startswith(progress)]
 
 
 @pytest.mark.parametrize("how", ENDS)
