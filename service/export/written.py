@@ -46,19 +46,20 @@ class WrittenFiles:
     """What was written of many faces, by folder and kind."""
 
     def __init__(self) -> None:
-        self._kinds: dict[tuple[Path, str], tuple[int, int]] = {}
+        self._kinds: dict[tuple[Path, str], tuple[int, int, Path]] = {}
 
     def add(self, *paths: Path | None) -> None:
         """Count files that were written; None is none."""
         for path in filter(None, paths):
             kind = path.parent, path.suffix.lower()
-            count, size = self._kinds.get(kind, (0, 0))
-            self._kinds[kind] = count + 1, size + path.stat().st_size
+            count, size, _ = self._kinds.get(kind, (0, 0, path))
+            self._kinds[kind] = count + 1, size + path.stat().st_size, path
 
     def lines(self) -> list[str]:
         """Say what there is, a line for each kind."""
-        return [f"{folder}/: {count} {ending}, {_in_words(size)}{_viewers(ending)}"
-                for (folder, ending), (count, size) in self._kinds.items()]
+        return [f"{path}: {_in_words(size)}{_viewers(ending)}" if count == 1 else
+                f"{folder}/: {count} {ending}, {_in_words(size)}{_viewers(ending)}"
+                for (folder, ending), (count, size, path) in self._kinds.items()]
 
 
 def describe_file(path: Path, what: str) -> str:

@@ -31,5 +31,5 @@ def test_sizes_are_told_in_words(tmp_path, size, words):
         file.truncate(size)
     written = WrittenFiles()
     written.add(path, None)
-    assert written.lines() == [f"{tmp_path}/: 1 .ply, {words}; MeshLab, CloudCompare and Blender "
+    assert written.lines() == [f"{tmp_path}/f.ply: {words}; MeshLab, CloudCompare and Blender "
                                "open it"]

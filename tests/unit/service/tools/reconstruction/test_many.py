@@ -56,7 +56,7 @@ def test_the_table_is_a_file_too_of_one_input_as_well(take, tmp_path, capsys):
     (take / "000002.npz").write_bytes(b"cut")
     table = tmp_path / "faces.csv"
     status, out, _ = run(capsys, take, "--all-frames", "--table", table)
-    assert (status, out[-1].partition(", ")[0]) == (2, f"{tmp_path}/: 1 .csv")
+    assert (status, out[-1].partition(": ")[0]) == (2, f"{tmp_path}/faces.csv")
     with table.open(newline="") as file:
         first, second, third = csv.DictReader(file)
     assert first == {"name": "take_0000", "source": str(take), "frame": "0", "measured": "26",
