@@ -1,6 +1,7 @@
 """The command line and the whole service as real processes."""
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -24,11 +25,18 @@ PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_LIVENESS": f"{min(15 * PATIEN
 3 s, since a busy machine stops one for longer than three of these heartbeats."""
 
 
+_SLOW = re.compile(
+    r"^(Ctrl-C ends it; |calibrating by |removing |looking at |reconstructing: ).* \.\.\.\n", re.M)
+"""What a command says where it takes long, as all may on a busy machine."""
+
+
 def denseface(*arguments: object, **environment: str) -> "subprocess.CompletedProcess[str]":
-    """Run one command to its end."""
-    return subprocess.run(
+    """Run one command to its end; its stderr is without what is said of a slow machine."""
+    done = subprocess.run(
         [sys.executable, "-m", "denseface", *map(str, arguments)], cwd=REPOSITORY, check=False,
         capture_output=True, text=True, timeout=1.5 * LIMIT_S, env=os.environ | environment)
+    done.stderr = _SLOW.sub("", done.stderr)
+    return done
 
 
 def run_here(*arguments: object) -> "subprocess.CompletedProcess[str]":
