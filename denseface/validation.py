@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-__all__ = ["complaint"]
+__all__ = ["CAPTURE_ID", "PEER_NAME", "TEXT_OF_PATTERN", "complaint"]
 
 _SHOWN = 60
 """Characters of a wrong value that are shown."""
@@ -37,9 +37,13 @@ _EXPECTED = {
     "enum": "{expected}",
 }
 """Kind of error -> what was expected, with the error's own context."""
-_PATTERNS = {
-    "^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$": "letters, digits, - and _, at most 64",
-    "^[!-~]{1,100}$": "1 to 100 ASCII characters without spaces",
+CAPTURE_ID = "^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
+"""Pattern of a capture's id."""
+PEER_NAME = "^[!-~]{1,100}$"
+"""Pattern of the name of a sensor or worker."""
+TEXT_OF_PATTERN = {
+    CAPTURE_ID: "letters, digits, - and _, at most 64",
+    PEER_NAME: "1 to 100 ASCII characters without spaces",
     "^[a-z]{2,3}(-[A-Za-z0-9]{2,8})?$": "names such as de or pt-BR",
 }
 """Pattern of a text -> the same for people."""
@@ -59,7 +63,7 @@ def complaint(error: "ErrorDetails", *, found: bool = False) -> str:
         said = str(context["error"])
     elif kind == "string_pattern_mismatch":
         pattern = context["pattern"]
-        said = f"expected {_PATTERNS.get(pattern, f'a text that matches {pattern}')}"
+        said = f"expected {TEXT_OF_PATTERN.get(pattern, f'a text that matches {pattern}')}"
     else:
         said = error["msg"]
     if not found or ", found " in said:

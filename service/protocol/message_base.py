@@ -7,13 +7,14 @@ from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, FailF
 
 from denseface.recon.face import Consent
 from denseface.service.protocol.payload import Payload
+from denseface.validation import CAPTURE_ID, PEER_NAME
 
-CaptureId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
+CaptureId = Annotated[str, Field(pattern=CAPTURE_ID)]
 """Chosen by whoever pressed; also part of file names, hence no dots and no slashes."""
 
 Name = Annotated[str, Field(max_length=200)]
 """Of an error, a sensor or a stage; also a time where it is only shown."""
-PeerName = Annotated[str, Field(pattern=r"^[!-~]{1,100}$")]
+PeerName = Annotated[str, Field(pattern=PEER_NAME)]
 """Of a sensor or worker: a machine's name and a process's number."""
 Names = Annotated[tuple[Name, ...], FailFast()]
 """Validation stops at the first error: each of 100,000 would cost a thousand bytes of memory."""

@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable
 from datetime import datetime
 
+from denseface.validation import PEER_NAME, TEXT_OF_PATTERN
+
 __all__ = ["burst", "count", "file_mode", "seconds", "sensor_name", "timestamp", "wanted", "whole"]
 
 _MOST = 10**12
@@ -59,8 +61,8 @@ def burst(text: str) -> int:
 
 def sensor_name(text: str) -> str:
     """Read the name of a sensor, as a hub takes it."""
-    if not re.fullmatch("[!-~]{1,100}", text):
-        raise wanted("1 to 100 ASCII characters without spaces", text)
+    if not re.fullmatch(PEER_NAME, text):
+        raise wanted(TEXT_OF_PATTERN[PEER_NAME], text)
     return text
 
 
