@@ -59,6 +59,9 @@ _NEARER_MM = 10.0
 _BODY_MM = 100.0
 """What is below the face and nearer by no more than this is its own body, and is not."""
 
+_FLAT, _REJECTED = "flat", "no face by its shape"
+"""Verdicts."""
+
 _REFINED_STEP, _REFINED_NEIGHBORS = 1.08, 2
 """A box's width is that of a few coarse steps, so it is sought again at full resolution."""
 _REFINED_MM = (120.0, 205.0)
@@ -71,6 +74,9 @@ _CENTER = 0.5
 """Of a box, each way: where a face has depth."""
 _MIN_CENTER_SHARE = 0.1
 """Of the pixels there that must have depth."""
+_REJECTED_WIDTHS = 0.5
+"""A box is of the same thing as a rejected one where their middles are nearer than this, each way,
+by the rejected one's width."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +91,9 @@ class Detection:
     """Every box, the chosen one first, then by depth."""
 
 
-def detect_face(color: Bytes, registered: Registration, focal_px: float) -> Detection:
+def detect_face(
+    color: Bytes, registered: Registration, focal_px: float, rejected: tuple[Box, ...] = ()
+) -> Detection:
     """Find the nearest face whose size and shape fit its depth.
 
     The scene is searched from the nearest layer of depth to the farthest, at most 2 m, and no
@@ -96,6 +104,8 @@ def detect_face(color: Bytes, registered: Registration, focal_px: float) -> Dete
     color : (H', W', 3) uint8, RGB
     registered : the depth tied to that image; every k-th pixel is enough
     focal_px : focal length of the colour camera, pixels
+    rejected : boxes of what was found before and turned out to be no face: the search goes on to
+        the next
 
     Raises
     ------
@@ -106,7 +116,7 @@ def detect_face(color: Bytes, registered: Registration, focal_px: float) -> Dete
     NoDepthError
         Where nothing measured lies before the colour camera.
     """
-    search = Search(color, registered, focal_px)
+    search = Search(color, registered, focal_px, rejected)
     for equalized, passes in ((False, _PASSES), (True, _EQUALIZED_PASSES)):
         for one in passes:
             hit = search.nearest_face(one, search.regions, equalized=equalized)
@@ -144,7 +154,7 @@ def judge_box(box: Box, registered: Registration, focal_px: float) -> FaceCandid
     if not FACE_WIDTH_MM[0] <= width <= FACE_WIDTH_MM[1]:
         verdict = "not a face's size at its depth"
     elif bulge_mm(depths, depth) < _MIN_BULGE_MM:
-        verdict = "flat"
+        verdict = _FLAT
     return FaceCandidate(box=box, depth_mm=depth, width_mm=width, verdict=verdict)
 
 
@@ -159,7 +169,11 @@ class _Hit(NamedTuple):
 class Search:
     """One frame's search: the image, the regions to search, and the candidates so far."""
 
-    def __init__(self, color: Bytes, registered: Registration, focal_px: float) -> None:
+    def __init__(
+        self, color: Bytes, registered: Registration, focal_px: float,
+        rejected: tuple[Box, ...] = (),
+    ) -> None:
+        self.rejected = rejected
         self.registered = registered
         self.focal_px = focal_px
         self.candidates: list[FaceCandidate] = []
@@ -250,9 +264,10 @@ class Search:
         if not measured:
             return FaceWithoutDepthError(
                 f"face seen at {self.candidates[0].box}, but no depth was measured on it")
-        if measured[-1].verdict == "flat":
+        if measured[-1].verdict in (_FLAT, _REJECTED):
             return NoFaceError(
-                f"no face found: what the box at {measured[-1].box} shows is flat")
+                f"no face found: what the box at {measured[-1].box} shows is "
+                f"{measured[-1].verdict}")
         least, most = FACE_WIDTH_MM
         return NoFaceError(
             f"no face found: the box at {measured[-1].box} is {measured[-1].width_mm:.0f} mm wide "
@@ -300,8 +315,18 @@ class Search:
         boxes = run_pass(gray, _scaled(roi, shrink), cascade_pass, typical * shrink,
                          (sizes[0] * shrink, sizes[1] * shrink), centers)
         narrower = 1 / _PROFILE_WIDER if cascade_pass.cascade == _PROFILE else 1.0
-        return [judge_box(_resized(_scaled(box, self.to_color), narrower), self.registered,
-                          self.focal_px) for box in boxes]
+        return [self._judge(_resized(_scaled(box, self.to_color), narrower)) for box in boxes]
+
+    def _judge(self, box: Box) -> FaceCandidate:
+        judged = judge_box(box, self.registered, self.focal_px)
+        again = any(_same_thing(box, other) for other in self.rejected)
+        return judged.model_copy(update={"verdict": _REJECTED}) if again else judged
+
+
+def _same_thing(box: Box, rejected: Box) -> bool:
+    (x, y, w, h), (left, top, width, height) = box, rejected
+    return bool(max(abs(x + w / 2 - left - width / 2), abs(y + h / 2 - top - height / 2))
+                < _REJECTED_WIDTHS * width)
 
 
 def _depth(candidate: FaceCandidate) -> float:

@@ -87,6 +87,18 @@ def test_a_photograph_of_a_faces_size_is_refused_because_it_is_flat(shot):
         detected(replace(shot.frame, depth=slanted(shot.frame.depth, 720)))
 
 
+def test_what_was_rejected_afterwards_is_passed_over(pair):
+    frame = pair.frame
+    registered, focal_px = register(frame), frame.calibration.color.fx
+    near = detect_face(frame.rgb, registered, focal_px)
+    far = detect_face(frame.rgb, registered, focal_px, (near.box,))
+    assert near.depth_mm < 830
+    assert far.depth_mm > 1100
+    assert "no face by its shape" in {c.verdict for c in far.candidates}
+    with pytest.raises(NoFaceError, match=r"the box at \(\d+, .* is no face by its shape"):
+        detect_face(frame.rgb, registered, focal_px, (near.box, far.box))
+
+
 def test_a_photograph_before_a_face_is_named_and_not_chosen(pair):
     depth = pair.frame.depth.copy()
     photograph = np.s_[:, :340]  # where the nearer head is
