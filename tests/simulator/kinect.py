@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from scipy.spatial.transform import Rotation
 
 from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
+from tests.simulator.depth_noise import KINECT_V1, DepthNoise
 
 __all__ = ["KINECT_CALIBRATED", "KINECT_DEFAULT", "KinectModel"]
 
@@ -22,6 +23,8 @@ class KinectModel:
     calibration: Calibration = field(hash=False)
     projector_mm: tuple[float, float, float]
     """Where the projector is, depth camera frame."""
+    noise: DepthNoise = KINECT_V1
+    """How its depth differs from the truth."""
 
 
 def _rotation(*degrees: float) -> tuple[tuple[float, float, float], ...]:

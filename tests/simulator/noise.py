@@ -1,4 +1,4 @@
-"""How a Kinect's depth differs from the truth.
+"""How a sensor's depth differs from the truth.
 
 Lateral jitter: Nguyen, Izadi, Lovell, "Modeling Kinect sensor noise for improved 3D
 reconstruction and tracking", 3DIMPVT 2012. Axial noise and its correlation: fitted to a real
@@ -10,40 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.simulator.camera_views import SUPERSAMPLING, DepthView
+from tests.simulator.depth_noise import KINECT_V1, DepthNoise, Edges, Levels
 from tests.simulator.shift import depth_to_shift, quantize
 
-__all__ = ["depth_noise_mm", "noisy_depth"]
+__all__ = ["noisy_depth"]
 
 Floats = NDArray[np.float32]
 
-_JITTER_PX = 0.5
-_JITTER_CORRELATION_PX = 1.3
 _CONTINUOUS = 0.012
 """Neighbouring samples farther apart than this share of the depth are not one surface."""
-_AXIAL = ((0.18, 0.0), (0.46, 1.4), (0.36, 3.1))
-"""(share of the axial variance, its correlation length in pixels): with the quantiser's own noise,
-the real recording's correlation over 1, 2, 4, 6, 8 pixels (0.64, 0.45, 0.24, 0.11, 0.05), as the
-mean of its bands at 0.55-0.75 and 1.0-1.5 m; between them a person moves."""
-_STEADY_SHARE = 0.22
-"""Share of the axial variance that is the same in every frame of a still scene: what Nguyen's
-total (1.37 mm at 0.7 m) leaves beside the recording's variance over time (1.22 mm)."""
-_EDGE_PX, _EDGE_CORRELATION_PX, _EDGE_REACH_PX = 1.2, 2.6, 4
-"""At depth edges the matching window takes one side or the other in small blocks."""
-_GRAZING = (0.10, 0.28)
-"""Cosine of incidence: never a reading below the first, always above the second."""
-
-
-def depth_noise_mm(depth_mm: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Give the axial noise, mm, standard deviation, at a depth in mm."""
-    z = np.asarray(depth_mm, np.float64) / 1000
-    return 1.17 + 2.0 * np.maximum(z - 0.65, 0) ** 2
-
+_MIXING = 3
+"""Side of the square of supersampled pixels whose depths a pixel of `Edges.MIXED` mixes."""
 
 def noisy_depth(
     view: DepthView, hole_share: Floats, steady: np.random.Generator,
-    changing: np.random.Generator,
+    changing: np.random.Generator, noise: DepthNoise = KINECT_V1,
 ) -> NDArray[np.uint16]:
-    """Make one depth image, (H, W) uint16 mm, of a true view.
+    """Make one depth image, (H, W) uint16 counts, of a true view.
 
     Parameters
     ----------
@@ -51,46 +34,52 @@ def noisy_depth(
     hole_share : (H, W) float32, 0-1, supersampled: how likely there is no reading
     steady : what is the same in each frame of a still scene; give it afresh for each frame
     changing : what differs between frames
+    noise : of the kind of sensor
     """
     height = view.camera.height // SUPERSAMPLING
     width = view.camera.width // SUPERSAMPLING
     shape = (height, width)
-    u, v = _jittered(view, shape, steady, changing)
-    depth = _look_up(view, u, v)
+    u, v = _jittered(view, shape, steady, changing, noise)
+    depth = _look_up(view, u, v, mixed=noise.edges is Edges.MIXED)
     slant = _nearest(view.slant, u, v)
     lit = _nearest(view.lit.astype(np.uint8), u, v) > 0
 
-    sigma = depth_noise_mm(np.maximum(depth, 1))
-    noise = (np.sqrt(_STEADY_SHARE) * _axial(shape, steady)
-             + np.sqrt(1 - _STEADY_SHARE) * _axial(shape, changing))
-    # In shift numbers: that is where the matching errs.
-    per_mm = _shift_per_mm(depth)
-    shift = depth_to_shift(np.maximum(depth, 1)) + noise * sigma * per_mm
-    out = quantize(shift)
+    error = (np.sqrt(noise.steady_share) * _axial(shape, steady, noise)
+             + np.sqrt(1 - noise.steady_share) * _axial(shape, changing, noise))
+    error = error * noise.axial_mm(np.maximum(depth, 1))
+    if noise.levels is Levels.SHIFT:
+        # In shift numbers: that is where the matching errs.
+        out = quantize(depth_to_shift(np.maximum(depth, 1)) + error * _shift_per_mm(depth))
+    else:
+        out = np.clip(noise.to_counts(depth + error), 0, 65535).astype(np.uint16)
 
     chance = 0.8 * _field(shape, 2.0, steady) + 0.6 * _field(shape, 1.0, changing)
-    low, high = _GRAZING
+    low, high = noise.grazing
     grazing = slant < low + (high - low) * _uniform(chance)
     missing = _nearest(hole_share, u, v) > _uniform(chance)
-    out[~lit | grazing | missing | (depth <= 0)] = 0
+    unlit = ~lit if noise.shadows else np.zeros_like(lit)
+    out[unlit | grazing | missing | (depth <= 0)] = 0
     return out
 
 
 def _jittered(
     view: DepthView, shape: tuple[int, int], steady: np.random.Generator,
-    changing: np.random.Generator,
+    changing: np.random.Generator, noise: DepthNoise,
 ) -> tuple[Floats, Floats]:
     """Give where on the supersampled grid each pixel really looks."""
     v, u = np.mgrid[:shape[0], :shape[1]].astype(np.float32)
-    edge = _nearest(_broken(view, SUPERSAMPLING * _EDGE_REACH_PX).astype(np.uint8),
+    edge = _nearest(_broken(view, SUPERSAMPLING * noise.edge_reach_px).astype(np.uint8),
                     *_on_grid(u, v)) > 0
+    apart, size = noise.jitter_correlation_px, noise.edge_correlation_px
     moved = []
     for place in (u, v):
-        jitter = _JITTER_PX * (0.8 * _field(shape, _JITTER_CORRELATION_PX, steady)
-                               + 0.6 * _field(shape, _JITTER_CORRELATION_PX, changing))
-        blocks = _EDGE_PX * (0.9 * _field(shape, _EDGE_CORRELATION_PX, steady)
-                             + 0.44 * _field(shape, _EDGE_CORRELATION_PX, changing))
-        moved.append(place + jitter + edge * blocks)
+        place = place + noise.jitter_px * (  # noqa: PLW2901
+            0.8 * _field(shape, apart, steady) + 0.6 * _field(shape, apart, changing))
+        if noise.edges is Edges.BLOCKS:
+            blocks = noise.edge_px * (
+                0.9 * _field(shape, size, steady) + 0.44 * _field(shape, size, changing))
+            place = place + edge * blocks  # noqa: PLW2901
+        moved.append(place)
     return _on_grid(moved[0], moved[1])
 
 
@@ -110,8 +99,12 @@ def _broken(view: DepthView, reach: int) -> NDArray[np.bool_]:
     return broken > 0
 
 
-def _look_up(view: DepthView, u: Floats, v: Floats) -> Floats:
-    """Sample the depth bilinearly on surfaces, nearest across their edges: no flying pixels."""
+def _look_up(view: DepthView, u: Floats, v: Floats, *, mixed: bool) -> Floats:
+    """Sample the depth bilinearly on surfaces; across their edges nearest, or mixed."""
+    if mixed:
+        wide = cv2.blur(view.depth, (_MIXING, _MIXING))
+        return np.asarray(
+            cv2.remap(wide, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
     smooth = cv2.remap(view.depth, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     nearest = _nearest(view.depth, u, v)
     broken = _nearest(_broken(view, 1).astype(np.uint8), u, v) > 0
@@ -123,9 +116,9 @@ def _nearest(image: NDArray[np.generic], u: Floats, v: Floats) -> Floats:
                                 borderMode=cv2.BORDER_REPLICATE), np.float32)
 
 
-def _axial(shape: tuple[int, int], rng: np.random.Generator) -> Floats:
+def _axial(shape: tuple[int, int], rng: np.random.Generator, noise: DepthNoise) -> Floats:
     mixed = np.zeros(shape, np.float32)
-    for share, length in _AXIAL:
+    for share, length in noise.spectrum:
         mixed += np.float32(np.sqrt(share)) * _field(shape, length, rng)
     return mixed
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from denseface.capture.frame import DepthMeaning, DepthRounding, RgbdFrame
+from denseface.capture.frame import RgbdFrame
 from tests.simulator.camera_views import color_view, depth_view
 from tests.simulator.heads import load_head
 from tests.simulator.holes import hole_share
@@ -50,7 +50,7 @@ def simulate(
     taken = []
     for index in range(frames):
         changing = np.random.default_rng([seed, 2, index])
-        depth = noisy_depth(view, share, np.random.default_rng([seed, 1]), changing)
+        depth = noisy_depth(view, share, np.random.default_rng([seed, 1]), changing, sensor.noise)
         color = clean + _COLOR_NOISE * changing.standard_normal(clean.shape, dtype=np.float32)
         taken.append(Simulated(
             frame=RgbdFrame(
@@ -59,7 +59,7 @@ def simulate(
                 color_timestamp_us=1_000_000 + index * _PERIOD_US,
                 calibration=sensor.calibration,
                 calibration_origin=f"simulated sensor {sensor.name}",
-                depth_meaning=DepthMeaning(rounding=DepthRounding.CUT),
+                depth_meaning=sensor.noise.meaning,
             ),
             truth=truth,
         ))
