@@ -10,6 +10,8 @@ from denseface.capture.frame import DepthMeaning, DepthRounding
 
 __all__ = ["KINECT_V1", "DepthNoise", "Edges", "Levels"]
 
+_CUT = DepthMeaning(rounding=DepthRounding.CUT)
+
 
 class Edges(StrEnum):
     """What a pixel at a depth edge shows."""
@@ -63,7 +65,7 @@ class DepthNoise:
     edge_reach_px: int = 4
     levels: Levels = Levels.SHIFT
     disparity_step: float = 0.0
-    meaning: DepthMeaning = DepthMeaning(rounding=DepthRounding.CUT)
+    meaning: DepthMeaning = _CUT
     shadows: bool = True
     grazing: tuple[float, float] = (0.10, 0.28)
 

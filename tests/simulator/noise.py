@@ -73,12 +73,12 @@ def _jittered(
     apart, size = noise.jitter_correlation_px, noise.edge_correlation_px
     moved = []
     for place in (u, v):
-        place = place + noise.jitter_px * (  # noqa: PLW2901
+        place = place + noise.jitter_px * (
             0.8 * _field(shape, apart, steady) + 0.6 * _field(shape, apart, changing))
         if noise.edges is Edges.BLOCKS:
             blocks = noise.edge_px * (
                 0.9 * _field(shape, size, steady) + 0.44 * _field(shape, size, changing))
-            place = place + edge * blocks  # noqa: PLW2901
+            place = place + edge * blocks
         moved.append(place)
     return _on_grid(moved[0], moved[1])
 

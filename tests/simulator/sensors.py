@@ -20,8 +20,8 @@ _ROUNDED = DepthMeaning(rounding=DepthRounding.ROUND)
 _FINE = DepthMeaning(unit_um=100, rounding=DepthRounding.ROUND)
 
 _PRIMESENSE = replace(
-    KINECT_V1, axial=(0.75, 1.6, 0.65), spectrum=_ALIKE_1, jitter_px=0.35, jitter_correlation_px=1.0,
-    edge_px=0.8, steady_share=0.5)
+    KINECT_V1, axial=(0.75, 1.6, 0.65), spectrum=_ALIKE_1, jitter_px=0.35,
+    jitter_correlation_px=1.0, edge_px=0.8, steady_share=0.5)
 """Structured light, its noise alike over one pixel."""
 _TIME_OF_FLIGHT = DepthNoise(
     axial=(1.4, 0.8, 0.7), spectrum=_WHITE, steady_share=0.1, jitter_px=0.15,
