@@ -10,12 +10,12 @@ docs/decisions/0019.
 
 import cv2
 import numpy as np
-from scipy.linalg.lapack import dpbsv
 
 from denseface.recon.arrays import Bools, Floats, Ints
 from denseface.recon.detail import _hole_kernels as kernels
 from denseface.recon.detail._rim import Rim
 from denseface.recon.numerics.filters import downsampled
+from denseface.recon.numerics.lapack import dpbsv
 from denseface.recon.numerics.morphology import large_components
 
 _MISSING = 0.5

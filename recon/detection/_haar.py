@@ -5,6 +5,7 @@ there is no face. The same windows pass here as there.
 """
 
 from functools import cache
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -52,33 +53,30 @@ def load_cascade(name: str) -> Cascade:
     if not path.is_file():
         raise RuntimeError(f"{path}: OpenCV ships no such cascade (version 5 has none)")
     root = _child(ElementTree.parse(path).getroot(), "cascade")  # noqa: S314  OpenCV's own file
-    rectangles = [[_numbers(one) for one in _child(feature, "rects")]
-                  for feature in _child(root, "features")]
-    nodes: list[Doubles] = []
-    outcomes: list[list[float]] = []
-    stages, stage_thresholds = [0], []
-    for stage in _child(root, "stages"):
-        weak = _child(stage, "weakClassifiers")
-        for tree in weak:
-            # left, right, feature, threshold; a branch that is not positive is minus a leaf.
-            rows = _numbers(_child(tree, "internalNodes")).reshape(-1, 4)
-            outcomes.append(_outcomes(rows[:, :2].astype(int).tolist(),
-                                      _numbers(_child(tree, "leafValues")).tolist()))
-            nodes += list(rows)
-        stages.append(stages[-1] + len(weak))
-        stage_thresholds.append(
-            float(_numbers(_child(stage, "stageThreshold"))[0]) - _THRESHOLD_SLACK)
-    table = np.array(nodes)
-    node_rectangles = np.zeros((len(nodes), 3, 5))  # x, y, width, height, weight
-    for three, feature in zip(node_rectangles, table[:, 2].astype(int), strict=True):
-        three[:len(rectangles[feature])] = rectangles[feature]
-    x, y, w, h, weights = np.moveaxis(node_rectangles, 2, 0)
+    features = [_child(one, "rects") for one in _child(root, "features")]
+    rectangles = np.zeros((len(features), 3, 5))  # x, y, width, height, weight
+    given = np.arange(3) < np.array([len(rects) for rects in features])[:, None]
+    rectangles[given] = _numbers(*(one for rects in features for one in rects)).reshape(-1, 5)
+    stages = [_child(stage, "weakClassifiers") for stage in _child(root, "stages")]
+    trees = [tree for stage in stages for tree in stage]
+    # left, right, feature, threshold; a branch that is not positive is minus a leaf.
+    texts = [_child(tree, "internalNodes") for tree in trees]
+    table = _numbers(*texts).reshape(-1, 4)
+    branches = iter(table[:, :2].astype(int).tolist())
+    leaves = iter(_numbers(*(_child(tree, "leafValues") for tree in trees)).tolist())
+    outcomes = []
+    for text in texts:
+        nodes = len((text.text or "").split()) // 4
+        outcomes.append(_outcomes(list(islice(branches, nodes)), list(islice(leaves, nodes + 1))))
+    x, y, w, h, weights = np.moveaxis(rectangles[table[:, 2].astype(int)], 2, 0)
     corners = np.stack([x, y, x + w, y, x, y + h, x + w, y + h], axis=2).reshape(-1, 12, 2)
     return Cascade(
         int(_numbers(_child(root, "width"))[0]),
         Trees(weights.astype(np.float32), table[:, 3].astype(np.float32),
-              np.array(outcomes, np.float32), np.array(stages, np.uint32),
-              np.array(stage_thresholds, np.float32)),
+              np.array(outcomes, np.float32),
+              np.cumsum([0, *map(len, stages)]).astype(np.uint32),
+              (_numbers(*(_child(stage, "stageThreshold") for stage in _child(root, "stages")))
+               - _THRESHOLD_SLACK).astype(np.float32)),
         corners.astype(np.int32))
 
 
@@ -138,5 +136,6 @@ def _child(element: ElementTree.Element, name: str) -> ElementTree.Element:
     return found
 
 
-def _numbers(element: ElementTree.Element) -> Doubles:
-    return np.array((element.text or "").split(), np.float64)
+def _numbers(*elements: ElementTree.Element) -> Doubles:
+    """Read all that is in some elements, at once: they are tens of thousands."""
+    return np.array(" ".join(one.text or "" for one in elements).split(), np.float64)

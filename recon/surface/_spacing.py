@@ -2,7 +2,6 @@
 
 import cv2
 import numpy as np
-from scipy.spatial import cKDTree
 
 from denseface.recon.arrays import Floats, Ints
 from denseface.recon.numerics.jit import compiled
@@ -60,6 +59,8 @@ def randomized_spacing(xy: Floats) -> float:
 
 def exact_spacing(xy: Floats) -> float:
     """Mean nearest-neighbour distance of (n, 2) points, mm, by an exact kd-tree."""
+    from scipy.spatial import cKDTree  # rarely needed, and slow to import
+
     return float(np.asarray(cKDTree(xy).query(xy, k=2)[0])[:, 1].mean())
 
 

@@ -14,8 +14,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import structlog
-
 from denseface.service.errors import SettingsError
 
 __all__ = ["ACTIONS", "FAILPOINTS_VARIABLE", "FAILPOINT_NAMES", "REMOVAL_FAILPOINTS",
@@ -88,6 +86,8 @@ def arm(environment: Mapping[str, str]) -> None:
                 f"{FAILPOINTS_VARIABLE}: {name}={what}: expected a number from 1 after @")
         _armed[name] = _Failpoint(
             action, int(number) if at else None, Path(folder, name) if folder else None)
+    import structlog  # slow to import
+
     structlog.get_logger("failpoints").warning(
         "failpoints are set: this process is to fail", failpoints=text)
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-import structlog
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from denseface.service.errors import KeyFileError, first_error, reason_of
@@ -66,6 +65,8 @@ class AllowList:
         self._tokens: frozenset[bytes] = frozenset()
         self.changes = 0
         """Times that `refresh` found another list."""
+        import structlog  # which who only has keys need not load
+
         self._log = structlog.get_logger("keys")
         self.refresh()
         self.changes = 0

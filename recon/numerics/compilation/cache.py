@@ -10,12 +10,12 @@ from contextlib import contextmanager, suppress
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
-from numba.core import compiler
 from numba.core.caching import IndexDataCacheFile, _Cache
 
 from denseface.files import write_whole
+from denseface.recon.numerics.compilation._rebuild import read, rebuild
 from denseface.recon.numerics.compilation.fingerprint import fingerprint
 from denseface.recon.numerics.compilation.folders import (
     folders_for,
@@ -28,7 +28,6 @@ __all__ = ["KernelCache", "folder_to_write"]
 
 _NO_BRACKETS = str.maketrans("", "", "<>")
 """Takes away what `<locals>` would bring into a file's name."""
-_rebuild: Any = compiler.CompileResult._rebuild
 
 
 class KernelCache(_Cache):
@@ -60,7 +59,6 @@ class KernelCache(_Cache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Give the code for these types; None where this process is to compile it."""
-        target_context.refresh()
         key = sig, target_context.codegen().magic_tuple()
         code = self._load(key, target_context)
         if code is None and self._turns.take_turn(folder_to_write):
@@ -84,12 +82,11 @@ class KernelCache(_Cache):
         for folder in folders_for(self._source):
             # Damaged, gone by now, or not to be looked at: it is compiled again.
             with suppress(Exception):
-                if not self._doubt(folder):
-                    reduced = self._files(folder).load(key)
-                    if reduced is not None:
-                        code = _rebuild(target_context, *reduced)
-                        self._turns.folders.add(folder)
-                        return code
+                reduced = self._files(folder).load_trusted(key, self._source)
+                if reduced is not None:
+                    code = rebuild(target_context, *reduced)
+                    self._turns.folders.add(folder)
+                    return code
         return None
 
     def _save(self, key: Any, code: Any) -> str:
@@ -142,6 +139,18 @@ class KernelCache(_Cache):
 
 class _Files(IndexDataCacheFile):
     """numba's index and files of one function: whole, and for no other user to write."""
+
+    _index_path: str
+
+    def load_trusted(self, key: Any, source: Path) -> Any:
+        """Give what was kept; None where there is nothing, or it is not to be run."""
+        index, untyped = Path(self._index_path), cast("Any", self)
+        if why_not_trusted(index.parent, source, index):
+            return None
+        name = untyped._load_index().get(key)
+        if name is None or why_not_trusted(index.parent, source, index.parent / name):
+            return None
+        return read(index.parent / name)
 
     @contextmanager
     def _open_for_write(self, filepath: str) -> Iterator[BytesIO]:

@@ -64,7 +64,8 @@ def test_importing_it_costs_nothing():
 
 
 def test_the_clients_load_nothing_of_the_other_processes():
-    heavy = {"numba", "cv2", "scipy", "open3d", "sqlite3", "prometheus_client"}
+    heavy = {"numba", "cv2", "scipy", "open3d", "sqlite3", "prometheus_client",
+             "structlog"}
     code = ("import sys; from denseface import AsyncClient, Client\n"
             f"found = {heavy} & set(sys.modules)\nsys.exit(repr(found) if found else 0)")
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)

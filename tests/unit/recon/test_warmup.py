@@ -2,6 +2,8 @@
 
 import importlib
 import pkgutil
+import subprocess
+import sys
 
 import numba
 
@@ -26,3 +28,12 @@ def test_once_warm_a_frame_compiles_nothing(shot):
     assert len(before) >= 8
     reconstruct(shot.frame)
     assert compiled() == before
+
+
+def test_loading_kernels_imports_no_more_than_runs():
+    warm()  # so that all are kept
+    slow = {"scipy.linalg", "scipy.spatial", "numba.np.linalg", "structlog", "open3d", "zmq"}
+    code = ("import sys; from denseface.recon import warm; warm()\n"
+            f"found = {slow} & set(sys.modules)\nsys.exit(repr(found) if found else 0)")
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -8,8 +8,9 @@ import re
 
 import numba
 import pytest
+from numba.core.registry import cpu_target
 
-from denseface.recon.numerics.compilation import cache, fingerprint
+from denseface.recon.numerics.compilation import _rebuild, cache, fingerprint
 from denseface.recon.numerics.compilation.cache import KernelCache
 from denseface.recon.numerics.compilation.progress import LOGGER, Compiling
 
@@ -180,3 +181,33 @@ def test_a_kernel_follows_what_it_calls_in_another_file(tmp_path):
         module.callee = numba.njit(imported(tmp_path / "callee.py").callee)
         marks.append(fingerprint.fingerprint(module.caller))
     assert marks[0] != marks[1]
+
+
+def test_what_is_kept_is_loaded_without_readying_the_compiler(start, monkeypatch):
+    start()
+    for what in ("refresh", "load_additional_registries"):
+        monkeypatch.setattr(cpu_target.target_context, what, None)
+    assert not start()
+
+
+def test_a_kernel_compiled_later_takes_in_one_that_was_loaded(start, tmp_path):
+    start()
+    module = imported(tmp_path / "package" / "kernels.py")
+    loaded = numba.njit(module.scaled)
+    loaded._cache = KernelCache(module.scaled, Compiling())
+
+    @numba.njit
+    def twice(x):
+        return loaded(loaded(x))
+
+    loaded(5)
+    (code,) = loaded.overloads.values()
+    assert code.library._shared_module is None  # not read before it is needed
+    assert twice(5) == 20
+    assert not loaded.stats.cache_misses
+
+
+def test_constants_come_without_the_module_of_the_function_that_they_are_of():
+    kept = _rebuild._environment("nowhere.to.be.found", ["too few"], "of a test")
+    assert kept.consts == ["too few"]
+    assert kept is _rebuild._environment("nowhere.to.be.found", [], "of a test")
