@@ -12,6 +12,7 @@ from denseface.recon.errors import NoFaceError
 from denseface.recon.fitting import surface_of
 from denseface.recon.numerics.compilation.progress import compiling
 from denseface.recon.numerics.malloc import keep_freed_memory
+from denseface.recon.prior import Heights, fit_face, mean_face
 from denseface.recon.propagation import densify
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import segment_face
@@ -53,6 +54,8 @@ def _run_every_stage() -> None:
     sampler = partial(sample_colors, frame, registered)
     surface = surface_of(seeds.points, spacing, settings, sampler)
     densify(seeds, surface, spacing, settings.ratio, 1.0, sampler)
+    heights, _, known = mean_face(_NEAREST_MM).heights((-90.0, -90.0), 4.0, (45, 45))
+    fit_face(Heights(heights, known.astype(np.float32), (-90.0, -90.0), 4.0))
 
 
 def _ball() -> RgbdFrame:

@@ -1,0 +1,159 @@
+"""A face of the model, fitted to heights: pose, and the weights of its modes.
+
+The posterior of a linear Gaussian model: of all faces the likeliest, given heights with errors of
+known variance and weights that are unit normals (Blanz and Vetter, 1999,
+doi:10.1145/311535.311556, without their colours). A few poses of the mean face are tried first.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from denseface.recon.arrays import Bools, Doubles, Floats
+from denseface.recon.prior import _fit_kernels as kernels
+from denseface.recon.prior._basis import basis
+
+__all__ = ["FittedFace", "Heights", "fit_face", "mean_face"]
+
+Heights = kernels.Heights
+
+_COARSE, _FINE = 250, 900
+"""Points of the model that find the pose, and that tell its modes."""
+_YAWS = np.radians((-20.0, 0.0, 20.0))
+"""Turns of the mean face to start from, where the plane of symmetry is not known, rad."""
+_ALONG_MM = (-25.0, 0.0, 25.0)
+"""Where its middle is along its own y to start from, from the heights' middle, mm."""
+_COARSE_SCALES = np.array([30.0, 15.0, 8.0, 5.0, 4.0])
+"""Scales of the robust weights in the steps of the pose, mm."""
+_FINE_SCALES = (5.0, 4.0, 3.0, 3.0, 3.0, 3.0)
+"""The same in the steps of pose and modes, mm."""
+_FAR_MM, _MISSING = 8.0, 0.1
+"""When poses are compared: larger distances cost the same; cost of a point that meets nothing, as a
+part of that."""
+_MISFIT_MM = 2.5
+"""Standard deviation of what a point is off the model. Faces are off by 1 mm, but neighbours
+alike."""
+_POSE_RIDGE = 1e-6
+"""What is known of turns and shifts before: next to nothing, 1 / rad^2 and 1 / mm^2."""
+_FARTHEST_MM = np.float32(1e30)
+"""Behind everything, mm. Not inf: compiled code assumes finite numbers."""
+_FEWEST = 100
+"""Fewest heights, and points that meet one."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedFace:
+    """A face of the model, in the frame of the heights that it was fitted to.
+
+    Attributes
+    ----------
+    rotation, shift : (3, 3) and (3,) mm, from the model's frame
+    weights : (k,), of the modes, in standard deviations
+    covariance : (6 + k, 6 + k), of turns, rad, shifts, mm, and weights
+    rms_mm : root mean square distance from the heights, robust
+    met : what part of the points that are turned to the camera meet a height, 0-1
+    """
+
+    rotation: Doubles
+    shift: Doubles
+    weights: Doubles
+    covariance: Doubles
+    rms_mm: float
+    met: float
+
+    @property
+    def mahalanobis(self) -> float:
+        """How unusual the face is: the weights' norm over what is usual, sqrt(k)."""
+        return float(np.linalg.norm(self.weights) / np.sqrt(len(self.weights)))
+
+    def heights(
+        self, origin: tuple[float, float], step: float, shape: tuple[int, int]
+    ) -> tuple[Floats, Floats, Bools]:
+        """Predict the heights on a grid.
+
+        origin, step : x and y of the first point, and the distance of points, mm
+        shape : rows, columns
+
+        Gives the heights, mm, their variance, mm^2, as far as the model's, (rows, columns) float32,
+        and where there are any: both are 0 elsewhere.
+        """
+        model = basis()
+        points = model.vertices + model.modes @ self.weights.astype(np.float32)
+        J = np.empty((len(points), 6 + len(self.weights)), np.float32)
+        kernels.gradients(points, model.normals, model.modes, self.rotation, J)
+        variance = np.einsum("ij,ij->i", J @ self.covariance.astype(np.float32), J)
+        posed = (points @ self.rotation.T + self.shift).astype(np.float32)
+        heights, drawn = np.full(shape, _FARTHEST_MM, np.float32), np.zeros(shape, np.float32)
+        kernels.draw(posed, variance, model.triangles, origin, step, heights, drawn)
+        known = heights < _FARTHEST_MM
+        heights[~known] = 0
+        return heights, drawn, known
+
+
+def mean_face(distance_mm: float) -> FittedFace:
+    """Give the mean face, upright and looking at the camera, at a distance; of no variance."""
+    modes = basis().modes.shape[2]
+    return FittedFace(np.eye(3), np.array([0.0, 0.0, distance_mm]), np.zeros(modes),
+                      np.zeros((6 + modes, 6 + modes)), 0.0, 1.0)
+
+
+def fit_face(field: Heights, across: Doubles | None = None) -> FittedFace | None:
+    """Fit a face to heights; None where too few of its points meet them.
+
+    field : of a face that is within 30 degrees or so of upright, facing the camera, -z
+    across : (3,), normal of its plane of symmetry, where that is known: any roll will do
+    """
+    rows, columns = np.nonzero(field.weights > 0)
+    if len(rows) < _FEWEST:
+        return None
+    model = basis()
+    turned = _starts(across)
+    rotations = np.repeat(turned, len(_ALONG_MM), axis=0)
+    shifts = rotations[:, :, 1] * np.tile(_ALONG_MM, len(turned))[:, None]
+    shifts[:, 0] += field.origin[0] + field.step * columns.mean()
+    shifts[:, 1] += field.origin[1] + field.step * rows.mean()
+    best = kernels.best_pose(
+        field, model.vertices[:_COARSE], model.normals[:_COARSE], rotations, shifts,
+        _COARSE_SCALES, _FAR_MM**2, _MISSING * _FAR_MM**2)
+    return _fit_modes(field, rotations[best], shifts[best])
+
+
+def _starts(across: Doubles | None) -> Doubles:
+    """Give rotations of the mean face to start from, (s, 3, 3)."""
+    if across is None:
+        return np.array([cv2.Rodrigues(np.array([0, yaw, 0]))[0] for yaw in _YAWS])
+    # Right is right: a face that lies on its side may have been found upside down.
+    x = across * (1 if across[0] >= 0 else -1) / np.linalg.norm(across)
+    y = np.cross((0.0, 0.0, 1.0), x)
+    y /= max(float(np.linalg.norm(y)), 1e-9)
+    return np.column_stack([x, y, np.cross(x, y)])[None]
+
+
+def _fit_modes(field: Heights, rotation: Doubles, shift: Doubles) -> FittedFace | None:
+    """Take Gauss-Newton steps of pose and modes."""
+    model = basis()
+    vertices, normals, modes = model.vertices[:_FINE], model.normals[:_FINE], model.modes[:_FINE]
+    weights = np.zeros(modes.shape[2])
+    ridge = np.r_[np.full(6, _POSE_RIDGE), np.ones(len(weights))]
+    J = np.empty((len(vertices), 6 + len(weights)), np.float32)
+    rests, trust = np.empty(len(vertices), np.float32), np.empty(len(vertices), np.float32)
+    for scale in _FINE_SCALES:
+        points = vertices + modes @ weights.astype(np.float32)
+        count, seen = kernels.equations(
+            field, points, normals, modes, rotation, shift, scale, J, rests, trust)
+        if count < _FEWEST:
+            return None
+        met, rest, trusted = J[:count], rests[:count], trust[:count]
+        weighted = met * (trusted / np.float32(_MISFIT_MM**2))[:, None]
+        precision = (weighted.T @ met).astype(np.float64)
+        precision[np.diag_indices_from(precision)] += ridge
+        right = -(rest @ weighted).astype(np.float64)
+        right[6:] -= weights
+        moved = np.linalg.solve(precision, right)
+        rotation = cv2.Rodrigues(moved[:3])[0] @ rotation
+        shift = shift + moved[3:6]
+        weights += moved[6:]
+    rms = float(np.sqrt(trusted @ (rest * rest) / max(float(trusted.sum()), 1e-6)))
+    covariance = np.linalg.inv(precision).astype(np.float64)
+    return FittedFace(rotation, shift, weights, covariance, rms, count / seen)
