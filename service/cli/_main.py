@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from denseface.service.cli._parser import USAGE, parse
 from denseface.service.commands import load
 from denseface.service.log.kernels import KernelLines, tell_of_kernels
+from denseface.service.runtime.collection import collect_from_now_on, collection_put_off
 from denseface.service.runtime.interruption import Interruption, interrupted
 from denseface.service.runtime.process import forbid_core_dumps, untried_python
 from denseface.service.runtime.signals import PARENT_VARIABLE
@@ -28,14 +29,23 @@ from denseface.service.runtime.terminal import (
 
 _FAILED, _CTRL_C, _BROKEN_PIPE = 1, 130, 141
 """Exit statuses; above 128, 128 and the number of the signal, as a shell has it."""
+_BRIEF = {"reconstruct", "press", "get", "list", "status", "worker"}
+"""Commands that end soon, or say themselves when they have started."""
 _LONGEST = 400
 """Characters of a word that are shown: a path of a system's longest is no line."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and give its exit status."""
+    with collection_put_off():
+        return _main(arguments)
+
+
+def _main(arguments: Sequence[str] | None) -> int:
     fill_standard_descriptors()
     forbid_core_dumps()
+    # Nothing here has plugins, and pydantic would read the metadata of all that is installed.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")
     tell_of_kernels(KernelLines())
     try:
         args = parse(arguments)
@@ -50,6 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         complain(f"denseface: {doubt}")
     try:
         with Interruption():
+            if args.command not in _BRIEF:
+                collect_from_now_on()
             status: int = load(args.command).run(args)
             flush_stdout()
     except KeyboardInterrupt:

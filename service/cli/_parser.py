@@ -4,8 +4,9 @@ import argparse
 import itertools
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
+from functools import partial
 from typing import Any, NoReturn
 
 from denseface.service.cli._examples import EXAMPLES, EXIT_STATUSES, FIRST
@@ -48,15 +49,24 @@ class _Formatter(argparse.RawDescriptionHelpFormatter):
 class _Parser(argparse.ArgumentParser):
     """Says what is wrong in one line, by the help of the very command that was meant."""
 
+    declare: Callable[[argparse.ArgumentParser], None] = staticmethod(lambda _: None)
+    """Adds the flags of a command."""
+
     def __init__(self, **given: Any) -> None:
         super().__init__(allow_abbrev=False, formatter_class=_Formatter, **given)
         if self.epilog is None:
             self.epilog = _example(self.prog)
 
+    def complete(self) -> None:
+        """Add the flags, where that is not done: of the command alone that is run."""
+        declare, self.declare = self.declare, _Parser.declare
+        declare(self)
+
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None,
     ) -> tuple[argparse.Namespace, list[str]]:
         """Refuse here what is unknown, not where the outermost parser finds it left over."""
+        self.complete()
         given = sys.argv[1:] if args is None else list(args)
         if self._subparsers is None:  # else it may be a flag of one of them
             # First: what is said to be missing may well be what was meant.
@@ -115,12 +125,16 @@ def _parser() -> _Parser:
             name, help=text, description=text[0].upper() + text[1:] + ".")
         command.add_argument(
             "--debug", action="store_true", help="show a traceback where something goes wrong")
-        load(name).add_arguments(command)
+        command.declare = partial(_declare, name)
     helping = commands.add_parser("help", help="show the help of a command")
     helping.add_argument("words", nargs="*", metavar="COMMAND",
                          help="the command; of one with commands of its own, such as keys, also "
                               "that (default: all commands)")
     return parser
+
+
+def _declare(name: str, parser: argparse.ArgumentParser) -> None:
+    load(name).add_arguments(parser)
 
 
 class _Version(argparse.Action):

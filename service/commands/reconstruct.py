@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from denseface.service.commands import _options
 from denseface.service.export import FORMATS
+from denseface.service.runtime.collection import collect_from_now_on
 from denseface.service.runtime.terminal import say
 
 if TYPE_CHECKING:
@@ -74,6 +75,7 @@ def run(args: argparse.Namespace) -> int:
     if several:
         from denseface.service.tools.reconstruction.many import reconstruct_many
 
+        collect_from_now_on()
         return reconstruct_many(inputs, choice, settings, outputs,
                                 None if args.all_frames else args.frame or 0)
     from denseface.service.tools.reconstruction import single

@@ -22,6 +22,7 @@ from denseface.service.protocol.packing import warm_packing
 from denseface.service.protocol.payload import Arrays, FaceHeader, check_frame_size
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
+from denseface.service.runtime.collection import collect_from_now_on
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.supervisor_link import Beat, SupervisorLink
@@ -91,6 +92,7 @@ class _Worker:
         for _ in self.connection.packets(stop, warming, self._progress):
             if warming.done():
                 warming.result()
+                collect_from_now_on()
                 _log.info("warm", seconds=round(time.monotonic() - begun, 2))
                 self._send_ready()
                 return True

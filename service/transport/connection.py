@@ -1,13 +1,13 @@
 """A connection to the hub: its keys, and why the hub refuses it."""
 
 import errno
+import struct
 import time
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Self
 
 import zmq
-from zmq.utils.monitor import recv_monitor_message
 
 from denseface.service.errors import KeyFileError, KeyRefusedError, RemoteProtocolError
 from denseface.service.protocol.wire import Packet, decode_from_hub, readable
@@ -81,8 +81,9 @@ class ConnectionMonitor:
         """Read what happened; True where it is a new refusal."""
         before = str(self.refused)
         while self._monitor.poll(0):
-            event = recv_monitor_message(self._monitor)
-            self._note(zmq.Event(event["event"]), event["value"])
+            # As zmq.utils.monitor reads it, which imports asyncio.
+            event, value = struct.unpack_from("=Hi", self._monitor.recv_multipart()[0])
+            self._note(zmq.Event(event), value)
         if self._reconnect_at is not None and time.monotonic() >= self._reconnect_at:
             self._reconnect()
         return self.refused is not None and str(self.refused) != before

@@ -63,10 +63,11 @@ def test_importing_it_costs_nothing():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_the_clients_load_nothing_of_the_other_processes():
+@pytest.mark.parametrize(("client", "spared"), [("Client", {"asyncio"}), ("AsyncClient", set())])
+def test_the_clients_load_nothing_of_the_other_processes(client, spared):
     heavy = {"numba", "cv2", "scipy", "open3d", "sqlite3", "prometheus_client",
-             "structlog"}
-    code = ("import sys; from denseface import AsyncClient, Client\n"
+             "structlog"} | spared
+    code = (f"import sys; from denseface import {client}\n"
             f"found = {heavy} & set(sys.modules)\nsys.exit(repr(found) if found else 0)")
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")

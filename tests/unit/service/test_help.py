@@ -10,8 +10,9 @@ from denseface.service.cli import _examples, _parser, main
 from denseface.service.commands import COMMANDS
 
 
-def parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+def parsers(parser: _parser._Parser) -> Iterator[_parser._Parser]:
     yield parser
+    parser.complete()
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for one in action.choices.values():
