@@ -116,7 +116,7 @@ MAX_STEP = 20.0
 between two surfaces. A slope of 14, the steepest bridge that is kept, makes that along a diagonal.
 """
 STAGES = ("overview", "detection", "registration", "segmentation", "neighbors", "rbf",
-          "propagation")
+          "judgement", "propagation")
 """The stages of a reconstruction, in order: names in `Report.timings_ms`, beside `total`."""
 
 
@@ -154,7 +154,8 @@ class Report(BaseModel):
     """x, y, width, height; pixels of the colour image."""
     # FailFast: of an invalid report one error is enough, each costs a thousand bytes.
     candidates: Annotated[tuple[FaceCandidate, ...], FailFast()]
-    """Every box the detector weighed, the chosen one first. Nobody farther is looked for."""
+    """Every box the detector weighed, the chosen one first. Nobody farther is looked for, but where
+    the nearest was none or may be none."""
     initial_points: int
     dense_points: int
     mean_spacing_mm: float
@@ -166,6 +167,9 @@ class Report(BaseModel):
     settings: Settings
     calibration: str
     """Which calibration was used."""
+    face_score: Annotated[float, Field(ge=0, le=1)] | None = None
+    """How sure it is that this is a face, by its shape, 0-1; below 0.5 nothing is given out. None
+    in reports of earlier versions."""
     skew_us: int
     """Depth time stamp less colour time stamp, microseconds."""
     skew_known_by: str = ""

@@ -5,7 +5,8 @@ Unconstrained Environment".
 """
 
 import time
-from dataclasses import fields
+from collections.abc import Callable
+from dataclasses import fields, replace
 from functools import cache, partial
 from importlib.metadata import version
 from typing import Any
@@ -18,7 +19,7 @@ from denseface.capture.doubts import doubts_of
 from denseface.capture.frame import FrameOrigin, RgbdFrame
 from denseface.capture.rotation import ROTATIONS, rotate_frame
 from denseface.recon.arrays import Floats
-from denseface.recon.detection import Detection, detect_face, look_for_faces
+from denseface.recon.detection import REJECTED, Detection, detect_face, look_for_faces
 from denseface.recon.errors import (
     ImpossibleFrameError,
     NoDepthError,
@@ -26,12 +27,18 @@ from denseface.recon.errors import (
     ReconstructionError,
     TooLittleDepthError,
 )
-from denseface.recon.face import Face, PointCloud, Report
+from denseface.recon.face import Face, FaceCandidate, PointCloud, Report
 from denseface.recon.fitting import surface_of
 from denseface.recon.intermediate import Registration
+from denseface.recon.judgement import (
+    LEAST_SCORE,
+    SURE_SCORE,
+    check_face,
+    check_steps,
+    judge_shape,
+)
 from denseface.recon.numerics.threads import one_blas_thread
 from denseface.recon.openings import Openings, openings
-from denseface.recon.plausibility import check_face, check_steps
 from denseface.recon.propagation import densify, noise_fraction
 from denseface.recon.registration import register, sample_colors, with_shaded_depth
 from denseface.recon.segmentation import box_window, segment_face
@@ -45,6 +52,10 @@ _FEW_SEEDS = 2000
 """With fewer seeds, the report warns."""
 _MOST_MM = 1000.0
 """Seeds farther apart, along x or y, are not on a face."""
+_TRIES = 3
+"""So many boxes are shaped, at most, until one is a face for sure."""
+_DOUBTFUL = "a face, perhaps"
+"""Verdict on a box that was looked past for a surer one."""
 _SPARSE = 4
 """Every so many pixels are enough to find a face and weigh its depth."""
 _TURNED_LOOKS, _FARTHEST_MM = (0, 4), 1300.0
@@ -114,11 +125,51 @@ def _reconstruct(frame: RgbdFrame, settings: Settings, clock: "_Stopwatch") -> F
     clock.lap("overview")
     found = _detect(frame, overview)
     clock.lap("detection")
-    try:
-        return _shape(frame, settings, clock, overview, found, colored=colored)
-    except ReconstructionError as error:
-        error.candidates = found.candidates
-        raise
+    return _surest(frame, overview, found, clock,
+                   partial(_shape, frame, settings, clock, overview, colored=colored))
+
+
+def _surest(
+    frame: RgbdFrame, overview: Registration, found: Detection, clock: "_Stopwatch",
+    shape: Callable[[Detection], Face],
+) -> Face:
+    """Shape what was found; where that is no face, or may be none, what else is found, too."""
+    best: Face | None = None
+    refusals: list[ReconstructionError] = []
+    passed: tuple[FaceCandidate, ...] = ()
+    while len(passed) < _TRIES:
+        verdict = _DOUBTFUL
+        try:
+            face = shape(replace(found, candidates=found.candidates + passed))
+            best = face if best is None else max(best, face, key=_score)
+            if _score(best) >= SURE_SCORE:
+                break
+        except NoFaceError as error:
+            verdict = REJECTED
+            error.candidates = _first_is(verdict, found.candidates) + passed
+            refusals.append(error)
+        except ReconstructionError as error:
+            error.candidates = found.candidates + passed
+            refusals.append(error)
+            break
+        passed += _first_is(verdict, found.candidates[:1])
+        try:
+            found = detect_face(frame.rgb, overview, frame.calibration.color.fx,
+                                tuple(one.box for one in passed))
+        except ReconstructionError:
+            break
+        clock.lap("detection")
+    if best is None:
+        raise refusals[0]
+    return best
+
+
+def _first_is(verdict: str, candidates: tuple[FaceCandidate, ...]) -> tuple[FaceCandidate, ...]:
+    return (candidates[0].model_copy(update={"verdict": verdict}), *candidates[1:])
+
+
+def _score(face: Face) -> float:
+    return face.report.face_score or 0.0
 
 
 def _shape(
@@ -139,6 +190,11 @@ def _shape(
     sampler = partial(sample_colors, frame, registered)
     surface = surface_of(seeds.points, spacing, settings, sampler)
     clock.lap("rbf")
+    score, like = judge_shape(surface)
+    clock.lap("judgement")
+    if like:
+        raise NoFaceError(f"no face found: what the box at {found.box} shows is {like} "
+                          f"(score {score:.2f}, a face has {LEAST_SCORE} or more)")
     dense = densify(seeds, surface, spacing, settings.ratio, noise_fraction(settings), sampler)
     left_open = openings(dense)
     clock.lap("propagation")
@@ -147,6 +203,7 @@ def _shape(
         face_box=found.box, candidates=found.candidates,
         initial_points=len(initial), dense_points=len(dense),
         mean_spacing_mm=spacing, r0_mm=settings.r0_factor * spacing, noise_mm=surface.noise,
+        face_score=score,
         timings_ms=clock.timings_ms(), settings=settings,
         calibration=frame.calibration_origin, skew_us=frame.skew_us,
         colored=colored, registered=frame.registered and colored,
@@ -239,7 +296,7 @@ class _Stopwatch:
 
     def lap(self, name: str) -> None:
         now = time.perf_counter()
-        self._laps[name] = (now - self._last) * 1e3
+        self._laps[name] = self._laps.get(name, 0.0) + (now - self._last) * 1e3
         self._last = now
 
     def timings_ms(self) -> dict[str, float]:

@@ -1,6 +1,12 @@
 """Stage 2: the face in the colour image, by Haar cascades, confirmed by its depth."""
 
-from denseface.recon.detection._detect import FACE_WIDTH_MM, Detection, detect_face, judge_box
+from denseface.recon.detection._detect import (
+    FACE_WIDTH_MM,
+    REJECTED,
+    Detection,
+    detect_face,
+    judge_box,
+)
 from denseface.recon.detection._follow import (
     Followed,
     Looked,
@@ -9,5 +15,5 @@ from denseface.recon.detection._follow import (
     look_for_faces,
 )
 
-__all__ = ["FACE_WIDTH_MM", "Detection", "Followed", "Looked", "close_face", "detect_face",
-           "follow_face", "judge_box", "look_for_faces"]
+__all__ = ["FACE_WIDTH_MM", "REJECTED", "Detection", "Followed", "Looked", "close_face",
+           "detect_face", "follow_face", "judge_box", "look_for_faces"]

@@ -59,7 +59,7 @@ _NEARER_MM = 10.0
 _BODY_MM = 100.0
 """What is below the face and nearer by no more than this is its own body, and is not."""
 
-_FLAT, _REJECTED = "flat", "no face by its shape"
+_FLAT, REJECTED = "flat", "no face by its shape"
 """Verdicts."""
 
 _REFINED_STEP, _REFINED_NEIGHBORS = 1.08, 2
@@ -264,7 +264,7 @@ class Search:
         if not measured:
             return FaceWithoutDepthError(
                 f"face seen at {self.candidates[0].box}, but no depth was measured on it")
-        if measured[-1].verdict in (_FLAT, _REJECTED):
+        if measured[-1].verdict in (_FLAT, REJECTED):
             return NoFaceError(
                 f"no face found: what the box at {measured[-1].box} shows is "
                 f"{measured[-1].verdict}")
@@ -320,7 +320,7 @@ class Search:
     def _judge(self, box: Box) -> FaceCandidate:
         judged = judge_box(box, self.registered, self.focal_px)
         again = any(_same_thing(box, other) for other in self.rejected)
-        return judged.model_copy(update={"verdict": _REJECTED}) if again else judged
+        return judged.model_copy(update={"verdict": REJECTED}) if again else judged
 
 
 def _same_thing(box: Box, rejected: Box) -> bool:

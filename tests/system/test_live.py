@@ -20,7 +20,7 @@ from tests.waiting import LIMIT_S
 FRONTAL = RECORDINGS / "frontal_700.oni"
 EMPTY = RECORDINGS / "empty_room.oni"
 STAGES = ["capture", "overview", "detection", "registration", "segmentation", "neighbors", "rbf",
-          "propagation", "total"]
+          "judgement", "propagation", "total"]
 
 
 def test_a_recording_goes_round_until_enough_frames_are_done():

@@ -32,7 +32,7 @@ from tests.simulator.heads import head_names, load_head
 from tests.unit.frames import resampled
 
 STAGES = ["overview", "detection", "registration", "segmentation", "neighbors", "rbf",
-          "propagation", "total"]
+          "judgement", "propagation", "total"]
 
 
 @pytest.fixture(scope="module", autouse=True)

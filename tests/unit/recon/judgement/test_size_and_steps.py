@@ -5,7 +5,7 @@ import pytest
 
 from denseface.capture.rotation import rotate_frame
 from denseface.recon import CoarseDepthError, NoFaceError, reconstruct
-from denseface.recon.plausibility import check_face, check_steps
+from denseface.recon.judgement import check_face, check_steps
 from tests.simulator import Person, Scene, simulate
 
 PIXEL_MM2 = 1 / 575.8**2

@@ -1,0 +1,97 @@
+"""Whether a surface has a face's shape: a score from 0 to 1, and in words what it is else."""
+
+import math
+
+import numpy as np
+
+from denseface.recon.arrays import Doubles
+from denseface.recon.intermediate import SurfaceGrid
+from denseface.recon.judgement._likeness import Likeness, likenesses
+
+__all__ = ["LEAST_SCORE", "SURE_SCORE", "judge_points", "judge_shape", "score_of",
+           "surface_points"]
+
+_STEP_MM = 4.0
+"""Distance of the points that are judged: the relief of a face is broader."""
+_FEWEST_POINTS = 80
+"""Fewer show no relief; the least that `check_face` lets pass are three times as many."""
+
+_WEIGHTS = np.array((3.10, 2.82, 2.69, -4.11, -0.64, -1.23, -2.51))
+_BIAS = 0.82
+"""Of `Likeness.figures`, for the logarithm of the odds: a logistic regression by
+`bench/judgement.py` on faces of the choosing heads and on things that are none."""
+LEAST_SCORE = 0.5
+"""What has less is no face."""
+SURE_SCORE = 0.9
+"""What has less may be none, and a farther face that has more is taken instead. With that, no other
+placement of the mean face is tried."""
+
+_FLAT_RMS_MM, _SMOOTH_RMS_MM = 1.5, 2.5
+"""What a plane, or a quadric, leaves of a flat thing, or a smooth one."""
+_STRAIGHT = 0.25
+"""Of the larger curvature: a smaller one along a tin."""
+
+
+def judge_shape(surface: SurfaceGrid) -> tuple[float, str]:
+    """Say how sure it is that a surface is a face's.
+
+    The mean face is laid on it. A face's eyes, nose and mouth then stand where the mean face's do:
+    what a quadric leaves of both correlates, about 0.9; of tins, boxes and balls it does not.
+
+    Parameters
+    ----------
+    surface : the fit over (X, Y), with its detail
+
+    Returns
+    -------
+    the score, 0-1, at least `LEAST_SCORE` for a face; and what the surface is like, in words,
+    empty for a face
+    """
+    return judge_points(surface_points(surface))
+
+
+def judge_points(points: Doubles) -> tuple[float, str]:
+    """Judge points of a surface, (n, 3) mm, `_STEP_MM` apart along x and y: see `judge_shape`."""
+    if len(points) < _FEWEST_POINTS:
+        return 0.0, "too small"
+    score = 0.0
+    for likeness in likenesses(points):
+        score = max(score, score_of(likeness))
+        if score >= SURE_SCORE:
+            break
+    return score, "" if score >= LEAST_SCORE else _what_it_is(points)
+
+
+def surface_points(surface: SurfaceGrid) -> Doubles:
+    """Give the points that are judged, (n, 3) mm."""
+    xs, ys, inside = surface.support.on_grid(_STEP_MM)
+    rows, columns = np.nonzero(inside)
+    return np.stack([xs[columns], ys[rows], surface.sampled(xs, ys)[0][rows, columns]],
+                    axis=-1).astype(np.float64)
+
+
+def score_of(likeness: Likeness) -> float:
+    """Give the probability that it is a face's, were faces and other things as common."""
+    return 1 / (1 + math.exp(-float(_WEIGHTS @ likeness.figures + _BIAS)))
+
+
+def _what_it_is(points: Doubles) -> str:
+    """Say what the front half of a surface, (n, 3) mm, is like that is no face's."""
+    front = points[points[:, 2] <= np.median(points[:, 2])]
+    x, y, z = (front - front.mean(axis=0)).T
+    _, rms = _fit(np.stack([np.ones_like(x), x, y], axis=1), z)
+    if rms < _FLAT_RMS_MM:
+        return "flat"
+    # Curvatures across the line of sight of what is tilted are a little off: good enough to name.
+    fit, rms = _fit(np.stack([np.ones_like(x), x, y, x * x / 2, x * y, y * y / 2], axis=1), z)
+    if rms > _SMOOTH_RMS_MM:
+        return "uneven, with no eyes, nose and mouth where a face has them"
+    mean, half = (fit[3] + fit[5]) / 2, math.hypot((fit[3] - fit[5]) / 2, fit[4])
+    least, most = sorted((mean - half, mean + half), key=abs)
+    return "round like a tin" if abs(least) < _STRAIGHT * abs(most) else "round like a ball"
+
+
+def _fit(terms: Doubles, z: Doubles) -> tuple[Doubles, float]:
+    """Fit by least squares; and say what that leaves, root mean square, mm."""
+    fit = np.asarray(np.linalg.lstsq(terms, z, rcond=None)[0], np.float64)
+    return fit, float(np.sqrt(np.mean((z - terms @ fit) ** 2)))
