@@ -225,6 +225,17 @@ def test_a_reader_that_leaves_is_no_error():
     assert (done.returncode, done.stderr) == (141, "")
 
 
+def test_a_command_that_ended_leaves_in_order_and_takes_no_module_apart():
+    done = subprocess.run(
+        [sys.executable, "-c", "import atexit, sys\nfrom denseface.__main__ import run\n"
+         "from denseface.service.commands import status\n"
+         "class Module:\n    def __del__(self): print('apart')\n"
+         "sys.module = Module()\n"
+         "status.run = lambda args: bool(atexit.register(print, 'left')) + 2\n"
+         "sys.exit(run())", "status"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (3, "left\n", "")
+
+
 @pytest.mark.parametrize(("stderr", "prefix"), [("/dev/full", ""), (os.devnull, " 2>&-")])
 @pytest.mark.parametrize(("command", "status"), [
     ("status --address tcp://127.0.0.1:1 --wait 0.01", 1), ("status --wait never", 2)])
