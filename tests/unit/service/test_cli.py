@@ -227,10 +227,10 @@ def test_a_reader_that_leaves_is_no_error():
 
 def test_a_command_that_ended_leaves_in_order_and_takes_no_module_apart():
     done = subprocess.run(
-        [sys.executable, "-c", "import atexit, sys\nfrom denseface.__main__ import run\n"
+        [sys.executable, "-c", "import atexit, os, sys\nfrom denseface.__main__ import run\n"
          "from denseface.service.commands import status\n"
-         "class Module:\n    def __del__(self): print('apart')\n"
-         "sys.module = Module()\n"
+         "class Module:\n    def __del__(self, say=os.write): say(1, b'apart')\n"
+         "module = Module()\n"
          "status.run = lambda args: bool(atexit.register(print, 'left')) + 2\n"
          "sys.exit(run())", "status"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (3, "left\n", "")
