@@ -20,9 +20,10 @@ from bench.objects import KINDS, Seen, Thing, make_thing, seen_by
 from denseface.capture import RgbdFrame, open_source
 from denseface.capture.npz import load_frame
 from denseface.recon import reconstruct
-from denseface.recon.detection import REJECTED
+from denseface.recon.detection import REJECTED, detect_face
 from denseface.recon.errors import ReconstructionError
 from denseface.recon.face import Box
+from denseface.recon.registration import register
 from tests.simulator import KINECT_CALIBRATED, Person, Scene, shared_folder, simulate
 from tests.simulator.depth_noise import KINECT_V1
 from tests.simulator.shift import depth_to_shift, quantize
@@ -168,7 +169,11 @@ def _with_color(color: Bytes, seen: Seen, rng: np.random.Generator) -> Bytes:
 
 def _outcome(frame: RgbdFrame) -> tuple[str, str, float]:
     """Reconstruct: `face`, `none by its shape` or `nothing`; what was said; the face's depth."""
+    sparse = slice(None, None, 4)
     try:
+        # As the pipeline does; but without its look at the images turned.
+        detect_face(frame.rgb, register(frame, sparse, sparse, colors=False),
+                    frame.calibration.color.fx)
         face = reconstruct(frame)
     except ReconstructionError as error:
         judged = any(one.verdict == REJECTED for one in error.candidates)

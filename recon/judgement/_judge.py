@@ -16,8 +16,8 @@ _STEP_MM = 4.0
 _FEWEST_POINTS = 80
 """Fewer show no relief; the least that `check_face` lets pass are three times as many."""
 
-_WEIGHTS = np.array((3.10, 2.82, 2.69, -4.11, -0.64, -1.23, -2.51))
-_BIAS = 0.82
+_WEIGHTS = np.array((3.47, 2.61, 2.30, -4.29, -0.67, -1.15, -2.70))
+_BIAS = 1.25
 """Of `Likeness.figures`, for the logarithm of the odds: a logistic regression by
 `bench/judgement.py` on faces of the choosing heads and on things that are none."""
 LEAST_SCORE = 0.5

@@ -15,13 +15,15 @@ __all__ = ["mean_face", "placements"]
 
 _YAWS, _ROLLS = np.radians(np.arange(-60.0, 61.0, 20.0)), np.radians((-28.0, 0.0, 28.0))
 """Turns to start from, rad."""
+_UPRIGHT, _ALL = slice(1, 2), slice(None)
+"""Which of the rolls are tried first, and then."""
 _SHIFTS_MM = (-20.0, 0.0, 20.0)
 """How far up or down the face, by the mean face, its part that is seen may lie."""
 _FEW, _SOME = 60, 250
 """Points for the search, and for the last steps."""
-_FIRST, _THEN = 3, 3
-"""Of the cheapest starts, how many are refined first, to give one placement; and how many
-placements are given of all, where that will not do."""
+_EACH, _THEN = 2, 3
+"""Starts of each yaw that are refined where the first placement will not do, and how many
+placements are given then, for each of two scales."""
 _ALIKE_RAD = 0.35
 """Placements that are turned by less from each other are one."""
 _FAR_MM, _NEAR_MM = 6.0, 3.0
@@ -61,27 +63,28 @@ def placements(points: Doubles) -> Iterator[Doubles]:
     few, some = (points[::max(1, len(points) // count)].copy() for count in (_FEW, _SOME))
     low, high = np.percentile(points[:, 1], _ENDS)
     scale = min(max((high - low) / _HEIGHT_MM, _SCALES[0]), _SCALES[1])
-    starts = _ordered(few, points, scale)
-    yield from _refined(few, some, starts[:_FIRST], 1)
-    smaller = _ordered(few, points, _SMALLER * scale)
-    yield from _refined(few, some, np.concatenate([starts, smaller]), _THEN)
+    yield from _refined(few, some, _starts_on(few, points, scale, 1, _UPRIGHT), 1)
+    for factor in (1.0, _SMALLER):
+        yield from _refined(few, some, _starts_on(few, points, factor * scale, _EACH), _THEN)
 
 
 def _front(points: Doubles, scale: float = 1.0) -> Doubles:
-    """Give the middle of what of points, (n, 3), lies no farther behind their front than eyes."""
+    """Give the middle of those of points, (n, 3), that lie a little behind the nearest at most."""
     depth = points[:, 2]
     front = np.percentile(depth, _FRONT_PERCENT)
     return np.asarray(points[depth < front + scale * _FRONT_MM].mean(axis=0))
 
 
-def _ordered(few: Doubles, points: Doubles, scale: float) -> Doubles:
-    """Give the best start of each yaw, the cheapest first."""
-    starts = _starts().copy()
+def _starts_on(
+    few: Doubles, points: Doubles, scale: float, each: int, rolls: slice = _ALL
+) -> Doubles:
+    """Give so many starts of each yaw, with some of the rolls, that are cheapest after a step."""
+    starts = _starts()[:, rolls].reshape(-1, 13).copy()
     starts[:, 9:12] = _front(points, scale) - scale * starts[:, 9:12]
     starts[:, 12] = scale
     costs = refine(mean_face(), few, starts, 1, _FAR_MM).reshape(len(_YAWS), -1)
-    best = costs.argmin(axis=1) + costs.shape[1] * np.arange(len(_YAWS))
-    return np.asarray(starts[best[np.argsort(costs.min(axis=1), kind="stable")]])
+    best = np.argsort(costs, axis=1, kind="stable")[:, :each]
+    return np.asarray(starts[(best + costs.shape[1] * np.arange(len(_YAWS))[:, None]).ravel()])
 
 
 def _refined(few: Doubles, some: Doubles, tried: Doubles, most: int) -> Iterator[Doubles]:
@@ -101,7 +104,7 @@ def _refined(few: Doubles, some: Doubles, tried: Doubles, most: int) -> Iterator
 
 @cache
 def _starts() -> Doubles:
-    """Give rows like placements, with the middle of what is seen of the mean face for the shift."""
+    """Give (yaws, rolls, shifts, 13): placements with the middle of what is seen for a shift."""
     mould = mean_face()
     angles = mould.first_angle + mould.angle_step * np.arange(mould.radius.shape[1])
     heights = mould.first_height + mould.height_step * np.arange(mould.radius.shape[0])
@@ -119,7 +122,7 @@ def _starts() -> Doubles:
             middle = _front(seen @ turn.T)
             rows += [[*turn.ravel(), *(middle - turn @ (0, shift, 0)), 1.0]
                      for shift in _SHIFTS_MM]
-    return np.array(rows)
+    return np.array(rows).reshape(len(_YAWS), len(_ROLLS), len(_SHIFTS_MM), 13)
 
 
 def _about_y(angle: float) -> Doubles:
