@@ -6,7 +6,7 @@ Unconstrained Environment".
 
 import time
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import fields
 from functools import cache, partial
 from importlib.metadata import version
 from typing import Any
@@ -17,19 +17,17 @@ import numpy as np
 from denseface.arguments import expect
 from denseface.capture.doubts import doubts_of
 from denseface.capture.frame import FrameOrigin, RgbdFrame
-from denseface.capture.rotation import ROTATIONS, rotate_frame
 from denseface.recon.arrays import Floats
-from denseface.recon.detection import REJECTED, Detection, detect_face, look_for_faces
+from denseface.recon.detection import REJECTED
 from denseface.recon.errors import (
     ImpossibleFrameError,
-    NoDepthError,
     NoFaceError,
     ReconstructionError,
     TooLittleDepthError,
 )
 from denseface.recon.face import Face, FaceCandidate, PointCloud, Report
+from denseface.recon.finding import Found, find_another, find_face
 from denseface.recon.fitting import surface_of
-from denseface.recon.intermediate import Registration
 from denseface.recon.judgement import (
     LEAST_SCORE,
     SURE_SCORE,
@@ -40,7 +38,7 @@ from denseface.recon.judgement import (
 from denseface.recon.numerics.threads import one_blas_thread
 from denseface.recon.openings import Openings, openings
 from denseface.recon.propagation import densify, noise_fraction
-from denseface.recon.registration import register, sample_colors, with_shaded_depth
+from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import box_window, segment_face
 from denseface.recon.settings import Settings
 from denseface.recon.surface import MIN_SEEDS, mean_spacing
@@ -56,10 +54,6 @@ _TRIES = 3
 """So many boxes are shaped, at most, until one is a face for sure."""
 _DOUBTFUL = "a face, perhaps"
 """Verdict on a box that was looked past for a surer one."""
-_SPARSE = 4
-"""Every so many pixels are enough to find a face and weigh its depth."""
-_TURNED_LOOKS, _FARTHEST_MM = (0, 4), 1300.0
-"""How faces are looked for in turned images: by the coarse and the medium pass, no farther."""
 _MUCH_SKEW_US = 33_000
 """A whole frame at 30 frames a second: the face may have moved in between."""
 
@@ -118,44 +112,33 @@ def ends_the_same(error: Exception) -> bool:
 
 
 def _reconstruct(frame: RgbdFrame, settings: Settings, clock: "_Stopwatch") -> Face:
-    colored = frame.color is not None
-    if not colored:
-        frame, settings = with_shaded_depth(frame), settings.model_copy(update={"shading": False})
-    overview = _overview(frame)
-    clock.lap("overview")
-    found = _detect(frame, overview)
-    clock.lap("detection")
-    return _surest(frame, overview, found, clock,
-                   partial(_shape, frame, settings, clock, overview, colored=colored))
+    found = find_face(frame, clock.lap)
+    return _surest(found, clock, partial(_shape, settings, clock))
 
 
-def _surest(
-    frame: RgbdFrame, overview: Registration, found: Detection, clock: "_Stopwatch",
-    shape: Callable[[Detection], Face],
-) -> Face:
+def _surest(found: Found, clock: "_Stopwatch", shape: Callable[[Found], Face]) -> Face:
     """Shape what was found; where that is no face, or may be none, what else is found, too."""
     best: Face | None = None
     refusals: list[ReconstructionError] = []
     passed: tuple[FaceCandidate, ...] = ()
     while len(passed) < _TRIES:
-        verdict = _DOUBTFUL
+        verdict, candidates = _DOUBTFUL, found.detection.candidates
         try:
-            face = shape(replace(found, candidates=found.candidates + passed))
+            face = shape(found.among(candidates + passed))
             best = face if best is None else max(best, face, key=_score)
             if _score(best) >= SURE_SCORE:
                 break
         except NoFaceError as error:
             verdict = REJECTED
-            error.candidates = _first_is(verdict, found.candidates) + passed
+            error.candidates = _first_is(verdict, candidates) + passed
             refusals.append(error)
         except ReconstructionError as error:
-            error.candidates = found.candidates + passed
+            error.candidates = candidates + passed
             refusals.append(error)
             break
-        passed += _first_is(verdict, found.candidates[:1])
+        passed += _first_is(verdict, candidates[:1])
         try:
-            found = detect_face(frame.rgb, overview, frame.calibration.color.fx,
-                                tuple(one.box for one in passed))
+            found = find_another(found, tuple(one.box for one in passed))
         except ReconstructionError:
             break
         clock.lap("detection")
@@ -172,18 +155,18 @@ def _score(face: Face) -> float:
     return face.report.face_score or 0.0
 
 
-def _shape(
-    frame: RgbdFrame, settings: Settings, clock: "_Stopwatch", overview: Registration,
-    found: Detection, *, colored: bool,
-) -> Face:
+def _shape(settings: Settings, clock: "_Stopwatch", found: Found) -> Face:
     """Go on from the face's box."""
+    frame, box = found.frame, found.detection.box
+    if not found.colored:
+        settings = settings.model_copy(update={"shading": False})
     focal_px = frame.calibration.color.fx
-    registered = register(frame, *box_window(overview, found.box))
-    coarse = check_steps(registered.points[registered.valid][:, 2], found.depth_mm)
+    registered = register(frame, *box_window(found.overview, box))
+    coarse = check_steps(registered.points[registered.valid][:, 2], found.detection.depth_mm)
     clock.lap("registration")
-    seeds = segment_face(registered, found.box, focal_px)
+    seeds = segment_face(registered, box, focal_px)
     _check_seeds(seeds.points)
-    check_face(seeds.points, 1 / (frame.depth_camera.fx * frame.depth_camera.fy), found.box)
+    check_face(seeds.points, 1 / (frame.depth_camera.fx * frame.depth_camera.fy), box)
     clock.lap("segmentation")
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     clock.lap("neighbors")
@@ -193,43 +176,25 @@ def _shape(
     score, like = judge_shape(surface)
     clock.lap("judgement")
     if like:
-        raise NoFaceError(f"no face found: what the box at {found.box} shows is {like} "
+        raise NoFaceError(f"no face found: what the box at {box} shows is {like} "
                           f"(score {score:.2f}, a face has {LEAST_SCORE} or more)")
     dense = densify(seeds, surface, spacing, settings.ratio, noise_fraction(settings), sampler)
     left_open = openings(dense)
     clock.lap("propagation")
     initial = PointCloud(seeds.points, seeds.colors)
     report = Report(
-        face_box=found.box, candidates=found.candidates,
+        face_box=box, candidates=found.detection.candidates,
         initial_points=len(initial), dense_points=len(dense),
         mean_spacing_mm=spacing, r0_mm=settings.r0_factor * spacing, noise_mm=surface.noise,
         face_score=score,
         timings_ms=clock.timings_ms(), settings=settings,
         calibration=frame.calibration_origin, skew_us=frame.skew_us,
-        colored=colored, registered=frame.registered and colored,
+        colored=found.colored, registered=frame.registered and found.colored,
         depth_unit_um=frame.depth_meaning.unit_um,
         depth_rounding=frame.depth_meaning.rounding, **_of_origin(frame.origin),
-        version=_version(), warnings=_warnings(frame, len(initial), coarse, left_open,
-                                               colored=colored),
+        version=_version(), warnings=_warnings(found, len(initial), coarse, left_open),
     )
     return Face(initial, dense, report)
-
-
-def _detect(frame: RgbdFrame, overview: Registration) -> Detection:
-    """Find the face; where there is none, say so if there is one in the turned images."""
-    try:
-        return detect_face(frame.rgb, overview, frame.calibration.color.fx)
-    except NoFaceError as error:
-        for degrees in ROTATIONS[1:]:
-            turned = rotate_frame(frame, degrees)
-            seen = _overview(turned)
-            if any(look_for_faces(turned.rgb, seen, turned.calibration.color.fx, look,
-                                  _FARTHEST_MM).faces for look in _TURNED_LOOKS):
-                hinting = NoFaceError(f"{error}; there is one when the images are turned by "
-                                      f"{degrees} degrees (--rotate {degrees})")
-                hinting.candidates = error.candidates
-                raise hinting from error
-        raise
 
 
 def _of_origin(origin: FrameOrigin) -> dict[str, Any]:
@@ -249,39 +214,32 @@ def _check_seeds(points: Floats) -> None:
                                    "across: is the calibration right?")
 
 
-def _overview(frame: RgbdFrame) -> Registration:
-    """Register every k-th pixel, or all where none of those has a depth."""
-    sparse = slice(None, None, _SPARSE)
-    try:
-        return register(frame, sparse, sparse, colors=False)
-    except NoDepthError:
-        return register(frame, colors=False)
-
-
 @cache
 def _version() -> str:
     return version("denseface")
 
 
 def _warnings(
-    frame: RgbdFrame, seeds: int, coarse: str, left_open: Openings, *, colored: bool
+    found: Found, seeds: int, coarse: str, left_open: Openings
 ) -> tuple[str, ...]:
-    found = [*frame.origin.notes, *filter(None, [coarse])]
+    frame = found.frame
+    warnings = [*frame.origin.notes, *filter(None, [coarse])]
     # Who read the frame from somewhere was told; who made it was not.
-    found += [doubt for doubt in doubts_of(frame.calibration, frame.registered or not colored)
-              if doubt not in found]
-    if not colored:
-        found.append("the sensor has no colour camera: the face is shaded grey")
+    in_one_image = frame.registered or not found.colored
+    warnings += [doubt for doubt in doubts_of(frame.calibration, in_one_image)
+                 if doubt not in warnings]
+    if found.warning:
+        warnings.append(found.warning)
     if seeds < _FEW_SEEDS:
-        found.append(f"only {seeds} seeds: the face is far away or mostly unmeasured")
+        warnings.append(f"only {seeds} seeds: the face is far away or mostly unmeasured")
     if left_open.holes:
         width, height = left_open.largest_mm
-        found.append(f"{left_open.holes} hole{'s' * (left_open.holes > 1)} in the surface left "
-                     f"open, up to {width:.1f} x {height:.1f} mm: the depth around steps too far "
-                     "for one surface")
+        warnings.append(f"{left_open.holes} hole{'s' * (left_open.holes > 1)} in the surface left "
+                        f"open, up to {width:.1f} x {height:.1f} mm: the depth around steps too "
+                        "far for one surface")
     if abs(frame.skew_us) > _MUCH_SKEW_US:
-        found.append(f"depth and colour were taken {frame.skew_us / 1000:.1f} ms apart")
-    return tuple(found)
+        warnings.append(f"depth and colour were taken {frame.skew_us / 1000:.1f} ms apart")
+    return tuple(warnings)
 
 
 class _Stopwatch:

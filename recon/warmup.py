@@ -7,7 +7,7 @@ import numpy as np
 
 from denseface.capture.calibration import Calibration, CameraModel
 from denseface.capture.frame import RgbdFrame
-from denseface.recon.detection import detect_face, judge_box
+from denseface.recon.detection import detect_by_depth, detect_face, judge_box
 from denseface.recon.errors import NoFaceError
 from denseface.recon.fitting import surface_of
 from denseface.recon.judgement import judge_shape
@@ -49,6 +49,8 @@ def _run_every_stage() -> None:
     registered = register(frame)
     with suppress(NoFaceError):  # not even OpenCV sees one
         detect_face(frame.rgb, registered, _FOCAL_PX)
+    with suppress(NoFaceError):
+        detect_by_depth(frame, registered)
     judge_box(_BOX, registered, _FOCAL_PX)
     seeds = segment_face(registered, _BOX, _FOCAL_PX)
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)

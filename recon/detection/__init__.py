@@ -1,5 +1,6 @@
 """Stage 2: the face in the colour image, by Haar cascades, confirmed by its depth."""
 
+from denseface.recon.detection._by_depth import detect_by_depth
 from denseface.recon.detection._detect import (
     FACE_WIDTH_MM,
     REJECTED,
@@ -16,4 +17,4 @@ from denseface.recon.detection._follow import (
 )
 
 __all__ = ["FACE_WIDTH_MM", "REJECTED", "Detection", "Followed", "Looked", "close_face",
-           "detect_face", "follow_face", "judge_box", "look_for_faces"]
+           "detect_by_depth", "detect_face", "follow_face", "judge_box", "look_for_faces"]

@@ -240,11 +240,7 @@ class Search:
         found = hit.face
         refined = [c for c in self._refine(hit) if c.verdict == "face"]
         chosen = max(refined, key=lambda c: c.box[2]) if refined else found
-        others = sorted((c for c in self.candidates if c is not found), key=_depth)
-        candidates = (chosen.model_copy(update={"verdict": "chosen"}), *(
-            c.model_copy(update={"verdict": "farther"}) if c.verdict == "face" else c
-            for c in others))
-        return Detection(chosen.box, _depth(chosen), candidates)
+        return detection_of(chosen, [c for c in self.candidates if c is not found])
 
     def failure(self) -> NoFaceError | FaceWithoutDepthError:
         """Say why there is no face; what looks like one is sought in the whole image."""
@@ -253,25 +249,7 @@ class Search:
         self.candidates += self._run(
             self.gray, (0, 0, width, height), _WHOLE_IMAGE, typical, (0.0, float(height)),
             CenterMask(np.ones((1, 1), np.bool_), float(width)))
-        error = self._why_none()
-        error.candidates = tuple(self.candidates)
-        return error
-
-    def _why_none(self) -> NoFaceError | FaceWithoutDepthError:
-        if not self.candidates:
-            return NoFaceError("no face found in the colour image")
-        measured = [c for c in self.candidates if c.depth_mm is not None]
-        if not measured:
-            return FaceWithoutDepthError(
-                f"face seen at {self.candidates[0].box}, but no depth was measured on it")
-        if measured[-1].verdict in (_FLAT, REJECTED):
-            return NoFaceError(
-                f"no face found: what the box at {measured[-1].box} shows is "
-                f"{measured[-1].verdict}")
-        least, most = FACE_WIDTH_MM
-        return NoFaceError(
-            f"no face found: the box at {measured[-1].box} is {measured[-1].width_mm:.0f} mm wide "
-            f"at its depth, a face is {least:.0f}-{most:.0f} mm")
+        return why_none(self.candidates, "in the colour image")
 
     def _refine(self, hit: _Hit) -> list[FaceCandidate]:
         """Give the boxes of a face's size at its depth, about the centre of the one found."""
@@ -318,9 +296,51 @@ class Search:
         return [self._judge(_resized(_scaled(box, self.to_color), narrower)) for box in boxes]
 
     def _judge(self, box: Box) -> FaceCandidate:
-        judged = judge_box(box, self.registered, self.focal_px)
-        again = any(_same_thing(box, other) for other in self.rejected)
-        return judged.model_copy(update={"verdict": REJECTED}) if again else judged
+        return judge_new(box, self.registered, self.focal_px, self.rejected)
+
+
+def judge_new(
+    box: Box, registered: Registration, focal_px: float, rejected: tuple[Box, ...]
+) -> FaceCandidate:
+    """Judge a box as `judge_box` does; what was rejected before stays so."""
+    judged = judge_box(box, registered, focal_px)
+    again = any(_same_thing(box, other) for other in rejected)
+    return judged.model_copy(update={"verdict": REJECTED}) if again else judged
+
+
+def detection_of(chosen: FaceCandidate, others: list[FaceCandidate]) -> Detection:
+    """Give the result: the chosen face, and every other box that was judged."""
+    candidates = (chosen.model_copy(update={"verdict": "chosen"}), *(
+        c.model_copy(update={"verdict": "farther"}) if c.verdict == "face" else c
+        for c in sorted(others, key=_depth)))
+    return Detection(chosen.box, _depth(chosen), candidates)
+
+
+def why_none(
+    candidates: list[FaceCandidate], where: str
+) -> NoFaceError | FaceWithoutDepthError:
+    """Give the error of a frame without a face, with all that was judged."""
+    error = _why_none(candidates, where)
+    error.candidates = tuple(candidates)
+    return error
+
+
+def _why_none(
+    candidates: list[FaceCandidate], where: str
+) -> NoFaceError | FaceWithoutDepthError:
+    if not candidates:
+        return NoFaceError(f"no face found {where}")
+    measured = [c for c in candidates if c.depth_mm is not None]
+    if not measured:
+        return FaceWithoutDepthError(
+            f"face seen at {candidates[0].box}, but no depth was measured on it")
+    box, width_mm, verdict = measured[-1].box, measured[-1].width_mm, measured[-1].verdict
+    if verdict in (_FLAT, REJECTED):
+        return NoFaceError(f"no face found: what the box at {box} shows is {verdict}")
+    least, most = FACE_WIDTH_MM
+    return NoFaceError(
+        f"no face found: the box at {box} is {width_mm:.0f} mm wide at its depth, a face is "
+        f"{least:.0f}-{most:.0f} mm")
 
 
 def _same_thing(box: Box, rejected: Box) -> bool:

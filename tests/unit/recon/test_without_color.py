@@ -35,11 +35,44 @@ def test_colours_are_the_shades_of_the_relief(depth_alone):
 
 
 @pytest.mark.parametrize("person", [
-    Person("ict_neutral", 600, yaw=15), Person("mh_cauc_m", 1000, pitch=8)])
+    Person("ict_neutral", 600, yaw=45), Person("mh_cauc_m", 1000, pitch=8)])
 def test_turned_near_and_far(person):
     shot = simulate(Scene((person,)), seed=3)[0]
     face = reconstruct(replace(shot.frame, color=None))
     assert measure(face, shot.truth, shot.frame).mean_mm < 1.0
+
+
+def in_the_dark(frame, noise: float):
+    noise = np.random.default_rng(3).normal(0, noise, frame.rgb.shape)
+    return replace(frame, color=np.clip(np.rint(0.01 * frame.rgb + noise), 0, 255).astype(np.uint8))
+
+
+def test_where_colour_is_too_dark_the_face_is_found_by_depth_and_grey(shot, depth_alone):
+    found, alone = reconstruct(in_the_dark(shot.frame, 4.0)), reconstruct(depth_alone)
+    assert not found.report.colored
+    assert any("too dark to show a face" in warning for warning in found.report.warnings)
+    np.testing.assert_array_equal(found.dense.points, alone.dense.points)
+    np.testing.assert_array_equal(found.dense.colors, alone.dense.colors)
+
+
+def test_nobody_is_found_in_the_dark_where_nobody_is(shot):
+    wall = np.full_like(shot.frame.depth, 900)
+    with pytest.raises(NoFaceError):
+        reconstruct(in_the_dark(replace(shot.frame, depth=wall), 4.0))
+
+
+@pytest.mark.parametrize("brightness", [60, 150])
+def test_depth_does_not_overrule_a_bright_picture_that_shows_no_face(shot, brightness):
+    flat = np.full_like(shot.frame.rgb, brightness)
+    with pytest.raises(NoFaceError, match="in the colour image"):
+        reconstruct(replace(shot.frame, color=flat))
+
+
+def test_nor_a_dark_one_that_shows_something(shot):
+    stripes = np.zeros_like(shot.frame.rgb)
+    stripes[:, ::64] = stripes[:, 1::64] = stripes[:, 2::64] = 200
+    with pytest.raises(NoFaceError, match="in the colour image"):
+        reconstruct(replace(shot.frame, color=stripes))
 
 
 def test_nobody_is_found_in_an_empty_room():
