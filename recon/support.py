@@ -12,7 +12,7 @@ from denseface.recon.errors import ImpossibleFrameError
 from denseface.recon.numerics.bilinear import exceeds
 from denseface.recon.numerics.filters import blurred
 from denseface.recon.numerics.jit import compiled
-from denseface.recon.numerics.morphology import binary_fill_holes, disc
+from denseface.recon.numerics.morphology import binary_fill_holes, dilated, disc, eroded
 from denseface.recon.numerics.scatter import occupancy, xy_bounds
 
 __all__ = ["Support"]
@@ -32,6 +32,14 @@ _EVEN_PX = 3
 """The same, in pixels of the image that is filtered; more change nothing."""
 _GROWTH = 1.0
 """How far the support may grow into bays of the outline, mean spacings."""
+_NARROW_MM = 5.5
+"""Narrower tongues of the support go, and narrower bays are closed: 5 mm, and what a grid may
+be off."""
+_NARROW_PART = 0.08
+"""Where seeds are few: half of that width, at most, as a part of the side of a square of their
+area."""
+_ISLAND_SHARE = 0.15
+"""What a cut leaves beside the largest part goes below this share of its area: an ear, or hair."""
 
 _MAX_PLACES = 2**25
 """Of a grid; a face of a million seeds has a third of it."""
@@ -78,16 +86,20 @@ class Support:
         margin = _broadly_blurred(closed, even) - np.float32(least)
         most = cv2.dilate(closed, disc(_GROWTH * _FINENESS))
         grown = cls(xs, ys, step, seeded, margin, pixels - least).without(most == 0)
-        return grown._without_holes()
+        return grown._evened()
 
-    def _without_holes(self) -> Self:
-        """Give the support with what it encloses: bays, too, whose mouth is evened out."""
+    def _evened(self) -> Self:
+        """Give the support with what it encloses, and without narrow bays and tongues.
+
+        It encloses bays, too, whose mouth is evened out.
+        """
         above = (self.margin > self.level).view(np.uint8)
-        enclosed = binary_fill_holes(above) > above
-        if not enclosed.any():
-            return self
-        # Twice the level: what lies between two points that are above it is so, too.
-        return replace(self, margin=np.where(enclosed, np.float32(2 * self.level), self.margin))
+        radius = _narrow(above, self.step)
+        wide = np.pad(above, radius)
+        # Closed, then opened.
+        broad = dilated(eroded(dilated(wide, radius), 2 * radius), radius)
+        whole = binary_fill_holes(broad)[radius:, radius:]
+        return replace(self, margin=_reshaped(self.margin, whole, self.level))
 
     @property
     def inside(self) -> Bools:
@@ -106,6 +118,18 @@ class Support:
     def without(self, removed: Bools) -> Self:
         """Remove some of the grid's points, up to half of the way to the next."""
         return replace(self, margin=_without(self.margin, removed, self.level))
+
+    def cut(self, removed: Bools) -> Self:
+        """Remove some of the grid's points, and what that leaves of tongues and islands."""
+        left = self.without(removed)
+        above = (left.margin > self.level).view(np.uint8)
+        radius = _narrow(above, self.step)
+        broad = dilated(eroded(above, radius), radius)
+        _, parts = cv2.connectedComponents(broad)
+        areas = np.bincount(parts.ravel())
+        dropped = areas < _ISLAND_SHARE * areas[1:].max(initial=0)
+        dropped[0] = True
+        return left.without(dropped[parts] & (above > 0))
 
     def coordinates(self, xs: Doubles, ys: Doubles) -> tuple[Floats, Floats]:
         """Turn x and y, (k,), (m,) mm, into fractional columns and rows, clipped to the grid."""
@@ -126,6 +150,11 @@ class Support:
         """Say which points of a grid are supported: (k,), (m,) mm, to (m, k)."""
         columns, rows = self.coordinates(xs, ys)
         return exceeds(self.margin, rows, columns, self.level)
+
+
+def _narrow(mask: Bytes, step: float) -> int:
+    """Give the radius, points of the grid, of the disc into which what is narrow does not go."""
+    return int(min(_NARROW_MM / 2 / step, _NARROW_PART * math.sqrt(np.count_nonzero(mask))))
 
 
 def _broadly_blurred(image: Bytes, sigma: float) -> Floats:
@@ -165,4 +194,20 @@ def _without(margin: Floats, removed: Bools, level: float) -> Floats:
         value = flat[i]
         less = min(middle - abs(value - middle), np.float32(0))
         given[i] = less if mask[i] else value
+    return out
+
+
+@compiled
+def _reshaped(margin: Floats, whole: Bytes, level: float) -> Floats:
+    """Give a support's margin above its level where `whole` is not 0, and nowhere else."""
+    out = margin.copy()
+    middle = np.float32(level)
+    for row in range(margin.shape[0]):
+        for column in range(margin.shape[1]):
+            value = margin[row, column]
+            if whole[row, column] and value <= middle:
+                # Twice the level: what lies between two points that are above it is so, too.
+                out[row, column] = 2 * middle
+            elif value > middle and not whole[row, column]:
+                out[row, column] = min(2 * middle - value, np.float32(0))
     return out

@@ -1,5 +1,6 @@
 """Binary morphology: discs, holes, openings; the pixels of an image under a mask."""
 
+import math
 from typing import TypeVar
 
 import cv2
@@ -8,9 +9,10 @@ from numpy.typing import NDArray
 
 from denseface.recon.arrays import Bools, Bytes, Ints
 
-__all__ = ["binary_fill_holes", "disc", "enclosed_parts", "large_components", "opened",
-           "select_pixels"]
+__all__ = ["binary_fill_holes", "dilated", "disc", "enclosed_parts", "eroded",
+           "large_components", "opened", "select_pixels"]
 
+_CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 _Kind = TypeVar("_Kind", bound=np.generic)
 
 
@@ -24,6 +26,27 @@ def disc(radius: float) -> Bytes:
     reach = int(radius)
     steps = np.arange(-reach, reach + 1)
     return (steps[:, None] ** 2 + steps**2 <= radius * radius).astype(np.uint8)
+
+
+def dilated(image: Bytes, radius: int) -> Bytes:
+    """Dilate by an octagon of that radius, pixels: (H, W) uint8, 0 or 1, to the same.
+
+    By a square and then by a lozenge, which together take half the time of a disc.
+    """
+    square, lozenge = _octagon(radius)
+    return np.asarray(cv2.dilate(cv2.dilate(image, square), _CROSS, iterations=lozenge), np.uint8)
+
+
+def eroded(image: Bytes, radius: int) -> Bytes:
+    """Erode by the same; beyond the image's edge the area goes on."""
+    square, lozenge = _octagon(radius)
+    return np.asarray(cv2.erode(cv2.erode(image, square), _CROSS, iterations=lozenge), np.uint8)
+
+
+def _octagon(radius: int) -> tuple[Bytes, int]:
+    """Split a radius: a square, and so many times a cross."""
+    square = round(radius * (math.sqrt(2) - 1))
+    return np.ones((2 * square + 1, 2 * square + 1), np.uint8), radius - square
 
 
 def binary_fill_holes(image: Bytes) -> Bytes:

@@ -47,7 +47,7 @@ def without_bridges(
     opened = cv2.dilate(cv2.erode(bridge.view(np.uint8), kernel), kernel, anchor=(0, 0))
     if not opened.any():
         return inside
-    kept = support.without(np.asarray(opened > 0)).sampled(*axes)
+    kept = support.cut(np.asarray(opened > 0)).sampled(*axes)
     labels, parts = enclosed_parts(~kept)
     for label, left, top, width, height in parts.tolist():
         box = np.s_[top:top + height, left:left + width]

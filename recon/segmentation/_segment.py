@@ -8,14 +8,15 @@ stay where they touch it; glasses, hands, walls, shoulders and other people may 
 import cv2
 import numpy as np
 
-from denseface.recon.arrays import Bools, Bytes, Floats
+from denseface.recon.arrays import Bools, Floats
 from denseface.recon.errors import FaceWithoutDepthError
 from denseface.recon.face import Box, Seeds
 from denseface.recon.intermediate import Registration
-from denseface.recon.numerics.morphology import binary_fill_holes, large_components, opened
+from denseface.recon.numerics.morphology import large_components
 from denseface.recon.numerics.percentile import percentile
 from denseface.recon.segmentation._depth_kmeans import split_depths
 from denseface.recon.segmentation._edge_colors import seed_colors
+from denseface.recon.segmentation._outline import smooth_outline, solid
 from denseface.recon.segmentation._region_kernels import (
     FloodLimits,
     nearest_pixel,
@@ -93,15 +94,9 @@ _FINGER_MM = 5.0
 _SHADOW_MM = 8.0
 """Width of the unmeasured shadow that it casts on the face."""
 
-_BAY_MM = 16.0
-"""Narrower bays of the outline are unmeasured spots at its edge, and are closed."""
 _EAR = 0.35
 """Bays farther sideways from the centre than this, and less up or down, box widths, stay open:
 they part an ear from the face."""
-_SPUR_MM = 30.0
-"""Narrower parts of a face are ear, hair, or the frayed edge of depth, and are dropped."""
-_ISLAND_SHARE = 0.15
-"""Parts cut off from the largest are dropped below this share of its area: an ear, or hair."""
 
 
 def segment_face(registered: Registration, box: Box, focal_px: float) -> Seeds:
@@ -126,7 +121,7 @@ def segment_face(registered: Registration, box: Box, focal_px: float) -> Seeds:
     pixels = np.stack([row + np.int32(registered.rows.start or 0),
                        column + np.int32(registered.columns.start or 0)], axis=1)
     return Seeds(registered.points.reshape(-1, 3)[at],
-                 seed_colors(registered, face, _solid(face)), pixels)
+                 seed_colors(registered, face, solid(face)), pixels)
 
 
 def box_window(registered: Registration, box: Box) -> tuple[slice, slice]:
@@ -217,7 +212,7 @@ def grow_face(registered: Registration, cluster: Bools, box: Box, focal_px: floa
     trim_to_profile(
         face, z, registered.pixels, front, center, axis,
         (width * _PROFILE_BELOW, min(max(box_mm, _BOX_MM[0]), _BOX_MM[1]) * _PROFILE_BEHIND))
-    return face & _smooth_outline(face | occluders, registered.valid & ~face, start,
+    return face & smooth_outline(face | occluders, registered.valid & ~face, start,
                                   _EAR * box_mm * px_per_mm, px_per_mm)
 
 
@@ -270,34 +265,3 @@ def _central_pixel(registered: Registration, mask: Bools, box: Box) -> tuple[int
     if row < 0:
         raise FaceWithoutDepthError("no depth was measured where the colour camera sees the face")
     return row, column
-
-
-def _smooth_outline(
-    face: Bools, other: Bools, middle: tuple[int, int], ear_px: float, px_per_mm: float
-) -> Bools:
-    """The face's area without spurs and islands.
-
-    other : measured, but not of the face: at a depth edge the sensor sets pixels to either side
-    middle : (row, column)
-    """
-    side = 2 * round(_BAY_MM * px_per_mm / 2) + 1
-    closed = cv2.morphologyEx(
-        face.view(np.uint8), cv2.MORPH_CLOSE, np.ones((side, side), np.uint8)).view(bool)
-    top, left, bottom, right = (max(round(place + way), 0) for way in (-ear_px, ear_px)
-                                for place in middle)
-    closed[top:bottom, :left] = closed[top:bottom, right:] = False
-    area = _solid(face | (closed & ~other))
-    # Half the pixels each way: so much detail is enough, in a fourth of the time.
-    half = np.asarray(
-        cv2.dilate(area, np.ones((2, 2), np.uint8), anchor=(0, 0))[::2, ::2], np.uint8, order="C")
-    _, parts = cv2.connectedComponents(opened(half, _SPUR_MM * px_per_mm / 4), connectivity=4)
-    areas = np.bincount(parts.ravel())
-    areas[0] = 0
-    kept = ((areas > 0) & (areas >= _ISLAND_SHARE * areas.max()))[parts]
-    return np.asarray(kept.repeat(2, axis=0).repeat(2, axis=1)[:face.shape[0], :face.shape[1]])
-
-
-def _solid(face: Bools) -> Bytes:
-    """The face's area with its holes filled, (H, W) uint8, 0 or 1."""
-    closed = cv2.morphologyEx(face.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    return binary_fill_holes(np.asarray(closed, np.uint8))

@@ -32,7 +32,8 @@ class DepthView:
     lit : (H, W) bool, the projector sees it too
     slant : (H, W) float32, cosine between the surface's normal and the ray
     albedo : (H, W) float32, how light the target's head is, 0-1 linear, 0 off it
-    on_head : (H, W, 3) float32, mm, the target head's frame, NaN off it
+    on_head : (H, W, 3) float32, mm, the target head's frame, NaN off it and its hair
+    hair : (H, W) bool, the target's hair or beard
     """
 
     camera: CameraModel
@@ -42,6 +43,7 @@ class DepthView:
     slant: NDArray[np.float32]
     albedo: NDArray[np.float32]
     on_head: NDArray[np.float32]
+    hair: NDArray[np.bool_]
 
 
 def depth_view(scene: Scene, sensor: KinectModel) -> DepthView:
@@ -67,7 +69,7 @@ def _depth_view(scene: Scene, sensor: KinectModel) -> DepthView:
         camera=camera, depth=depth.reshape(shape), labels=world.labels(hits).reshape(shape),
         lit=lit.reshape(shape), slant=slant.reshape(shape).astype(np.float32),
         albedo=world.colors(hits, head_only=True).mean(axis=1).reshape(shape),
-        on_head=world.on_head(hits).reshape(*shape, 3),
+        on_head=world.on_head(hits).reshape(*shape, 3), hair=world.on_hair(hits).reshape(shape),
     )
 
 

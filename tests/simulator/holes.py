@@ -11,6 +11,10 @@ __all__ = ["hole_share"]
 
 _DARK = 0.035
 """Linear albedo below which little of the pattern comes back."""
+_HAIR, _BEARD = 0.6, 0.3
+"""How likely a sample of hair has no depth, and one of a beard, which is shorter."""
+_NECK, _THROAT_MM = 0.85, 4.0
+"""The same of a neck in the shade of a chin, but for a strip of so many mm half width."""
 
 
 def hole_share(
@@ -53,7 +57,11 @@ def hole_share(
                   (22, marks.hairline[0] + 28), (0, marks.chin[0] - 14))
         for (cx, cy), (dx, dy) in zip(places, centres, strict=True):
             spot(cx + 8 * dx, cy + 6 * dy, 9 * level, 7 * level, level, across=x)
-        hair = ~face & (y < marks.hairline[0] + 5)
-        np.maximum(on, 0.6 * level * hair, out=on)
+        painted = ~face & (y < marks.hairline[0] + 5)
+        np.maximum(on, 0.6 * level * painted, out=on)
+    hair = view.hair[rows, columns]
+    if hair.any():
+        on[(y > marks.chin[0] + 4) & (side > _THROAT_MM)] = _NECK
+        on[hair] = np.where(y[hair] > marks.nose_tip[0] + 12, _BEARD, _HAIR)
     share[rows, columns] = on
     return share

@@ -32,6 +32,9 @@ class Person:
     glasses: bool = False
     hand: bool = False
     """A hand before chin and cheek."""
+    hair: bool = False
+    """Dark hair with a fringe and locks before the ears; less than half of it gives a depth."""
+    beard: bool = False
 
     @property
     def rotation(self) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tests.simulator import body, room
 from tests.simulator.caster import Caster
+from tests.simulator.hair import beard, hair
 from tests.simulator.heads import Head, load_head
 from tests.simulator.labels import Label
 from tests.simulator.scene import Person, Scene
@@ -58,6 +59,8 @@ class _Part:
     head: Head | None
     """The head whose surface this is."""
     target: bool
+    strands: bool
+    """Hair, or a beard."""
 
 
 class World:
@@ -123,12 +126,19 @@ class World:
     def on_head(self, hits: Hits) -> Floats:
         """Give the hit points in the target head's own frame, mm at the mesh's scale.
 
-        (n, 3) float32, NaN off the target's head.
+        (n, 3) float32, NaN off the target's head and hair.
         """
         out = np.full((len(hits.part), 3), np.nan, np.float32)
         for part, chosen, triangle, weights in self._each(hits):
-            if part.head is not None and part.target:
+            if (part.head is not None or part.strands) and part.target:
                 out[chosen] = _points(part.surface, triangle, weights)
+        return out
+
+    def on_hair(self, hits: Hits) -> NDArray[np.bool_]:
+        """Say which rays met the target's hair or beard, (n,)."""
+        out = np.zeros(len(hits.part), bool)
+        for part, chosen, _, _ in self._each(hits):
+            out[chosen] = part.strands and part.target
         return out
 
     def _each(
@@ -148,6 +158,10 @@ class World:
                       scale=person.scale, target=target, **more)
 
         add(head, R, t, Label.HEAD, gain=person.skin_gain, head=head)
+        if person.hair:
+            add(hair(head, marks), R, t, Label.HEAD, strands=True)
+        if person.beard:
+            add(beard(head, marks), R, t, Label.HEAD, strands=True)
         if person.shoulders:
             half, y, z, depth = marks.neck
             base = R @ np.array([0, y, z])
@@ -160,10 +174,10 @@ class World:
 
     def _add(self, surface: Surface, rotation: NDArray[np.float64], shift: NDArray[np.float64],
              label: Label, *, scale: float = 1.0, gain: tuple[float, float, float] = (1, 1, 1),
-             head: Head | None = None, target: bool = False) -> None:
+             head: Head | None = None, target: bool = False, strands: bool = False) -> None:
         placed = (scale * surface.vertices @ rotation.T + shift).astype(np.float32)
         normals = (surface.normals @ rotation.T).astype(np.float32)
-        self.parts.append(_Part(surface, placed, normals, label, gain, head, target))
+        self.parts.append(_Part(surface, placed, normals, label, gain, head, target, strands))
 
 
 @lru_cache(maxsize=4)

@@ -58,6 +58,37 @@ def test_a_bay_whose_mouth_closes_leaves_no_hole(mouth):
         np.testing.assert_array_equal(support, binary_fill_holes(support))
 
 
+@pytest.mark.parametrize(("width", "stays"), [(4, False), (12, True)])
+def test_a_tongue_goes_and_an_ear_stays(width, stays):
+    head = disc_seeds(1.0, 40)
+    ear = disc_seeds(1.0, 70)
+    ear = ear[(np.abs(ear[:, 1]) < width / 2) & (ear[:, 0] > 35) & (ear[:, 0] < 58)]
+    inside, _ = supported(np.concatenate([head, ear]), 1.0)
+    assert inside[:, 0].max() > 55 if stays else inside[:, 0].max() < 46  # but for its root
+    assert len(inside) * 0.1 > 0.97 * np.pi * 40**2
+
+
+def test_a_narrow_bay_and_a_pin_hole_are_closed():
+    points = disc_seeds(1.0, 40)
+    x, y, _ = points.T
+    bay = (x > 25) & (np.abs(y) < 2)
+    pin = np.hypot(x + 10, y - 5) < 1.5
+    whole, support = (Support.of(some, 1.0).on_grid(0.3)[2]
+                      for some in (points, points[~bay & ~pin]))
+    assert support.sum() == pytest.approx(whole.sum(), rel=0.005)  # of which the bay is 0.012
+    np.testing.assert_array_equal(support, binary_fill_holes(support.astype(np.uint8)))
+
+
+def test_a_cut_leaves_no_tongue_and_no_island():
+    support = Support.of(disc_seeds(1.0, 40), 1.0)
+    x = np.broadcast_to(support.xs, support.margin.shape)
+    cut = support.cut((np.abs(x - 28) < 1) | (np.abs(x - 24) < 1))
+    before, after = support.margin > support.level, cut.margin > cut.level
+    assert before[x > 23].sum() > 2000
+    assert not after[x > 23].any()
+    assert (after != before)[x < 22].sum() < 30  # its corners
+
+
 def test_two_parts_are_not_joined():
     parts = [disc_seeds(1.0, 12) + np.float32((x, 0, 0)) for x in (-15, 15)]
     inside, _ = supported(np.concatenate(parts), 1.0)

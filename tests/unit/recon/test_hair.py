@@ -1,0 +1,19 @@
+"""A head with hair, of which the sensor sees less than half: the face has an even outline."""
+
+from denseface.recon import reconstruct
+from tests.outlines import outline_faults
+from tests.simulator import KINECT_CALIBRATED, Label, Person, Scene, measure, simulate
+
+
+def test_hair_leaves_no_tongues_islands_or_pin_holes():
+    scene = Scene((Person(distance_mm=650, hair=True),), holes=1.0)
+    shot, = simulate(scene, KINECT_CALIBRATED, seed=5)
+    hair = shot.truth.points[shot.truth.labels == Label.HEAD]
+    assert len(hair) > 20_000
+    face = reconstruct(shot.frame)
+    faults = outline_faults(face.dense)
+    assert (faults.tongues, faults.islands, faults.holes) == (0, 0, 0)
+    assert faults.bays_mm2 < 20
+    accuracy = measure(face, shot.truth, shot.frame)
+    assert accuracy.lost < 0.01
+    assert accuracy.covered > 0.95
