@@ -182,7 +182,7 @@ def _hand(rng: np.random.Generator) -> tuple[Solid, float]:
         parts.append(_capsule((at, -44, 0), np.array([at, -44, 0]) + long * way, 9.0))
     parts.append(_capsule((-40, 15, -4), (-75, -25, -25 * rng.uniform(0, 1)), 10.5))
     parts.append(_capsule((0, 40, 0), (0, 180, 0), 27.0))
-    return _joined(parts, 8.0), 200.0
+    return _joined(parts, 8.0), 215.0
 
 
 def _head(rng: np.random.Generator) -> tuple[Solid, float]:
@@ -193,7 +193,7 @@ def _head(rng: np.random.Generator) -> tuple[Solid, float]:
     parts += [_ellipsoid((9, 30, 17), (side * half[0], 8, 25)) for side in (-1, 1)]
     if rng.random() < 0.3:
         parts.append(_ellipsoid((32, 36, 40), (0, -10, -half[2])))  # a bun, a tail
-    return _rough(_joined(parts, 15.0), rng, rng.uniform(0, 4), rng.uniform(20, 60)), 210.0
+    return _rough(_joined(parts, 15.0), rng, rng.uniform(0, 4), rng.uniform(20, 60)), 270.0
 
 
 def _lumps(rng: np.random.Generator) -> tuple[Solid, float]:

@@ -192,7 +192,8 @@ def _shape(settings: Settings, clock: "_Stopwatch", found: Found) -> Face:
         colored=found.colored, registered=frame.registered and found.colored,
         depth_unit_um=frame.depth_meaning.unit_um,
         depth_rounding=frame.depth_meaning.rounding, **_of_origin(frame.origin),
-        version=_version(), warnings=_warnings(found, len(initial), coarse, left_open),
+        version=_version(),
+        warnings=_warnings(found, len(initial), coarse, left_open, score),
     )
     return Face(initial, dense, report)
 
@@ -220,7 +221,7 @@ def _version() -> str:
 
 
 def _warnings(
-    found: Found, seeds: int, coarse: str, left_open: Openings
+    found: Found, seeds: int, coarse: str, left_open: Openings, score: float
 ) -> tuple[str, ...]:
     frame = found.frame
     warnings = [*frame.origin.notes, *filter(None, [coarse])]
@@ -237,6 +238,9 @@ def _warnings(
         warnings.append(f"{left_open.holes} hole{'s' * (left_open.holes > 1)} in the surface left "
                         f"open, up to {width:.1f} x {height:.1f} mm: the depth around steps too "
                         "far for one surface")
+    if score < SURE_SCORE:
+        warnings.append(f"its shape is not surely a face's (score {score:.2f}): is it one, all of "
+                        "it, and do depth and colour belong together?")
     if abs(frame.skew_us) > _MUCH_SKEW_US:
         warnings.append(f"depth and colour were taken {frame.skew_us / 1000:.1f} ms apart")
     return tuple(warnings)
