@@ -4,15 +4,19 @@ import os
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import platformdirs
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from denseface.service.errors import SettingsError, first_error
+from denseface.service.errors import FrameTooLargeError, SettingsError, first_error
 from denseface.service.runtime.parsing import parse_loopback_address, parse_retention
 
-__all__ = ["ServiceSettings", "default_address", "given_settings", "runtime_folder"]
+if TYPE_CHECKING:
+    from denseface.capture import Calibration
+
+__all__ = ["ServiceSettings", "check_frame_size", "default_address", "given_settings",
+           "runtime_folder"]
 
 _PREFIX = "DENSEFACE_"
 _MESSAGE_PIXELS = 2**25 // 3
@@ -126,3 +130,20 @@ class ServiceSettings(BaseModel):
             name = field.partition(".")[0]
             where = f"--{name.replace('_', '-')}" if name in flags else _PREFIX + name.upper()
             raise SettingsError(f"{where}: {message}") from error
+
+
+def check_frame_size(cameras: "Calibration", most: int) -> None:
+    """Check the cameras of a frame before anything is made of it.
+
+    Its reconstruction takes time and memory in proportion to its pixels.
+
+    Raises
+    ------
+    FrameTooLargeError
+        Where its depth or colour image has more than `most` pixels.
+    """
+    for name, camera in (("depth", cameras.depth), ("color", cameras.color)):
+        if camera.width * camera.height > most:
+            raise FrameTooLargeError(
+                f"{name} has {camera.width} x {camera.height} pixels, at most {most} allowed "
+                f"({_PREFIX}MAX_FRAME_PIXELS)")

@@ -26,13 +26,13 @@ from denseface.service.daemons.sensor import SensorReader
 from denseface.service.errors import FrameTooLargeError
 from denseface.service.log.output import exit_now
 from denseface.service.protocol import messages
-from denseface.service.protocol.payload import PreviewHeader, check_frame_size
+from denseface.service.protocol.payload import PreviewHeader
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.supervisor_link import SupervisorLink
-from denseface.service.settings import ServiceSettings
+from denseface.service.settings import ServiceSettings, check_frame_size
 from denseface.service.transport.hub_connection import HubConnection
 
 __all__ = ["run", "sensor_name"]
@@ -180,7 +180,7 @@ class _Capture:
     def _taken(self, capture_id: str, frame: RgbdFrame) -> None:
         failpoint("capture.frame.taken")
         try:
-            check_frame_size(frame, self.settings.max_frame_pixels)
+            check_frame_size(frame.calibration, self.settings.max_frame_pixels)
         except FrameTooLargeError as error:
             self._no_frame(capture_id, str(error))
             return

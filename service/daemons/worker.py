@@ -19,14 +19,14 @@ from denseface.service.log.output import exit_now
 from denseface.service.protocol import messages
 from denseface.service.protocol.message_base import MAX_JOBS
 from denseface.service.protocol.packing import warm_packing
-from denseface.service.protocol.payload import Arrays, FaceHeader, check_frame_size
+from denseface.service.protocol.payload import Arrays, FaceHeader
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.collection import collect_from_now_on
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.supervisor_link import Beat, SupervisorLink
-from denseface.service.settings import ServiceSettings
+from denseface.service.settings import ServiceSettings, check_frame_size
 from denseface.service.transport.addresses import check_connectable
 from denseface.service.transport.connection import Credentials
 from denseface.service.transport.hub_connection import HubConnection
@@ -207,5 +207,5 @@ class _Worker:
 
 def _reconstruct(job: messages.Job, arrays: Arrays, max_pixels: int) -> Face:
     failpoint("worker.job.computing")
-    check_frame_size(job.frame, max_pixels)
+    check_frame_size(job.frame.calibration, max_pixels)
     return reconstruct(job.frame.join(arrays), job.settings)

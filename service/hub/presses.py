@@ -17,11 +17,11 @@ from denseface.service.hub.withdrawn import Withdrawn
 from denseface.service.monitoring import Rejections
 from denseface.service.protocol import messages
 from denseface.service.protocol.outgoing import Output, send
-from denseface.service.protocol.payload import check_frame_size
 from denseface.service.protocol.states import CaptureEvent, CaptureState
 from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.bounded_dict import BoundedDict
 from denseface.service.runtime.failpoints import failpoint
+from denseface.service.settings import check_frame_size
 from denseface.service.storage import PendingWrite, WriteResult
 
 _MIB = 2**20
@@ -229,7 +229,7 @@ class Presses:
                 capture_id=capture_id, message="another sensor was asked"))
             return
         try:
-            check_frame_size(message.frame, self._settings.max_frame_pixels)
+            check_frame_size(message.frame.calibration, self._settings.max_frame_pixels)
         except FrameTooLargeError as error:
             yield send(peer, messages.FrameRefused(capture_id=capture_id, message=str(error)))
             yield from self._refuse(capture_id, "sensor", str(error))

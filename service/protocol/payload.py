@@ -31,12 +31,7 @@ from denseface.capture import (
     RgbdFrame,
 )
 from denseface.recon.face import Face, PointCloud, Report
-from denseface.service.errors import (
-    FrameTooLargeError,
-    LocalProtocolError,
-    RemoteProtocolError,
-    first_error,
-)
+from denseface.service.errors import LocalProtocolError, RemoteProtocolError, first_error
 from denseface.service.protocol.hint import Hint
 from denseface.service.protocol.jpeg import jpeg_size
 from denseface.service.protocol.packing import PackedCloud, pack, unpack
@@ -182,24 +177,6 @@ class FrameHeader(_PayloadHeader):
                     self.source))
         except (CaptureError, KeyError) as error:
             raise RemoteProtocolError(f"frame: {error}") from error
-
-
-def check_frame_size(frame: RgbdFrame | FrameHeader, most: int) -> None:
-    """Check a frame before anything is made of it.
-
-    Its reconstruction takes time and memory in proportion to its pixels.
-
-    Raises
-    ------
-    FrameTooLargeError
-        Where its depth or colour image has more than `most` pixels.
-    """
-    cameras = frame.calibration
-    for name, camera in (("depth", cameras.depth), ("color", cameras.color)):
-        if camera.width * camera.height > most:
-            raise FrameTooLargeError(
-                f"{name} has {camera.width} x {camera.height} pixels, at most {most} allowed "
-                "(DENSEFACE_MAX_FRAME_PIXELS)")
 
 
 class FaceHeader(_PayloadHeader):

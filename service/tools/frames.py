@@ -12,7 +12,7 @@ from denseface.capture.errors import CaptureError, UnreadableSourceError
 from denseface.capture.image_pair import FolderSource, ImagePairSource, PairReading
 from denseface.capture.source import is_folder_of_pairs
 from denseface.service.errors import FrameTooLargeError, UsageError
-from denseface.service.protocol.payload import check_frame_size
+from denseface.service.settings import check_frame_size
 
 __all__ = ["FrameChoice", "NumberedFrame", "UnreadFrame", "each_frame", "read_frame",
            "read_image_pair"]
@@ -76,7 +76,7 @@ def read_frame(path: str, number: int, choice: FrameChoice) -> NumberedFrame:
                              f"{number}")
         frames: list[RgbdFrame] = []
         for frame in islice(_frames_from(source, number), burst):
-            check_frame_size(frame, choice.max_pixels)
+            check_frame_size(frame.calibration, choice.max_pixels)
             frames.append(frame)
     if not frames:
         raise UsageError(f"{path}: has fewer than {number + 1} pairs of depth and colour")
@@ -125,7 +125,7 @@ def _next(
     """Read the next frame; StopIteration where there is none."""
     try:
         frame = next(frames)
-        check_frame_size(frame, max_pixels)
+        check_frame_size(frame.calibration, max_pixels)
     except (CaptureError, FrameTooLargeError) as error:
         return UnreadFrame(number, count, str(error))
     return NumberedFrame(number, count, frame)
