@@ -10,7 +10,7 @@ import numpy as np
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.rotation import ROTATIONS, rotate_frame
 from denseface.recon.arrays import Floats
-from denseface.recon.detection import Detection, detect_by_depth, detect_face, look_for_faces
+from denseface.recon.detection import Detection, detect_by_depth, detect_face, turned_by
 from denseface.recon.errors import (
     FaceWithoutDepthError,
     NoDepthError,
@@ -26,8 +26,6 @@ __all__ = ["Found", "find_another", "find_face"]
 
 _SPARSE = 4
 """Every so many pixels are enough to find a face and weigh its depth."""
-_TURNED_LOOKS, _FARTHEST_MM = (0, 4), 1300.0
-"""How faces are looked for in turned images: by the coarse and the medium pass, no farther."""
 
 _DARK, _DARK_SHARE = 48.0, 0.02
 """Grey below which a picture is dark, and share of the readings that must be so for a second look
@@ -84,7 +82,7 @@ def find_face(frame: RgbdFrame, lap: Callable[[str], None]) -> Found:
     try:
         found = _find(frame, overview, ())
     except NoFaceError as error:
-        _hint_at_turned(frame, error)
+        _hint_at_turned(frame, overview, error)
         raise
     lap("detection")
     return found
@@ -157,23 +155,23 @@ def _tells_nothing(gray: Floats, box: Box) -> bool:
     return bool(bright - dark < max(_LEAST_CONTRAST, _LEAST_TO_NOISE * noise))
 
 
-def _hint_at_turned(frame: RgbdFrame, error: NoFaceError) -> None:
+def _hint_at_turned(frame: RgbdFrame, overview: Registration, error: NoFaceError) -> None:
     """Raise an error that says so, where the turned images show a face."""
-    for degrees in ROTATIONS[1:]:
-        if _shows_face(rotate_frame(frame, degrees)):
-            hinting = NoFaceError(f"{error}; there is one when the images are turned by "
-                                  f"{degrees} degrees (--rotate {degrees})")
-            hinting.candidates = error.candidates
-            raise hinting from error
+    if frame.color is None:
+        degrees = next((turn for turn in ROTATIONS[1:] if _has_shape(rotate_frame(frame, turn))),
+                       None)
+    else:
+        degrees = turned_by(frame.rgb, overview, frame.calibration.color.fx)
+    if degrees is not None:
+        hinting = NoFaceError(f"{error}; there is one when the images are turned by "
+                              f"{degrees} degrees (--rotate {degrees})")
+        hinting.candidates = error.candidates
+        raise hinting from error
 
 
-def _shows_face(frame: RgbdFrame) -> bool:
-    overview = _overview(frame)
-    if frame.color is not None:
-        return any(look_for_faces(frame.rgb, overview, frame.calibration.color.fx, look,
-                                  _FARTHEST_MM).faces for look in _TURNED_LOOKS)
+def _has_shape(frame: RgbdFrame) -> bool:
     try:
-        detect_by_depth(frame, overview, ahead_only=True)
+        detect_by_depth(frame, _overview(frame), ahead_only=True)
     except NoFaceError:
         return False
     return True

@@ -14,7 +14,9 @@ from denseface.recon.detection._follow import (
     close_face,
     follow_face,
     look_for_faces,
+    turned_by,
 )
 
 __all__ = ["FACE_WIDTH_MM", "REJECTED", "Detection", "Followed", "Looked", "close_face",
-           "detect_by_depth", "detect_face", "follow_face", "judge_box", "look_for_faces"]
+           "detect_by_depth", "detect_face", "follow_face", "judge_box", "look_for_faces",
+           "turned_by"]

@@ -13,6 +13,10 @@ _GROUP_EPS = 0.2
 """How much boxes of one face may differ, as a share of their size: OpenCV's default."""
 
 
+_WHOLE = 1e-6
+"""A side that is larger than a whole number of pixels by no more is of so many."""
+
+
 class CascadePass(NamedTuple):
     """Which cascade runs, at which resolution, in which orientation."""
 
@@ -93,7 +97,8 @@ def _rotated(image: Bytes, degrees: float) -> tuple[Bytes, Doubles]:
     height, width = image.shape
     transform = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), degrees, 1.0)
     c, s = abs(transform[0, 0]), abs(transform[0, 1])
-    columns, rows = int(np.ceil(width * c + height * s)), int(np.ceil(width * s + height * c))
+    columns, rows = (int(np.ceil(side - _WHOLE)) for side in
+                     (width * c + height * s, width * s + height * c))
     transform[:, 2] += (columns - width) / 2, (rows - height) / 2
     rotated = cv2.warpAffine(image, transform, (columns, rows), flags=cv2.INTER_LINEAR,
                              borderMode=cv2.BORDER_REPLICATE)

@@ -10,8 +10,9 @@ import numpy as np
 from denseface.recon.arrays import Bytes
 from denseface.recon.detection._cascades import CascadePass, CenterMask, run_pass
 from denseface.recon.detection._contrast import equalize_contrast
+from denseface.recon.detection._head_regions import depth_cells, head_regions
 from denseface.recon.detection._kernels import depths_in_box
-from denseface.recon.detection._regions import CELLS, Region, regions_by_depth, without_flat
+from denseface.recon.detection._regions import CELLS, Region
 from denseface.recon.detection._relief import bulge_mm
 from denseface.recon.errors import FaceWithoutDepthError, NoFaceError
 from denseface.recon.face import Box, FaceCandidate
@@ -31,29 +32,26 @@ _ALT2, _PROFILE = "haarcascade_frontalface_alt2", "haarcascade_profileface"
 _PROFILE_WIDER = 1.09
 """A profile cascade's box by a frontal one's around the same head."""
 
-COARSE = CascadePass(_ALT2, 28.0, 1.18, 3)
-"""At a third of a Kinect's resolution for a face at 0.8 m."""
-MEDIUM = CascadePass(_ALT2, 42.0)
+STRAIGHT = CascadePass(_ALT2, 36.0, 1.1, 3)
+"""At two fifths of a Kinect's resolution for a face at 0.8 m."""
+FINE = CascadePass(_ALT2, 48.0, 1.1, 3)
 """At half of it."""
-_FINE = CascadePass(_ALT2, 60.0, 1.07)
-"""At two thirds of it."""
-ROLLED = tuple(CascadePass(_ALT2, 36.0, 1.15, 3, roll=degrees) for degrees in (-30, 30, -15, 15))
+TIPPED = tuple(CascadePass(_ALT2, 36.0, 1.15, 3, roll=degrees) for degrees in (-25.0, 25.0))
 """For tipped heads."""
-PROFILES = tuple(CascadePass(_PROFILE, 34.0, 1.05, 6, mirrored=way) for way in (False, True))
+PROFILES = tuple(CascadePass(_PROFILE, 34.0, 1.05, 3, mirrored=way) for way in (False, True))
 """For turned heads, either way."""
-_WHOLE_IMAGE = CascadePass(_ALT2, 28.0, 1.2, 3)
-"""Where no pass found a face, to name what looks like one."""
+_WHOLE_IMAGE, _WHOLE_SHRINK = CascadePass(_ALT2, 28.0, 1.2, 3), 4.0
+"""Where no pass saw anything, to name what looks like a face where depth allows none; and how much
+the image is shrunk for it."""
 
-_PASSES = (COARSE, MEDIUM, *ROLLED, *PROFILES, _FINE)
-"""Until depth confirms a face. `COARSE` finds most, the others what is turned, tipped or lit from
+_PASSES = (STRAIGHT, *TIPPED, *PROFILES, FINE)
+"""Until depth confirms a face. `STRAIGHT` finds most, the others what is tipped, turned or lit from
 the side."""
-_EQUALIZED_PASSES = (COARSE, MEDIUM, *ROLLED, _FINE)
+_EQUALIZED_PASSES = (FINE, *TIPPED)
 """Then, in equalised images, for faces in the dark, before a bright wall or lit aslant. The profile
 cascade takes the back of an ear for a face there."""
-_NEARER_PASSES = (MEDIUM, *ROLLED[:2], *PROFILES)
-"""For what stands before a face that was found."""
-_NEARER_EQUALIZED_PASSES = (MEDIUM, *ROLLED[:2], _FINE)
-"""The same in equalised images."""
+_NEARER_PASSES = (FINE, *TIPPED, *PROFILES)
+"""For what stands before a face that was found; then `_EQUALIZED_PASSES`."""
 _NEARER_MM = 10.0
 """What is nearer than the face by this is searched again."""
 _BODY_MM = 100.0
@@ -70,6 +68,8 @@ _REFINED_SHIFT = 0.1
 """How far their centres may be from the box's own, each way, by its width."""
 _MAX_WIDTH_PX = 640
 """Wider images are shrunk: cascades were trained on faces of 20-24 pixels and gain nothing."""
+_SAMPLE_STEP = 3
+"""Every so many pixels tell how bright a region is at its depth."""
 _CENTER = 0.5
 """Of a box, each way: where a face has depth."""
 _MIN_CENTER_SHARE = 0.1
@@ -122,8 +122,6 @@ def detect_face(
             hit = search.nearest_face(one, search.regions, equalized=equalized)
             if hit:
                 return search.detection(search.nearer_face(hit.face) or hit)
-            if one is COARSE and not equalized:
-                search.regions = search.without_flat(search.regions)
     raise search.failure()
 
 
@@ -186,12 +184,9 @@ class Search:
         self.gray = np.asarray(gray, np.uint8)
         self.to_color = color.shape[1] / gray.shape[1]
         self.shape = color.shape[:2]
-        self.regions = regions_by_depth(registered, self.shape, focal_px)
+        self.cells = depth_cells(registered, self.shape, focal_px)
+        self.regions = head_regions(self.cells)
         self._equalized: dict[tuple[Box, float, float], Bytes] = {}
-
-    def without_flat(self, regions: list[Region]) -> list[Region]:
-        """Keep only where depth bulges."""
-        return without_flat(regions, self.registered, self.shape, self.focal_px)
 
     def nearest_face(
         self, cascade_pass: CascadePass, regions: Iterable[Region], *, equalized: bool = False
@@ -219,16 +214,19 @@ class Search:
 
     def nearer_face(self, found: FaceCandidate) -> _Hit | None:
         """Search, by other passes, what stands before a face and is not its own body."""
-        nearer = regions_by_depth(self.registered, self.shape, self.focal_px,
-                                  _depth(found) - _NEARER_MM)
         x, y, w, h = (side * CELLS / self.shape[1] for side in found.box)
         left, top, right, bottom = (max(round(side), 0) for side in (x, y, x + w, y + h))
-        for region in nearer:
-            region.centers[top:bottom, left:right] = False
+        nearer = []
+        for region in self.regions:
+            if region.near_mm > _depth(found) - _NEARER_MM:
+                break
+            centers = region.centers & (self.cells.nearest < _depth(found) - _NEARER_MM)
+            centers[top:bottom, left:right] = False
             if region.far_mm > _depth(found) - _BODY_MM:
-                region.centers[bottom:, max(round(x - w / 2), 0):round(x + 1.5 * w)] = False
-        nearer = self.without_flat(nearer)
-        for equalized, passes in ((False, _NEARER_PASSES), (True, _NEARER_EQUALIZED_PASSES)):
+                centers[bottom:, max(round(x - w / 2), 0):round(x + 1.5 * w)] = False
+            if centers.any():
+                nearer.append(region._replace(centers=centers))
+        for equalized, passes in ((False, _NEARER_PASSES), (True, _EQUALIZED_PASSES)):
             for one in passes if nearer else ():
                 hit = self.nearest_face(one, nearer, equalized=equalized)
                 if hit and _depth(hit.face) < _depth(found):
@@ -244,11 +242,12 @@ class Search:
 
     def failure(self) -> NoFaceError | FaceWithoutDepthError:
         """Say why there is no face; what looks like one is sought in the whole image."""
-        height, width = (round(side * self.to_color) for side in self.gray.shape)
-        typical = 3 * _WHOLE_IMAGE.face_px * self.to_color
-        self.candidates += self._run(
-            self.gray, (0, 0, width, height), _WHOLE_IMAGE, typical, (0.0, float(height)),
-            CenterMask(np.ones((1, 1), np.bool_), float(width)))
+        if not self.candidates:
+            height, width = (round(side * self.to_color) for side in self.gray.shape)
+            typical = _WHOLE_SHRINK * _WHOLE_IMAGE.face_px * self.to_color
+            self.candidates += self._run(
+                self.gray, (0, 0, width, height), _WHOLE_IMAGE, typical, (0.0, float(height)),
+                CenterMask(np.ones((1, 1), np.bool_), float(width)))
         return why_none(self.candidates, "in the colour image")
 
     def _refine(self, hit: _Hit) -> list[FaceCandidate]:
@@ -274,13 +273,13 @@ class Search:
         """Give the image with a region's contrast equalised by what lies at its depth."""
         key = (region.roi, region.near_mm, region.far_mm)
         if key not in self._equalized:
-            depth = self.registered.color_depth
-            at_depth = (self.registered.visible & (depth >= region.near_mm)
-                        & (depth < region.far_mm))
-            u, v = (self.registered.pixels[at_depth] / np.float32(self.to_color)).astype(np.int32).T
             x, y, w, h = roi = _scaled(region.roi, 1 / self.to_color)
-            inside = (u >= x) & (u < x + w) & (v >= y) & (v < y + h)
-            samples = self.gray[v[inside], u[inside]]
+            rows, columns = np.ogrid[y:y + h:_SAMPLE_STEP, x:x + w:_SAMPLE_STEP]
+            cell = self.gray.shape[1] / CELLS
+            depth = self.cells.nearest[(rows / cell).astype(np.intp),
+                                       (columns / cell).astype(np.intp)]
+            at_depth = (depth >= region.near_mm) & (depth < region.far_mm)
+            samples = self.gray[y:y + h:_SAMPLE_STEP, x:x + w:_SAMPLE_STEP][at_depth]
             self._equalized[key] = equalize_contrast(self.gray, roi, samples)
         return self._equalized[key]
 

@@ -11,21 +11,26 @@ import numpy as np
 
 from denseface.recon.arrays import Bytes
 from denseface.recon.detection._cascades import CenterMask, run_pass
-from denseface.recon.detection._detect import COARSE, MEDIUM, PROFILES, ROLLED, Search
-from denseface.recon.detection._regions import CELLS, Region, regions_by_depth
+from denseface.recon.detection._detect import FINE, PROFILES, STRAIGHT, TIPPED, Search
+from denseface.recon.detection._head_regions import head_regions
+from denseface.recon.detection._regions import CELLS, Region
 from denseface.recon.face import FaceCandidate
 from denseface.recon.intermediate import Registration
 
-_SEARCHES = (COARSE, PROFILES[0], COARSE, PROFILES[1], MEDIUM, ROLLED[0], COARSE, ROLLED[1])
+_SEARCHES = (STRAIGHT, PROFILES[0], STRAIGHT, PROFILES[1], FINE, TIPPED[0], STRAIGHT, TIPPED[1])
 """The passes in turn: a face that looks at the camera waits for no more than two frames."""
-_FOLLOWING = COARSE._replace(face_px=36.0, scale_step=1.1, min_neighbors=2)
-"""Where a face is known to be, less evidence and smaller steps are enough."""
+_FOLLOWING = STRAIGHT._replace(min_neighbors=2)
+"""Where a face is known to be, less evidence is enough."""
 _FOLLOWED_SHIFT = 0.6
 """How far the centre of a face may be from where it was, by the width of its box."""
 _FOLLOWED_DEPTH = 0.15
 """How far its depth may be from what it was, as a share."""
 _FOLLOWED_MARGIN = 1.3
 """Half the side of the part of the image that is searched, by the width of the box."""
+_TURNED, _TURNED_MM = STRAIGHT._replace(face_px=34.0, scale_step=1.12), 1300.0
+"""How faces are looked for in the images turned by quarters, and no farther than that."""
+_CLOSE = STRAIGHT._replace(face_px=28.0, scale_step=1.18)
+"""A face that is too near fills the image."""
 _CLOSE_WIDTHS = 0.3, 1.0
 """Narrowest box of a face that is too near, by the image's width, and widest, by its height: at
 400 mm a Kinect's image is 490 mm wide."""
@@ -71,8 +76,7 @@ def look_for_faces(
         Where nothing measured lies before the colour camera.
     """
     search = Search(color, registered, focal_px)
-    regions = search.without_flat(
-        regions_by_depth(registered, search.shape, focal_px, farthest_mm))
+    regions = head_regions(search.cells, farthest_mm)
     one = _SEARCHES[turn % len(_SEARCHES)]
     found = [face for region in regions for face in search.faces_in(one, region)]
     return Looked(_each_once(found), one not in PROFILES, bool(regions))
@@ -97,6 +101,19 @@ def follow_face(
     return None
 
 
+def turned_by(color: Bytes, registered: Registration, focal_px: float) -> int | None:
+    """Give by how many degrees, clockwise, the images are to be turned for a face to be seen.
+
+    Parameters are those of `detect_face`; None where no quarter turns show a face.
+    """
+    search = Search(color, registered, focal_px)
+    near = [region for region in search.regions if region.near_mm < _TURNED_MM]
+    for degrees in (90, 180, 270):
+        if search.nearest_face(_TURNED._replace(roll=-float(degrees)), near):
+            return degrees
+    return None
+
+
 def close_face(color: Bytes) -> bool:
     """Say whether the image shows a face so wide that it must be too near for any depth.
 
@@ -106,7 +123,7 @@ def close_face(color: Bytes) -> bool:
     height, width = gray.shape
     limits = _CLOSE_WIDTHS[0] * width, _CLOSE_WIDTHS[1] * height
     everywhere = CenterMask(np.ones((1, 1), np.bool_), float(max(width, height)))
-    return bool(run_pass(gray, (0, 0, width, height), COARSE, limits[0], limits, everywhere))
+    return bool(run_pass(gray, (0, 0, width, height), _CLOSE, limits[0], limits, everywhere))
 
 
 def _around(last: FaceCandidate, depth_mm: float, shape: tuple[int, int]) -> Region:

@@ -26,6 +26,10 @@ _THRESHOLD_SLACK = 1e-5
 """What OpenCV takes off a stage's threshold for rounding."""
 _FULL_STEP_SCALE = 2.0
 """From this scale on, windows are tried at every pixel; below at every second, as in OpenCV."""
+_STRIDE_STEP = 32
+"""Rows of integral images are as long as a multiple of that, so that few lengths occur."""
+_MOST_GRIDS = 64
+"""Grids whose offsets are kept: 0.2 MB each."""
 _MAX_NODES = 2
 """Nodes of a tree."""
 
@@ -38,6 +42,8 @@ class Cascade(NamedTuple):
     trees: Trees
     corners: Ints
     """(nodes, 12, 2), (x, y) of the corners of each node's three rectangles."""
+    offsets: dict[WindowGrid, Sizes]
+    """Those corners in the integral images of the grids that were asked for so far."""
 
 
 @cache
@@ -77,7 +83,7 @@ def load_cascade(name: str) -> Cascade:
               np.cumsum([0, *map(len, stages)]).astype(np.uint32),
               (_numbers(*(_child(stage, "stageThreshold") for stage in _child(root, "stages")))
                - _THRESHOLD_SLACK).astype(np.float32)),
-        corners.astype(np.int32))
+        corners.astype(np.int32), {})
 
 
 def passing_boxes(
@@ -98,8 +104,7 @@ def passing_boxes(
     height, width = gray.shape
     smallest, largest = size_limits
     found = []
-    stride = width + 1 + (width + 1) % 2
-    offsets: dict[int, Sizes] = {}
+    stride = -(-(width + 1) // _STRIDE_STEP) * _STRIDE_STEP
     scale = 1.0
     while (side := round(cascade.window * scale)) <= min(largest, height, width):
         if side >= smallest:
@@ -110,14 +115,21 @@ def passing_boxes(
             enlarge = np.array(
                 [[scale, 0, (scale - 1) / 2], [0, scale, (scale - 1) / 2], [0, 0, 1]])
             grid = WindowGrid(cascade.window, 1 if scale >= _FULL_STEP_SCALE else 2, stride)
-            if grid.step not in offsets:
-                offsets[grid.step] = corner_offsets(cascade.corners, grid)
-            windows = passing_windows(small, cascade.trees, offsets[grid.step], grid,
+            windows = passing_windows(small, cascade.trees, _offsets(cascade, grid), grid,
                                       to_cells @ enlarge, allowed)
             found += [(round(x * scale), round(y * scale), side, side)
                       for x, y in windows.tolist()]
         scale *= scale_step
     return found
+
+
+def _offsets(cascade: Cascade, grid: WindowGrid) -> Sizes:
+    known = cascade.offsets.get(grid)
+    if known is None:
+        if len(cascade.offsets) >= _MOST_GRIDS:
+            cascade.offsets.clear()
+        known = cascade.offsets[grid] = corner_offsets(cascade.corners, grid)
+    return known
 
 
 def _outcomes(branches: list[list[int]], leaves: list[float]) -> list[float]:

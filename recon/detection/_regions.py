@@ -1,5 +1,6 @@
 """Where in the colour image a face can be, by depth: the nearest places first."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import cv2
@@ -82,7 +83,7 @@ def regions_by_depth(
         _, _, pieces, _ = cv2.connectedComponentsWithStats(closed, connectivity=8)
         for x, y, w, h, _ in pieces[1:].tolist():
             if w >= min_side and h >= min_side:
-                roi = _padded((x, y, w, h), margin, cell, shape)
+                roi = padded((x, y, w, h), margin, cell, shape)
                 regions.append(Region(roi, near, far, centers))
     return regions
 
@@ -112,12 +113,12 @@ def without_flat(
         if bulging.any():
             margin = round(_HALF_WIDEST_MM * focal_px / region.near_mm / cell)
             left, top, width, height = cv2.boundingRect(bulging.view(np.uint8))
-            roi = _padded((left, top, width, height), margin, cell, shape)
+            roi = padded((left, top, width, height), margin, cell, shape)
             remaining.append(region._replace(roi=roi, centers=bulging))
     return remaining
 
 
-def _padded(cells: Box, margin: int, cell: float, shape: tuple[int, int]) -> Box:
+def padded(cells: Sequence[int], margin: int, cell: float, shape: tuple[int, int]) -> Box:
     """Widen a box of cells and give it in pixels, inside the image.
 
     Whole cells: the places that are searched do not depend on the camera's resolution.

@@ -7,7 +7,6 @@ from denseface.capture.calibration import Calibration, CameraModel
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.npz import load_frame
 from denseface.recon import NoFaceError, reconstruct
-from denseface.recon.detection import REJECTED
 from tests.simulator import shared_folder
 
 SHARED = shared_folder()
@@ -19,9 +18,9 @@ pytestmark = pytest.mark.skipif(
 
 @pytest.mark.parametrize("thing", ["tin", "cereal_or_tin"])
 def test_a_real_thing_is_no_face(thing):
-    with pytest.raises(NoFaceError, match=r"shows is .*\(score 0\.\d\d, a face has") as refused:
+    """Colour alone takes each for one; depth, before or after the shape is known, does not."""
+    with pytest.raises(NoFaceError, match="no face found"):
         reconstruct(load_frame(SHARED / "reports" / f"{thing}.npz"))
-    assert refused.value.candidates[0].verdict == REJECTED
 
 
 def test_a_real_face_in_profile_is_one():

@@ -1,0 +1,99 @@
+"""Where in the colour image depth looks like a head: the nearest places first."""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from denseface.recon.arrays import Bools, Floats
+from denseface.recon.detection._heads import head_like
+from denseface.recon.detection._kernels import nearest_in_cells
+from denseface.recon.detection._regions import CELLS, Region, padded
+from denseface.recon.errors import NoDepthError
+from denseface.recon.intermediate import NO_DEPTH_MM, Registration
+
+_NEAREST_MM, _FARTHEST_MM = 300.0, 2000.0
+"""Range that is searched. A farther face has under 2,000 depth pixels and noise of over 5 mm."""
+_MIN_RADIUS_MM = 35.0
+"""Head-like places that hang together are at least as large as a circle of that radius."""
+_AROUND_MM = 20.0
+"""How far about a head-like place the middle of a cascade's box may be."""
+_DEEPER_MM = 50.0
+"""How far a face's middle may lie behind the nearest reading of its cell."""
+_HALF_NARROWEST_MM, _HALF_WIDEST_MM = 55.0, 105.0
+"""Half of the narrowest and of the widest face."""
+
+
+class DepthCells(NamedTuple):
+    """The nearest depth in each cell of the colour image."""
+
+    nearest: Floats
+    """(rows, CELLS), mm, or `NO_DEPTH_MM`."""
+    shape: tuple[int, int]
+    """Rows and columns of the image."""
+    focal_px: float
+    """Its focal length."""
+
+    @property
+    def cell_px(self) -> float:
+        """Side of a cell."""
+        return self.shape[1] / CELLS
+
+
+def depth_cells(
+    registered: Registration, shape: tuple[int, int], focal_px: float
+) -> DepthCells:
+    """Judge the depth of each cell of the colour image.
+
+    Parameters
+    ----------
+    registered : the depth tied to the colour image; every k-th pixel is enough
+    shape : rows and columns of the colour image
+    focal_px : its focal length, pixels
+
+    Raises
+    ------
+    NoDepthError
+        Where nothing measured lies before the colour camera.
+    """
+    if not (registered.color_depth > 0).any():
+        raise NoDepthError("no depth lies before the colour camera: is the calibration right?")
+    cell = shape[1] / CELLS
+    nearest = np.full((int(np.ceil(shape[0] / cell)), CELLS), NO_DEPTH_MM)
+    nearest_in_cells(registered.pixels, registered.color_depth, registered.visible, cell, nearest)
+    # A cell that no reading fell into is as its neighbours.
+    around = cv2.erode(nearest, np.ones((3, 3), np.uint8))
+    return DepthCells(np.where(nearest == NO_DEPTH_MM, around, nearest), shape, focal_px)
+
+
+def head_regions(cells: DepthCells, nearer_than_mm: float = _FARTHEST_MM) -> list[Region]:
+    """Give each place that depth allows for a head, the nearest first, up to a depth."""
+    nearest, shape, focal_px = cells
+    cell = cells.cell_px
+    farthest = min(nearer_than_mm, _FARTHEST_MM)
+    likely = head_like(nearest, focal_px / cell, _NEAREST_MM, farthest)
+    _clear_border(likely, nearest, focal_px / cell)
+    count, labels, pieces, _ = cv2.connectedComponentsWithStats(
+        likely.view(np.uint8), connectivity=8)
+    regions = []
+    for piece in range(1, count):
+        middles = labels == piece
+        depths = nearest[middles]
+        near, far = float(depths.min()), float(depths.max())
+        cells_to_mm = focal_px / cell / np.sqrt(near * far)
+        if pieces[piece, cv2.CC_STAT_AREA] < np.pi * (_MIN_RADIUS_MM * cells_to_mm) ** 2:
+            continue
+        grown = 2 * round(_AROUND_MM * cells_to_mm) + 1
+        centers = cv2.dilate(middles.view(np.uint8), np.ones((grown, grown), np.uint8))
+        margin = int(np.ceil(_HALF_WIDEST_MM * focal_px / near / cell))
+        roi = padded(cv2.boundingRect(centers), margin, cell, shape)
+        regions.append(Region(roi, near, far + _DEEPER_MM, centers.view(np.bool_)))
+    return sorted(regions, key=lambda region: region.near_mm)
+
+
+def _clear_border(likely: Bools, nearest: Floats, cells_at_1_mm: float) -> None:
+    """Clear where the narrowest face would not be whole within the image."""
+    half = _HALF_NARROWEST_MM * cells_at_1_mm / nearest
+    rows, columns = np.ogrid[:likely.shape[0], :likely.shape[1]]
+    likely &= ((rows + 0.5 >= half) & (likely.shape[0] - rows - 0.5 >= half)
+               & (columns + 0.5 >= half) & (likely.shape[1] - columns - 0.5 >= half))
