@@ -12,10 +12,12 @@ import numpy as np
 
 from bench.accuracy import RECORDINGS
 from bench.heads import CHOOSING, REPORTING
-from bench.recall_scenes import View, empty_views, face_views, taken
+from bench.recall_scenes import View, darkened, empty_views, face_views, taken
 from denseface.capture import RgbdFrame, open_source
+from denseface.recon import reconstruct
 from denseface.recon.detection import Detection, detect_by_depth, detect_face
 from denseface.recon.errors import ReconstructionError
+from denseface.recon.finding import find_face
 from denseface.recon.registration import register, without_color
 from tests.simulator import Truth, shared_folder
 
@@ -25,6 +27,8 @@ __all__: list[str] = []
 _SPARSE = slice(None, None, 4)
 # A third of a face's width.
 _NEAR_MM = 47.0
+_DARK_VIEWS = (("plain", ""), ("yaw", "+30"), ("pitch", "+20"), ("distance", "1.30 m"))
+_DARK_LIGHT, _DARK_NOISE = (0.02, 0.01, 0.005, 0.002, 0.0), (2.5, 8.0)
 _COLUMNS = ("faces", "found", "of it near the middle", "something else", "nothing",
             "processor's ms, median", "95th percentile")
 
@@ -109,6 +113,26 @@ def _print_faces(
           f"the 95th percentile {high:.2f}.")
 
 
+def _in_the_dark(views: list[View], folder: Path | None) -> None:
+    """Print what finds the faces in little light."""
+    views = [view for view in views if (view.factor, view.value) in _DARK_VIEWS]
+    print("\n| light | noise, grey levels | faces | found in colour | in depth, grey | not |")
+    print("|" + " --- |" * 6)
+    for noise in _DARK_NOISE:
+        for light in _DARK_LIGHT:
+            found = [_found(darkened(taken(view, folder)[0], light, noise, view.seed))
+                     for view in views]
+            print(f"| {light:g} | {noise:g} | {len(views)} | {found.count('colour')} "
+                  f"| {found.count('depth')} | {found.count('neither')} |")
+
+
+def _found(frame: RgbdFrame) -> str:
+    try:
+        return "colour" if find_face(frame, lambda _: None).colored else "depth"
+    except ReconstructionError:
+        return "neither"
+
+
 def _empty(views: list[View], folder: Path | None) -> Iterator[tuple[str, RgbdFrame]]:
     for view in views:
         yield f"simulated: {view.value}", taken(view, folder)[0]
@@ -126,28 +150,38 @@ def _empty(views: list[View], folder: Path | None) -> Iterator[tuple[str, RgbdFr
 
 def _false_faces(views: list[View], folder: Path | None) -> int:
     """Print the tables of frames without a face, and give how many faces were found in them."""
-    tables: dict[str, dict[str, list[tuple[bool, float]]]] = {
+    tables: dict[str, dict[str, list[tuple[bool, bool, float]]]] = {
         "With colour": defaultdict(list), "Without, in depth alone": defaultdict(list)}
     haar: list[float] = []
     for number, (name, frame) in enumerate(_empty(views, folder)):
         haar.append(_haar_ms(frame))
         for sight, rows in tables.items():
-            found, ms = _detected(frame if rows is tables["With colour"] else without_color(frame))
-            rows[name].append((found is not None, ms))
+            seen = frame if rows is tables["With colour"] else without_color(frame)
+            found, ms = _detected(seen)
+            rows[name].append((found is not None, found is not None and _is_face(seen), ms))
             if found:
                 what = views[number].name if number < len(views) else name
                 print(f"{sight}: {what}: a face at {found.box}, {found.depth_mm:.0f} mm",
                       file=sys.stderr)
     for sight, rows in tables.items():
         print(f"\n{sight}; OpenCV's default Haar pass takes {np.median(haar):.1f} ms:")
-        print("\n| frames without a face | frames | false faces | processor's ms, median "
-              "| 95th percentile |")
-        print("|" + " --- |" * 5)
+        print("\n| frames without a face | frames | false boxes | false faces "
+              "| processor's ms, median | 95th percentile |")
+        print("|" + " --- |" * 6)
         for name, row in rows.items():
-            times = [ms for _, ms in row]
-            print(f"| {name} | {len(row)} | {sum(false for false, _ in row)} "
+            boxes, faces, times = zip(*row, strict=True)
+            print(f"| {name} | {len(row)} | {sum(boxes)} | {sum(faces)} "
                   f"| {np.median(times):.0f} | {np.percentile(times, 95):.0f} |")
-    return sum(false for rows in tables.values() for row in rows.values() for false, _ in row)
+    return sum(face for rows in tables.values() for row in rows.values() for _, face, _ in row)
+
+
+def _is_face(frame: RgbdFrame) -> bool:
+    """Say whether a face leaves the last judgement, too."""
+    try:
+        reconstruct(frame)
+    except ReconstructionError:
+        return False
+    return True
 
 
 def main() -> int:
@@ -164,7 +198,9 @@ def main() -> int:
     if args.frames:
         args.frames.mkdir(parents=True, exist_ok=True)
     heads = REPORTING if args.heads == "reporting" else CHOOSING
-    _recall(list(face_views(heads)), args.frames)
+    faces = list(face_views(heads))
+    _recall(faces, args.frames)
+    _in_the_dark(faces, args.frames)
     return min(1, _false_faces(list(empty_views(heads, args.empty)), args.frames))
 
 

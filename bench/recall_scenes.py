@@ -12,7 +12,7 @@ from denseface.capture.calibration import CameraModel
 from denseface.capture.npz import load_frame, save_frame
 from tests.simulator import KINECT_CALIBRATED, Light, Person, Scene, Truth, head_names, simulate
 
-__all__ = ["View", "empty_views", "face_views", "taken"]
+__all__ = ["View", "darkened", "empty_views", "face_views", "taken"]
 
 
 _PLAIN = Person(distance_mm=750.0)
@@ -112,6 +112,15 @@ def taken(view: View, folder: Path | None) -> tuple[RgbdFrame, Truth]:
     """Simulate a view, or read what was kept of it in a folder. The truth is never mirrored."""
     frame, truth = _simulated(view, folder)
     return (_mirrored(frame) if view.mirrored else frame), truth
+
+
+def darkened(frame: RgbdFrame, light: float, noise: float, seed: int) -> RgbdFrame:
+    """Give the frame in so much of its light, with that much more noise in colour, grey levels."""
+    share = frame.rgb / 255.0
+    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4) * light
+    share = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    noisy = 255 * share + np.random.default_rng([7, seed]).normal(0, noise, share.shape)
+    return replace(frame, color=np.clip(np.rint(noisy), 0, 255).astype(np.uint8))
 
 
 def _simulated(view: View, folder: Path | None) -> tuple[RgbdFrame, Truth]:

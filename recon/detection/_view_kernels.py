@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from denseface.recon.arrays import Bools, Doubles, Floats, Ints
+from denseface.recon.arrays import Bools, Bytes, Doubles, Floats, Ints
 from denseface.recon.numerics.jit import compiled
 
 _MEASURED = 0.3
@@ -32,6 +32,8 @@ class View(NamedTuple):
     nearest: Floats
     """mm; very large where nothing is."""
     grey: Floats
+    seen: Floats
+    """1 where a sample is."""
     source: Ints
     """Which sample of the grid is seen; -1 for none."""
 
@@ -107,4 +109,33 @@ def draw_view(
                  + facing * light[2])
         view.nearest[v, u] = away
         view.grey[v, u] = min(max(max(shade, 0) + relief_gain * surface.relief[k], 1), 255)
+        view.seen[v, u] = 1
         view.source[v, u] = surface.places[k]
+
+
+@compiled
+def finish_view(
+    view: View, grey_around: Floats, seen_around: Floats, least_seen: float, centers: Bools,
+    grey: Bytes, allowed: Bools
+) -> None:
+    """Fill the gaps between the samples, and mark where the centre of a face can be.
+
+    grey_around, seen_around : those of `view`, smoothed alike
+    least_seen : with less around it a pixel stays black
+    centers : (h, w), of the samples' grid
+    grey, allowed : (H, W), written; zero and False before
+    """
+    height, width = grey.shape
+    columns = centers.shape[1]
+    for v in range(height):
+        for u in range(width):
+            source = view.source[v, u]
+            if source < 0:
+                if seen_around[v, u] >= least_seen:
+                    grey[v, u] = np.uint8(grey_around[v, u] / seen_around[v, u])
+                continue
+            grey[v, u] = np.uint8(view.grey[v, u])
+            if centers[source // columns, source % columns]:
+                for i in range(max(v - 1, 0), min(v + 2, height)):
+                    for j in range(max(u - 1, 0), min(u + 2, width)):
+                        allowed[i, j] = True
