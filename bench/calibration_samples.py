@@ -15,8 +15,14 @@ from bench.cases import Case, with_preset
 from denseface.capture import RgbdFrame
 from denseface.recon import Preset, ReconstructionError, reconstruct
 from denseface.recon.face import Face
-from denseface.recon.propagation.uncertainty import VarianceComponents, variance_components
-from tests.simulator import KINECT_CALIBRATED, Person, Scene, Truth, head_names, simulate
+from denseface.recon.noise import Risk
+from denseface.recon.propagation.uncertainty import (
+    VarianceComponents,
+    standard_error,
+    variance_components,
+)
+from tests.simulator import Person, Scene, Truth, head_names, simulate
+from tests.simulator.sensors import SENSORS
 
 __all__ = ["Samples", "frames", "sample"]
 
@@ -45,7 +51,8 @@ class Samples:
     error : (m,) mm along the viewing ray, signed
     distance : (m,) mm from the true surface; NaN where it was not asked for
     sigma, z : (m,) mm
-    components : (m, 4) mm^2, `VarianceComponents`' noise, hole, slope and rim
+    components : (m, 7) mm^2, what the coefficients of `recon.propagation.uncertainty` multiply:
+        bias, white, smooth, hole, slope, rim, rim_jitter
     hole, rim : (m,) bool
     everywhere : (m,) bool, drawn from all points; the others were added to have enough in holes
     """
@@ -67,7 +74,7 @@ class Samples:
 
 
 def frames(heads: tuple[str, ...], count: int, seed: int) -> Iterator[tuple[RgbdFrame, Truth]]:
-    """Simulate heads by turns, few and many holes by turns, at random distances and yaws.
+    """Simulate heads and sensors by turns, few and many holes by turns, at random places.
 
     The procedural head stands in for those that are not at hand.
     """
@@ -77,7 +84,8 @@ def frames(heads: tuple[str, ...], count: int, seed: int) -> Iterator[tuple[Rgbd
         distance, yaw = rng.uniform(*_DISTANCES_MM), rng.uniform(-_YAW, _YAW)
         scene = Scene((Person(known[index % len(known)], distance, yaw=yaw),),
                       holes=_HOLES[(index // len(known)) % 2], decor=index)
-        shot, = simulate(scene, KINECT_CALIBRATED, seed=1000 + index)
+        sensor = tuple(SENSORS.values())[index * 5 % len(SENSORS)]
+        shot, = simulate(scene, sensor, seed=1000 + index)
         yield shot.frame, shot.truth
 
 
@@ -89,18 +97,20 @@ class _PlacedComponents:
     origin: tuple[float, float]
     step: float
 
-    def at(self, points: NDArray[np.float32]) -> Floats:
-        """Interpolate them at points, (n, 3) to (n, 4)."""
+    def at(self, points: NDArray[np.float32], plan: Risk) -> Floats:
+        """Interpolate them at points, (n, 3) to (n, 7)."""
         x, y = ((points[:, axis] - self.origin[axis]) / self.step for axis in (0, 1))
-        return np.column_stack([map_coordinates(
+        noise, *rest = (map_coordinates(
             getattr(self.components, name).astype(np.float64), (y, x), order=1, mode="nearest")
-            for name in ("noise", "hole", "slope", "rim")])
+            for name in ("noise", "hole", "slope", "rim", "rim_jitter"))
+        shares = (plan.bias_share, plan.white_share, plan.smooth_share)
+        return np.column_stack([*(share * noise for share in shares), *rest])
 
 
 def sample(frame: RgbdFrame, truth: Truth, preset: Preset, *, distance: bool) -> Samples | None:
     """Reconstruct a frame and draw some of its points; None where it gives no face."""
     try:
-        with _recorded_components() as recorded:
+        with _recorded() as (recorded, plans):
             case = Case("", frame, truth, reconstruct(frame, with_preset(preset)))
     except ReconstructionError:
         return None
@@ -119,7 +129,7 @@ def sample(frame: RgbdFrame, truth: Truth, preset: Preset, *, distance: bool) ->
                   else np.full(len(points), np.nan)),
         sigma=dense.sigma[chosen].astype(np.float64),
         z=points[:, 2].astype(np.float64),
-        components=recorded[-1].at(points),  # any before are the warm-up's
+        components=recorded[-1].at(points, plans[-1]),  # any before are the warm-up's
         hole=case.hole[chosen],
         rim=_rim(case.face)[chosen],
         everywhere=everywhere[chosen],
@@ -127,9 +137,10 @@ def sample(frame: RgbdFrame, truth: Truth, preset: Preset, *, distance: bool) ->
 
 
 @contextmanager
-def _recorded_components() -> Iterator[list[_PlacedComponents]]:
+def _recorded() -> Iterator[tuple[list[_PlacedComponents], list[Risk]]]:
     """Record what `reconstruct` makes sigma of; it is not in the face."""
     recorded: list[_PlacedComponents] = []
+    plans: list[Risk] = []
 
     def record(*arguments: Any) -> VarianceComponents:
         found = variance_components(*arguments)
@@ -137,8 +148,14 @@ def _recorded_components() -> Iterator[list[_PlacedComponents]]:
         recorded.append(_PlacedComponents(found, origin, step * found.every))
         return found
 
-    with mock.patch("denseface.recon.propagation._densify.variance_components", record):
-        yield recorded
+    def with_plan(components: VarianceComponents, plan: Risk, **how: bool) -> Any:
+        plans.append(plan)
+        return standard_error(components, plan, **how)
+
+    place = "denseface.recon.propagation._densify"
+    with (mock.patch(f"{place}.variance_components", record),
+          mock.patch(f"{place}.standard_error", with_plan)):
+        yield recorded, plans
 
 
 def _rim(face: Face) -> NDArray[np.bool_]:

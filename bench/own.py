@@ -6,8 +6,9 @@ from functools import partial
 
 from bench.cases import Case
 from denseface.recon import Settings
-from denseface.recon.fitting import surface_of
-from denseface.recon.propagation import densify, noise_fraction
+from denseface.recon.fitting import plan_fit, surface_of
+from denseface.recon.noise import measure_noise
+from denseface.recon.propagation import densify
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import segment_face
 from denseface.recon.surface import mean_spacing
@@ -32,7 +33,8 @@ def after_segmentation(case: Case, known: Settings) -> Callable[[], object]:
 
     def call() -> object:
         spacing = mean_spacing(seeds.points, seeds.pixels, known.neighbors)
-        surface = surface_of(seeds.points, spacing, known, sampler)
-        return densify(seeds, surface, spacing, known.ratio, noise_fraction(known), sampler)
+        plan = plan_fit(known, measure_noise(seeds.points, seeds.pixels, spacing), spacing)
+        surface = surface_of(seeds.points, spacing, known, plan, sampler)
+        return densify(seeds, surface, spacing, known.ratio, plan, sampler)
 
     return call

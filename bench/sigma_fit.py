@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize
 
 from bench.calibration_samples import Samples
-from denseface.recon import Preset, Settings
-from denseface.recon.propagation.uncertainty import averaging_cutoff, fit_cutoff
+from denseface.recon import Preset
 
 __all__ = ["fitted"]
 
@@ -28,28 +27,17 @@ _FITS_ALONE = (Preset.FAITHFUL, Preset.PAPER)
 Floats = NDArray[np.float64]
 
 
-def fitted(samples: dict[Preset, Samples]) -> dict[str, float]:
-    """Fit all coefficients: slope, rim and hole on `best`, the share of noise on all presets.
-
-    The rim of a fit alone, without detail, is that of the other two presets.
-    """
-    best = samples[Preset.BEST]
-    share, hole, slope, rim = _most_likely(best.components, best)
-    alone = [_most_likely(samples[preset].components, samples[preset])[3] for preset in _FITS_ALONE]
-    found = {"_HOLE": hole / share, "_SLOPE": slope, "_RIM": rim,
-             "_RIM_FIT_ALONE": math.sqrt(math.prod(alone))}
-    scale = math.sqrt(math.prod(_scale(preset, samples[preset], found)
-                                for preset in _FITS_ALONE))
-    settings = Settings.of(Preset.BEST)
-    base = scale * fit_cutoff(settings.r0_factor, settings.smoothing) ** 2
-    detail = scale * averaging_cutoff(settings.detail_factor or math.inf) ** 2
-    return found | {"_FIT_FRACTION": scale, "_DETAIL_FRACTION": (share - base) / detail}
+def fitted(samples: dict[Preset, Samples]) -> dict[str, tuple[float, ...]]:
+    """Fit the coefficients of fits with detail (`best`) and without (the other presets)."""
+    alone = Samples.joined([samples[preset] for preset in _FITS_ALONE])
+    return {"_DETAILED": tuple(_most_likely(samples[Preset.BEST]).tolist()),
+            "_FIT_ALONE": tuple(_most_likely(alone).tolist())}
 
 
-def _most_likely(components: Floats, of: Samples) -> Floats:
+def _most_likely(of: Samples) -> Floats:
     """Give the nonnegative coefficients of the components, (k,)."""
-    size = components.mean(axis=0)
-    parts, squares = components / size, of.error**2
+    size = np.maximum(of.components.mean(axis=0), 1e-9)
+    parts, squares = of.components / size, of.error**2
     weights = np.where(of.rim, _RIM_WEIGHT, 1.0)
     weights /= weights.sum()
 
@@ -64,16 +52,7 @@ def _most_likely(components: Floats, of: Samples) -> Floats:
     start = np.full(parts.shape[1], -math.log(parts.shape[1]))
     found = np.exp(minimize(cost, start, jac=True, method="L-BFGS-B",
                             bounds=[(-14, 6)] * len(start)).x) / size
-    return np.asarray(found * _balanced(components @ found, of) ** 2)
-
-
-def _scale(preset: Preset, of: Samples, known: dict[str, float]) -> float:
-    """Give what balances a preset of one fit, where all else is known: its share by (h / L)^2."""
-    noise = of.components[:, 0] + known["_HOLE"] * of.components[:, 1]
-    rest = of.components[:, 2:] @ [known["_SLOPE"], known["_RIM_FIT_ALONE"]]
-    settings = Settings.of(preset)
-    share = brentq(lambda share: _imbalance(np.sqrt(share * noise + rest), of), 0.01, 20)
-    return float(share) / fit_cutoff(settings.r0_factor, settings.smoothing) ** 2
+    return np.asarray(found * _balanced(of.components @ found, of) ** 2)
 
 
 def _balanced(variance: Floats, of: Samples) -> float:

@@ -25,7 +25,8 @@ from bench.own import after_segmentation, milliseconds
 from bench.pcl_peer import Pcl
 from bench.peer_methods import inpaint_points, rbf_points
 from denseface.recon import Preset, Settings, pipeline, reconstruct, warm
-from denseface.recon.fitting import surface_of
+from denseface.recon.fitting import plan_fit, surface_of
+from denseface.recon.noise import Risk, measure_noise
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.surface import MIN_SEEDS, fit_surface
 
@@ -89,12 +90,12 @@ def _fit_times(case: Case, pcl: Pcl | None) -> None:
     seeds, spacing = case.seeds, case.spacing
     sampler = partial(sample_colors, case.frame, register(case.frame))
     calls: dict[str, Callable[[], float]] = {
-        **{f"ours, `{preset.value}`: its fit {_of_fit(preset)} and evaluation": partial(
-            milliseconds, partial(_fitted, seeds, spacing, preset, xs, ys))
+        **{f"ours, `{preset.value}`: its fit {_of_fit(case, preset)} and evaluation": partial(
+            milliseconds, partial(_fitted, case, preset, xs, ys))
            for preset in (Preset.BEST, Preset.FAITHFUL)},
         "ours, `best`: fit, detail, evaluation with slopes": lambda: milliseconds(
-            lambda: surface_of(
-                seeds.astype(np.float32), spacing, Settings(), sampler).sampled(xs, ys)),
+            lambda: surface_of(seeds.astype(np.float32), spacing, Settings(),
+                               _plan(case, Preset.BEST), sampler).sampled(xs, ys)),
         **{f"ours, `{preset.value}`, all after segmentation: spacing, fit, normals, colours, sigma":
            partial(milliseconds, after_segmentation(case, with_preset(preset)))
            for preset in (Preset.BEST, Preset.FAITHFUL)},
@@ -124,25 +125,30 @@ def _fit_times(case: Case, pcl: Pcl | None) -> None:
         print(f"| {name} | {ms:,.1f} | " + " | ".join(f"{ms / one:,.2f}" for one in own) + " |")
 
 
-def _of_fit(preset: Preset) -> str:
-    known = Settings.of(preset)
-    return f"(R0 = {known.r0_factor:g}h, lambda = {known.smoothing:g})"
+def _plan(case: Case, preset: Preset) -> Risk:
+    seeds = case.face.initial.points
+    noise = measure_noise(seeds, case.seed_pixels.astype(np.int32), case.spacing)
+    return plan_fit(Settings.of(preset), noise, case.spacing)
+
+
+def _of_fit(case: Case, preset: Preset) -> str:
+    plan = _plan(case, preset)
+    return f"(R0 = {plan.r0_factor:.3g}h, lambda = {plan.smoothing:.3g})"
 
 
 def _fitted(
-    seeds: NDArray[np.float64], spacing: float, preset: Preset, xs: NDArray[np.float64],
-    ys: NDArray[np.float64],
+    case: Case, preset: Preset, xs: NDArray[np.float64], ys: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    known = Settings.of(preset)
-    return fit_surface(seeds, known.r0_factor * spacing, known.smoothing).heights(xs, ys)
+    plan = _plan(case, preset)
+    return fit_surface(case.seeds, plan.r0_factor * case.spacing, plan.smoothing).heights(xs, ys)
 
 
 def _against_dense(case: Case, count: int, preset: Preset) -> None:
     """The same system with one unknown for each seed, for so many seeds as it can bear."""
-    known = Settings.of(preset)
+    plan = _plan(case, preset)
     away = np.linalg.norm(case.seeds[:, :2] - np.median(case.seeds[:, :2], axis=0), axis=1)
     chosen = np.argsort(away)[:count]
-    seeds, r0 = case.seeds[chosen], known.r0_factor * case.spacing
+    seeds, r0 = case.seeds[chosen], plan.r0_factor * case.spacing
     low, high = seeds[:, :2].min(axis=0), seeds[:, :2].max(axis=0)
     side = int(np.sqrt(10 * len(seeds)))
     xs, ys = np.linspace(low[0], high[0], side), np.linspace(low[1], high[1], side)
@@ -152,10 +158,10 @@ def _against_dense(case: Case, count: int, preset: Preset) -> None:
     results: dict[str, Any] = {}
 
     def fast() -> None:
-        results["fast"] = fit_surface(seeds, r0, known.smoothing).heights(xs, ys).ravel()
+        results["fast"] = fit_surface(seeds, r0, plan.smoothing).heights(xs, ys).ravel()
 
     def dense() -> None:
-        results["dense"] = dense_heights(seeds, queries, r0, known.smoothing)
+        results["dense"] = dense_heights(seeds, queries, r0, plan.smoothing)
 
     fast()
     times: list[tuple[float, float]] = []
@@ -164,7 +170,7 @@ def _against_dense(case: Case, count: int, preset: Preset) -> None:
         times.append((statistics.median(milliseconds(fast) for _ in range(5)), slow))
     ours, dense_ms = (statistics.median(column) for column in zip(*times, strict=True))
     off = np.abs(results["fast"] - results["dense"])[inside]
-    print(f"\nThe system of `{preset.value}` {_of_fit(preset)} for the middle "
+    print(f"\nThe system of `{preset.value}` {_of_fit(case, preset)} for the middle "
           f"{len(seeds):,} seeds, {len(queries):,} points: dense solve {dense_ms:,.0f} ms, ours "
           f"{ours:.1f} ms, {dense_ms / ours:,.0f} times faster (goal 1000, for all seeds); largest "
           f"deviation {off.max():.4f} mm (goal 0.01).")

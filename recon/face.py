@@ -160,8 +160,15 @@ class Report(BaseModel):
     dense_points: int
     mean_spacing_mm: float
     r0_mm: float
+    smoothing: Annotated[float, Field(ge=0)] = 0.0
+    """lambda of the fit: that of the settings, or what the noise asked for."""
     noise_mm: float
-    """Standard deviation of the seeds about the fitted surface."""
+    """Standard deviation of the noise of depth, measured in the frame."""
+    noise_correlation_px: Annotated[float, Field(ge=0)] = 0.0
+    """How far noise is alike: standard deviation of the Gaussian that makes white noise so; 0 of
+    white noise."""
+    quantum_mm: Annotated[float, Field(ge=0)] = 0.0
+    """Distance of neighbouring levels of depth."""
     timings_ms: dict[str, Annotated[float, Field(ge=0)]]
     """Wall time of each stage, and `total`."""
     settings: Settings

@@ -65,13 +65,11 @@ class SurfaceGrid:
     ----------
     values : (3, rows, columns) float32: height, mm, and slopes along x and y
     support : where the seeds support the surface, and the grid
-    noise : standard deviation of the seeds about the surface, mm
     detailed : whether detail was added to the fit
     """
 
     values: Floats
     support: Support
-    noise: float
     detailed: bool
 
     def sampled(self, xs: Doubles, ys: Doubles) -> Floats:

@@ -27,7 +27,7 @@ from denseface.recon.errors import (
 )
 from denseface.recon.face import Face, FaceCandidate, PointCloud, Report
 from denseface.recon.finding import Found, find_another, find_face
-from denseface.recon.fitting import surface_of
+from denseface.recon.fitting import plan_fit, surface_of
 from denseface.recon.judgement import (
     LEAST_SCORE,
     SURE_SCORE,
@@ -35,9 +35,10 @@ from denseface.recon.judgement import (
     check_steps,
     judge_shape,
 )
+from denseface.recon.noise import measure_noise
 from denseface.recon.numerics.threads import one_blas_thread
 from denseface.recon.openings import Openings, openings
-from denseface.recon.propagation import densify, noise_fraction
+from denseface.recon.propagation import densify
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import box_window, segment_face
 from denseface.recon.settings import Settings
@@ -171,22 +172,25 @@ def _shape(settings: Settings, clock: "_Stopwatch", found: Found) -> Face:
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     clock.lap("neighbors")
     sampler = partial(sample_colors, frame, registered)
-    surface = surface_of(seeds.points, spacing, settings, sampler)
+    noise = measure_noise(seeds.points, seeds.pixels, spacing)
+    plan = plan_fit(settings, noise, spacing)
+    surface = surface_of(seeds.points, spacing, settings, plan, sampler)
     clock.lap("rbf")
     score, like = judge_shape(surface)
     clock.lap("judgement")
     if like:
         raise NoFaceError(f"no face found: what the box at {box} shows is {like} "
                           f"(score {score:.2f}, a face has {LEAST_SCORE} or more)")
-    dense = densify(seeds, surface, spacing, settings.ratio, noise_fraction(settings), sampler)
+    dense = densify(seeds, surface, spacing, settings.ratio, plan, sampler)
     left_open = openings(dense)
     clock.lap("propagation")
     initial = PointCloud(seeds.points, seeds.colors)
     report = Report(
         face_box=box, candidates=found.detection.candidates,
         initial_points=len(initial), dense_points=len(dense),
-        mean_spacing_mm=spacing, r0_mm=settings.r0_factor * spacing, noise_mm=surface.noise,
-        face_score=score,
+        mean_spacing_mm=spacing, r0_mm=plan.r0_factor * spacing, smoothing=plan.smoothing,
+        noise_mm=noise.total_mm, noise_correlation_px=noise.correlation_px,
+        quantum_mm=noise.quantum_mm, face_score=score,
         timings_ms=clock.timings_ms(), settings=settings,
         calibration=frame.calibration_origin, skew_us=frame.skew_us,
         colored=found.colored, registered=frame.registered and found.colored,

@@ -43,16 +43,16 @@ class Preset(StrEnum):
     """The paper's R0 and the little smoothing that meets its reported error."""
     FAITHFUL = "faithful", {"r0_factor": 6.0, "smoothing": 3.0, "neighbors": Neighbors.RANDOMIZED}
     """The paper's R0 with the smoothing that a sensor's noise asks for."""
-    BEST = "best", {"r0_factor": 14.0, "smoothing": 12.0, "detail_factor": 1.5, "symmetry": True,
+    BEST = "best", {"r0_factor": None, "smoothing": None, "detail_factor": 1.0, "symmetry": True,
                     "shading": True, "neighbors": Neighbors.LATTICE}
-    """The most accurate found; chosen on other heads than the reported ones."""
+    """The most accurate found: R0 and lambda follow from the noise that is measured in the frame."""
 
 
 class Changes(TypedDict, total=False):
     """What `Settings.of` may change: the fields of `Settings`, as type checkers see them."""
 
-    r0_factor: float
-    smoothing: float
+    r0_factor: float | None
+    smoothing: float | None
     detail_factor: float | None
     symmetry: bool
     shading: bool
@@ -64,16 +64,25 @@ def _none_by_its_name(given: object) -> object:
     return None if given == "none" else given
 
 
+def _measured_by_its_name(given: object) -> object:
+    return None if given == "measured" else given
+
+
 class Settings(CheckedModel):
     """Settings of `reconstruct`; what is not given comes from the preset."""
 
     error = ImpossibleSettingsError
 
     preset: Preset = Preset.BEST
-    r0_factor: Annotated[float, Field(ge=2, le=40)] = 0.0
-    """R0 of Eq. (3) in units of the seeds' mean spacing."""
-    smoothing: Annotated[float, Field(ge=0.05, le=1000)] = 0.0
-    """lambda: weight of the squared norm against the squared residuals (unitless)."""
+    r0_factor: Annotated[
+        Annotated[float, Field(ge=2, le=40)] | None, BeforeValidator(_measured_by_its_name)] = None
+    """R0 of Eq. (3) in units of the seeds' mean spacing; None (`measured`): as the frame's noise
+    asks for."""
+    smoothing: Annotated[
+        Annotated[float, Field(ge=0.05, le=1000)] | None,
+        BeforeValidator(_measured_by_its_name)] = None
+    """lambda: weight of the squared norm against the squared residuals (unitless); None
+    (`measured`): as the frame's noise asks for."""
     detail_factor: Annotated[
         Annotated[float, Field(ge=0.5, le=10)] | None, BeforeValidator(_none_by_its_name)] = None
     """Radius of the averages that give back what the fit smooths away, in mean spacings; None:

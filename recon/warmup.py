@@ -9,8 +9,9 @@ from denseface.capture.calibration import Calibration, CameraModel
 from denseface.capture.frame import RgbdFrame
 from denseface.recon.detection import detect_by_depth, detect_face, judge_box
 from denseface.recon.errors import NoFaceError
-from denseface.recon.fitting import surface_of
+from denseface.recon.fitting import plan_fit, surface_of
 from denseface.recon.judgement import judge_shape
+from denseface.recon.noise import measure_noise
 from denseface.recon.numerics.compilation.progress import compiling
 from denseface.recon.numerics.malloc import keep_freed_memory
 from denseface.recon.prior import Heights, fit_face, mean_face
@@ -55,9 +56,10 @@ def _run_every_stage() -> None:
     seeds = segment_face(registered, _BOX, _FOCAL_PX)
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     sampler = partial(sample_colors, frame, registered)
-    surface = surface_of(seeds.points, spacing, settings, sampler)
+    plan = plan_fit(settings, measure_noise(seeds.points, seeds.pixels, spacing), spacing)
+    surface = surface_of(seeds.points, spacing, settings, plan, sampler)
     judge_shape(surface)
-    densify(seeds, surface, spacing, settings.ratio, 1.0, sampler)
+    densify(seeds, surface, spacing, settings.ratio, plan, sampler)
     heights, _, known = mean_face(_NEAREST_MM).heights((-90.0, -90.0), 4.0, (45, 45))
     fit_face(Heights(heights, known.astype(np.float32), (-90.0, -90.0), 4.0))
 

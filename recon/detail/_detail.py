@@ -20,6 +20,7 @@ from denseface.recon.detail._rim import BROADER, Rim, iterated_average
 from denseface.recon.detail._shading import shading_detail
 from denseface.recon.detail._symmetry import symmetry_correction
 from denseface.recon.intermediate import ColorSampler, SurfaceGrid
+from denseface.recon.noise import Risk
 from denseface.recon.numerics.bilinear import add_resampled
 from denseface.recon.numerics.filters import blurred, downsampled, upsampled
 from denseface.recon.numerics.normalized_convolution import normalized_convolution
@@ -39,13 +40,16 @@ _NARROW = 0.5
 """Noise is told where the broad average weighs less: it leaves less noise."""
 _RIM_SPACINGS = 1.5
 """So near the rim detail tells little of the noise, and of the other side, mean spacings."""
+_MOST_FIT_SHARE = 0.25
+"""Variance of the broad fit's noise over that of the detail's: with more, what one side has alone
+fades."""
 
 _COARSE = np.s_[::2, ::2]
 """Every second point each way: how much of the detail is noise varies slowly."""
 
 
 def add_detail(
-    heights: Floats, support: Support, points: Floats, spacing: float, radius: float, *,
+    heights: Floats, support: Support, points: Floats, spacing: float, radius: float, plan: Risk, *,
     symmetry: bool = False, sampler: ColorSampler | None = None,
 ) -> SurfaceGrid:
     """Add to a broad fit what its seeds show besides.
@@ -57,6 +61,7 @@ def add_detail(
     points : (n, 3) float32, mm, depth camera frame
     spacing : mean spacing of the points, mm
     radius : of the average (standard deviation), mm
+    plan : the fit's expected error, and the noise in it and in the averages
     symmetry : correct each side of the face by the other's mirror image
     sampler : tells points' colours, of whose shading more detail is taken; None: of depth alone
     """
@@ -80,19 +85,18 @@ def add_detail(
     plane = find_plane(field) if symmetry else None
     if plane is not None:
         more = symmetry_correction(
-            field, kept, filled[_COARSE], hole[_COARSE], plane, noise, _WINDOW_MM)
+            field, kept, filled[_COARSE], hole[_COARSE], plane, noise,
+            min(plan.fit_noise / max(plan.detail_noise, 1e-12), _MOST_FIT_SHARE), _WINDOW_MM)
     if sampler is not None:
         surface = heights[_COARSE] + detail[_COARSE] + filled[_COARSE] + more
         more += shading_detail(
             surface, shown * rim.color_weight, kernels.with_slopes(surface, spacing)[1:],
-            (support.xs[::2], support.ys[::2]), sampler)
+            (support.xs[::2], support.ys[::2]), sampler, plan)
     _add_upsampled(detail, more)
     _, dz_dx, dz_dy = kernels.with_slopes(downsampled(heights), 2 * support.step)
     detail += upsampled(rim.fraying_correction(dz_dx, dz_dy, spacing), detail.shape)
     detail += filled
-    noise_mm = float((residuals - interpolate(detail, seeds.columns, seeds.rows)).std())
-    return SurfaceGrid(kernels.with_slopes(heights + detail, support.step), support, noise_mm,
-                       detailed=True)
+    return SurfaceGrid(kernels.with_slopes(heights + detail, support.step), support, detailed=True)
 
 
 class _SeedGrid(NamedTuple):

@@ -16,6 +16,7 @@ from denseface.recon.arrays import Doubles, Floats
 from denseface.recon.detail import _shading_kernels as kernels
 from denseface.recon.detail._spherical_harmonics import fit_lighting, sample_harmonics
 from denseface.recon.intermediate import ColorSampler
+from denseface.recon.noise import Risk
 from denseface.recon.numerics.filters import blurred, upsampled
 from denseface.recon.numerics.normalized_convolution import normalized, normalized_convolution
 
@@ -42,10 +43,8 @@ _ENERGY_MM = 6.0
 """Standard deviation of the Gaussian that averages the squared residuals, mm."""
 _COLOR_NOISE = 0.06
 """Root mean square residual from which on points count less: there skin is of many colours."""
-_ERROR_MM = 0.6
-"""Standard deviation of the error of the surface to be mended, mm."""
-_RADIUS_MM = 3.0
-"""Standard deviation of the Gaussian whose self-convolution is that error's covariance, mm."""
+_ERROR_FACTOR = 1.2
+"""On the surface's expected error: where shading tells most, at lips and lids, it is larger."""
 _PRECISION = 9.0
 """1 over the variance of the logarithm on even skin, for each mm^2."""
 _STEPS = 3
@@ -54,13 +53,14 @@ _STEPS = 3
 
 def shading_detail(
     heights: Floats, weight: Floats, slopes: Floats, coordinates: tuple[Doubles, Doubles],
-    sampler: ColorSampler,
+    sampler: ColorSampler, plan: Risk,
 ) -> Floats:
     """Find what is to be added to a surface for its shading to be that of the image.
 
     heights : (rows, columns) float32, mm
     coordinates : x of the columns, y of the rows, mm
     sampler : tells points' colours
+    plan : tells the surface's expected error
 
     The rest is as of `shape_from_shading`.
     """
@@ -70,10 +70,13 @@ def shading_detail(
     weight = weight.copy()
     brightness = kernels.brightness_image(*sampler(points), _BRIGHTNESS, _SATURATED, weight)
     xs = coordinates[0]
-    return shape_from_shading(brightness, weight, slopes, float(xs[1] - xs[0]))
+    return shape_from_shading(brightness, weight, slopes, float(xs[1] - xs[0]),
+                              _ERROR_FACTOR * plan.error_mm, plan.radius_mm)
 
 
-def shape_from_shading(brightness: Floats, weight: Floats, slopes: Floats, step: float) -> Floats:
+def shape_from_shading(
+    brightness: Floats, weight: Floats, slopes: Floats, step: float, error: float, radius: float
+) -> Floats:
     """Find what is to be added to a surface for its shading to be that of the image.
 
     Of all changes h with a Gaussian's covariance, the one that best explains r, the logarithm of
@@ -84,6 +87,8 @@ def shape_from_shading(brightness: Floats, weight: Floats, slopes: Floats, step:
     weight : (rows, columns) float32, 0-1, how much a point counts
     slopes : (2, rows, columns) float32, dz/dx, dz/dy
     step : distance of points, mm
+    error : standard deviation of the error of the surface to be mended, mm
+    radius : of the Gaussian whose self-convolution is that error's covariance, mm
 
     Gives (rows, columns) float32, mm along z; zero where there is too little to fit the lighting.
     """
@@ -100,13 +105,15 @@ def shape_from_shading(brightness: Floats, weight: Floats, slopes: Floats, step:
     energy, = normalized_convolution(skin, _ENERGY_MM / (2 * step), residuals * residuals)
     kernels.apply_weights(system, weight * skin, upsampled(energy, residuals.shape), _COLOR_NOISE,
                           _PRECISION * step**2, step)
-    return _solved(system, step)
+    return _solved(system, error, math.sqrt(2) * radius / step)
 
 
-def _solved(system: kernels.ShadingSystem, step: float) -> Floats:
-    """Solve by conjugate gradients, with the covariance as preconditioner."""
-    radius = math.sqrt(2) * _RADIUS_MM / step
-    variance = _ERROR_MM**2 * 2 * math.pi * radius**2
+def _solved(system: kernels.ShadingSystem, error: float, radius: float) -> Floats:
+    """Solve by conjugate gradients, with the error's covariance as preconditioner.
+
+    radius : standard deviation of that covariance, points of the grid
+    """
+    variance = error**2 * 2 * math.pi * radius**2
     values, by_x, by_y = system
     state = kernels.Iterate(*(np.zeros_like(values) for _ in kernels.Iterate._fields))
     kernels.apply_jacobian_transpose(values, by_x, by_y, state.residual)

@@ -33,8 +33,6 @@ _GAP_MM = 6.0
 """Standard deviation of the Gaussian over which gaps of the broad fits are averaged, mm."""
 _HOLE_GAP_MM = 16.0
 """The same for a hole, whose surroundings tell the gap, mm."""
-_FIT_VARIANCE = 0.25
-"""Variance of the broad fit, over that of the noise in the detail."""
 _DIFFERENCE_MM = 4.0
 """Standard deviation of the Gaussian over which the sides' detail is compared, mm."""
 _REACH_MM = 12.0
@@ -45,7 +43,7 @@ _DIFFERENT = 1.15
 
 def symmetry_correction(
     field: HeightField, kept: Floats, filled: Floats, hole: Floats, plane: MirrorPlane,
-    noise: float, window: float,
+    noise: float, fit_share: float, window: float,
 ) -> Floats:
     """Find what the mirror image adds to a face.
 
@@ -55,6 +53,7 @@ def symmetry_correction(
     hole : (rows, columns) float32, 0-1, how much of a place is filled
     plane : to mirror in
     noise : variance of the noise in the detail, mm^2
+    fit_share : variance of the error of the broad fit, over that
     window : over which detail counts as local (standard deviation), mm
 
     Gives (rows, columns) float32, mm along z.
@@ -72,7 +71,7 @@ def symmetry_correction(
         around, = normalized(blurred(gaps, _HOLE_GAP_MM / (2 * step)))
         gap_energy += hole * (upsampled(around, hole.shape) - gap_energy)
     return kernels.correction(field.planes, image, kept, hole, upsampled(factors, hole.shape),
-                              gap_energy, _FIT_VARIANCE * v)
+                              gap_energy, fit_share * v)
 
 
 def _alike(excess: Floats, step: float) -> Floats:

@@ -10,6 +10,7 @@ import numpy as np
 from denseface.recon.arrays import Bools, Bytes
 from denseface.recon.face import DenseCloud, Seeds
 from denseface.recon.intermediate import ColorSampler, SurfaceGrid
+from denseface.recon.noise import Risk
 from denseface.recon.numerics.push_pull import interpolate_colors
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, pixel_coordinates
 from denseface.recon.propagation._bridges import without_bridges
@@ -27,7 +28,7 @@ _HOLE = 1.5
 
 
 def densify(
-    seeds: Seeds, surface: SurfaceGrid, spacing: float, ratio: float, noise_fraction: float,
+    seeds: Seeds, surface: SurfaceGrid, spacing: float, ratio: float, plan: Risk,
     sampler: ColorSampler | None = None,
 ) -> DenseCloud:
     """Sample the surface on a regular grid, `ratio` points for each seed.
@@ -38,7 +39,7 @@ def densify(
     surface : the fit over (X, Y), with its detail
     spacing : mean spacing of the seeds, mm
     ratio : dense points for each seed
-    noise_fraction : k of `recon.propagation.uncertainty.noise_fraction`
+    plan : the expected error of the fit
     sampler : tells the colours of points in holes; None, and their border's colours fill them
     """
     step = float(np.sqrt(surface.support.area / (ratio * len(seeds.points))))
@@ -49,7 +50,7 @@ def densify(
 
     components = variance_components(
         seeds.points, support.inside, surface.values, origin, support.step, spacing)
-    error = standard_error(components, noise_fraction, detailed=surface.detailed)
+    error = standard_error(components, plan, detailed=surface.detailed)
     sigma = np.asarray(cv2.copyMakeBorder(error, 0, 1, 0, 1, cv2.BORDER_REPLICATE), np.float32)
     every = max(1, round(_COLOR_STEP * spacing / step))
     colors = _colors(seeds, origin, every * step, spacing, _coarser(inside, every))

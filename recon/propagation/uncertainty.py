@@ -1,48 +1,57 @@
 """Stage 6: how far off each dense point may be, along its viewing ray.
 
-    sigma^2 = k r^2 (1 + H d) + S (h g^2)^2 + E e (h g)^2
+    sigma^2 = r^2 (B b + W w + M m) + H d^2 + S j^2 h^2 g^4 + e g^2 (E h^2 + J j^2)
 
-r, mm : what the seeds around the point are off the surface, root mean square: the sensor's noise
-    and detail that smoothing took away, k of it left in the surface (`noise_fraction`)
-d, spacings : how far into a hole: distance from the nearest seed, less one
+r, mm : what the seeds around the point are off the surface, root mean square
+b, w, m : expected squares of what the fit takes off the face, and of white and smooth noise that it
+    lets pass, over r^2: `recon.noise.Risk`
+d, mm : how far into a hole: distance from the nearest seed, less one spacing
 h, mm : mean spacing of the seeds, which grows with the distance from the camera
-g : slope of the surface: where it is steep, a reading's sideways jitter, as large as h, is depth
+g : slope of the surface: where it is steep, a reading's sideways jitter is depth
+j, mm : that jitter, told by how much more the seeds are off where it is steep
 e, 0-1 : how near the rim, where seeds lie on one side alone; 1 on it
 
-A Gaussian process has its own posterior variance, but only where noise is independent from seed
-to seed and the fit has no bias: a Kinect's is correlated over several pixels, and lips, lids and
-nostrils are bias. So the form is made of what an error can come from, and the coefficients are
-fitted by maximum likelihood to simulated frames with known truth (`python -m bench.calibration
---fit`, on the heads that settings are chosen on; docs/decisions/0007-sigma.md).
+and never less than what the levels of depth leave, `recon.noise.Noise.level_error_mm`. Were the
+model of face and noise the whole truth, B, W and M would be 1. The coefficients are fitted by
+maximum likelihood to simulated frames of many kinds of sensor with known truth (`python -m
+bench.adaptation --fit`, on the heads that settings are chosen on; docs/decisions/0007-sigma.md).
 """
 
-import math
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from denseface.recon.arrays import Bools, Floats
+from denseface.recon.noise import Risk
 from denseface.recon.numerics.filters import filtered, gaussian_taps
 from denseface.recon.numerics.jit import compiled
-from denseface.recon.settings import Settings
 
-__all__ = ["VarianceComponents", "averaging_cutoff", "fit_cutoff", "noise_fraction",
-           "standard_error", "variance_components"]
+__all__ = ["VarianceComponents", "standard_error", "variance_components"]
 
-_HOLE = 0.4
-"""H, for each spacing into a hole. This and the next five: `bench/calibration.py --fit`."""
-_SLOPE = 0.075
-"""S, of a slope squared."""
-_RIM = 1.46
-"""E of a fit with detail, which has a broad average at the rim."""
-_RIM_FIT_ALONE = 2.4
-"""E of a fit without detail."""
-_FIT_FRACTION = 90.0
-"""Of `noise_fraction`: over the squared cut-off of the fit."""
-_DETAIL_FRACTION = 0.12
-"""Of `noise_fraction`: what detail brings back, over what its own average would let pass."""
 
+
+class _Coefficients(NamedTuple):
+    """Of `sigma`'s square: B, W, M, H, S, E, J."""
+
+    bias: float
+    white: float
+    smooth: float
+    hole: float
+    slope: float
+    rim: float
+    rim_jitter: float
+
+
+_DETAILED = _Coefficients(1.35, 0.85, 2.2, 0.11, 0.14, 0.42, 1.1)
+"""Of a fit with detail, which has a broad average at the rim."""
+_FIT_ALONE = _Coefficients(2.0, 2.0, 2.1, 0.38, 0.20, 1.50, 2.18)
+"""Of a fit without."""
+
+_STEEP, _FLAT = 0.8, 0.3
+"""Squared slopes above and below which residuals are compared to tell the jitter."""
+_USUAL_JITTER, _JITTER_SEEDS = 0.35, 100.0
+"""j^2 where no frame tells it, over h^2, and the weight of that, in seeds."""
 _WINDOW = 2.5
 """Standard deviation of the Gaussian over which residuals and slopes count as local, spacings."""
 _PRIOR = 0.03
@@ -56,7 +65,8 @@ class VarianceComponents(NamedTuple):
 
     Attributes
     ----------
-    noise, hole, slope, rim : r^2, r^2 d, (h g^2)^2, e (h g)^2, (rows, columns) float32, mm^2
+    noise, hole, slope, rim, rim_jitter : r^2, d^2, j^2 h^2 g^4, e h^2 g^2, e j^2 g^2,
+        (rows, columns) float32, mm^2
     every : grid points from node to node
     """
 
@@ -64,31 +74,8 @@ class VarianceComponents(NamedTuple):
     hole: Floats
     slope: Floats
     rim: Floats
+    rim_jitter: Floats
     every: int
-
-
-def noise_fraction(settings: Settings) -> float:
-    """Give k: what fraction of the residuals' variance is error left in the surface.
-
-    A smoother lets pass what is longer than some L, where signal and smoothing weigh the same: of
-    noise, a fraction in proportion to (h / L)^2. Detail that is added to the fit brings back a part
-    of what its own average lets pass.
-    """
-    fraction = _FIT_FRACTION * fit_cutoff(settings.r0_factor, settings.smoothing) ** 2
-    if settings.detail_factor is not None:
-        fraction += _DETAIL_FRACTION * _FIT_FRACTION * averaging_cutoff(settings.detail_factor) ** 2
-    return fraction
-
-
-def fit_cutoff(r0_factor: float, smoothing: float) -> float:
-    """Give the cut-off h / L of a fit, L = pi R0 / sqrt(ln(pi (R0/h)^2 / lambda))."""
-    weight = max(math.pi * r0_factor**2 / smoothing, math.e)
-    return math.sqrt(math.log(weight)) / (math.pi * r0_factor)
-
-
-def averaging_cutoff(detail_factor: float) -> float:
-    """Give the cut-off h / L of a Gaussian average: of a wave of length L, half is left."""
-    return math.sqrt(math.log(2) / 2) / (math.pi * detail_factor)
 
 
 def variance_components(
@@ -111,17 +98,39 @@ def variance_components(
     nodes = node_statistics(points, support, surface, origin, step, every)
     far = cv2.distanceTransform((nodes[..., 2] == 0).astype(np.uint8), cv2.DIST_L2, 5)
     seeds, squares = nodes[..., 2].sum(dtype=np.float64), nodes[..., 3].sum(dtype=np.float64)
+    jitter = np.float32(_squared_jitter(nodes, spacing))
     covered, slope, count, square = cv2.split(filtered(nodes, gaussian_taps(_WINDOW / node)))
     prior = np.float32(_PRIOR * node**2)
     noise = (square + prior * np.float32(squares / max(seeds, 1.0))) / (count + prior)
-    hole = noise * np.maximum(np.float32(node) * far - 1, np.float32(0))
+    deep = np.float32(spacing) * np.maximum(np.float32(node) * far - 1, np.float32(0))
     slope /= np.maximum(covered, np.float32(1e-3))
     area = np.float32(spacing**2)
-    edge = np.clip(2 - 2 * covered, np.float32(0), np.float32(1))
+    edge = slope * np.clip(2 - 2 * covered, np.float32(0), np.float32(1))
     return VarianceComponents(
-        noise=np.asarray(noise, np.float32), hole=np.asarray(hole, np.float32),
-        slope=np.asarray(area * slope * slope, np.float32),
-        rim=np.asarray(area * slope * edge, np.float32), every=every)
+        noise=np.asarray(noise, np.float32), hole=np.asarray(deep * deep, np.float32),
+        slope=np.asarray(jitter * area * slope * slope, np.float32),
+        rim=np.asarray(area * edge, np.float32), rim_jitter=np.asarray(jitter * edge, np.float32),
+        every=every)
+
+
+def _squared_jitter(nodes: Floats, spacing: float) -> float:
+    """Tell j^2, mm^2, by the squared residuals of seeds where it is steep and where it is not.
+
+    nodes : of `node_statistics`; spacing : h, mm
+    """
+    _, slope, count, square = (nodes[..., k] for k in range(4))
+    levels = []
+    for chosen in (slope > _STEEP, slope < _FLAT):
+        seeds = float(count[chosen].sum())
+        levels.append((seeds, float((count[chosen] * slope[chosen]).sum()) / max(seeds, 1.0),
+                       float(square[chosen].sum()) / max(seeds, 1.0)))
+    (some, steep, residual), (others, flat, least) = levels
+    usual = _USUAL_JITTER * spacing**2
+    seeds = min(some, others)
+    if seeds == 0:
+        return usual
+    found = max(residual - least, 0.0) / (steep - flat)
+    return (seeds * found + _JITTER_SEEDS * usual) / (seeds + _JITTER_SEEDS)
 
 
 @compiled
@@ -162,24 +171,25 @@ def node_statistics(
     return out
 
 
-def standard_error(
-    components: VarianceComponents, noise_fraction: float, *, detailed: bool
-) -> Floats:
+def standard_error(components: VarianceComponents, plan: Risk, *, detailed: bool) -> Floats:
     """Give sigma on the nodes of its components.
 
     Parameters
     ----------
     components : of this face's variance
-    noise_fraction : k, of the settings that the surface was fitted with
-    detailed : whether detail was added to the fit
+    plan : the expected error of the fit
+    detailed : whether detail was added to it
 
     Returns
     -------
     (rows, columns) float32, mm: 68 % of the errors along the viewing ray are within it, 95 % within
     twice
     """
-    rim = np.float32(_RIM if detailed else _RIM_FIT_ALONE)
-    variance = (np.float32(noise_fraction)
-                * (components.noise + np.float32(_HOLE) * components.hole)
-                + np.float32(_SLOPE) * components.slope + rim * components.rim)
-    return np.asarray(np.maximum(np.sqrt(variance), np.float32(_MIN_SIGMA_MM)), np.float32)
+    c = _DETAILED if detailed else _FIT_ALONE
+    share = (c.bias * plan.bias_share + c.white * plan.white_share
+             + c.smooth * plan.smooth_share)
+    variance = (np.float32(share) * components.noise + np.float32(c.hole) * components.hole
+                + np.float32(c.slope) * components.slope + np.float32(c.rim) * components.rim
+                + np.float32(c.rim_jitter) * components.rim_jitter)
+    least = np.float32(max(plan.least_mm, _MIN_SIGMA_MM))
+    return np.asarray(np.maximum(np.sqrt(variance), least), np.float32)

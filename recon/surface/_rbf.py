@@ -62,7 +62,6 @@ class Surface:
     center : (x, y), mm
     scale : mm
     r0 : mm
-    noise : weighted standard deviation of the seeds about the surface, mm
     """
 
     nodes_x: Doubles
@@ -72,7 +71,6 @@ class Surface:
     center: tuple[float, float]
     scale: float
     r0: float
-    noise: float
 
     def heights(self, xs: Doubles, ys: Doubles) -> Floats:
         """Evaluate on an axis-aligned grid: (k,), (m,) mm -> (m, k) mm."""
@@ -90,7 +88,7 @@ class Surface:
     def on_support(self, support: Support) -> SurfaceGrid:
         """Sample on the grid of a support."""
         values = self.sampled(support.xs, support.ys)
-        return SurfaceGrid(values, support, self.noise, detailed=False)
+        return SurfaceGrid(values, support, detailed=False)
 
     def _factors(self, values: Doubles, axis: int) -> Floats:
         """The nodes' Gaussians and 1, t, t^2 of the polynomial along one axis."""
@@ -171,11 +169,7 @@ def fit_surface(
     solved = conjugate_gradients(system, flat[6], _TOLERANCE, _MAX_ITERATIONS)
     alpha = solved.reshape(padded.shape[1:])[reach:-reach, reach:-reach].astype(np.float64)
     beta = trend.beta - np.linalg.solve(trend.normal, terms @ alpha.ravel())
-
-    # At the solution the squared residuals follow from the sums at hand.
-    squares = trend.squares - (alpha * right).sum() - smoothing * (alpha * alpha).sum()
-    return Surface(nodes_x, nodes_y, root * alpha, beta, trend.center, trend.scale, r0,
-                   noise=float(np.sqrt(max(squares, 0.0) / float(W.sum()))))
+    return Surface(nodes_x, nodes_y, root * alpha, beta, trend.center, trend.scale, r0)
 
 
 def _node_sums(

@@ -24,7 +24,6 @@ class Trend:
     normal : (6, 6) float64, the matrix of the normal equations, P^T W P
     beta : (6,) float64, mm, before 1, u, v, u^2, uv, v^2
     residuals : (n,) float32, W_i times the residual of z_i, mm
-    squares : the sum of W_i times the squared residuals, mm^2
     """
 
     center: tuple[float, float]
@@ -32,7 +31,6 @@ class Trend:
     normal: Doubles
     beta: Doubles
     residuals: Floats
-    squares: float
 
     @classmethod
     def of(cls, x: Doubles, y: Doubles, z: Doubles, weights: Doubles) -> "Trend":
@@ -42,8 +40,8 @@ class Trend:
         sums, right = _sums(x, y, z, weights, cx, cy, 1 / scale)
         normal = sums[_PRODUCT_POWERS[..., 0], _PRODUCT_POWERS[..., 1]]
         beta: Doubles = np.linalg.solve(normal, right[_POWERS[:, 0], _POWERS[:, 1]])
-        residuals, squares = _residuals(x, y, z, weights, cx, cy, 1 / scale, beta)
-        return cls((cx, cy), scale, normal, beta, residuals, squares)
+        return cls((cx, cy), scale, normal, beta,
+                   _residuals(x, y, z, weights, cx, cy, 1 / scale, beta))
 
 
 @compiled
@@ -83,14 +81,12 @@ def _sums(
 def _residuals(
     x: Doubles, y: Doubles, z: Doubles, weights: Doubles, cx: float, cy: float, per_scale: float,
     beta: Doubles,
-) -> tuple[Floats, float]:
-    """Give W times the residuals of z, and the sum of W times their squares."""
+) -> Floats:
+    """Give W times the residuals of z."""
     b0, b1, b2, b3, b4, b5 = beta[0], beta[1], beta[2], beta[3], beta[4], beta[5]
     residuals = np.empty(len(x), np.float32)
-    squares = 0.0
     for k in range(len(x)):
         u, v = (x[k] - cx) * per_scale, (y[k] - cy) * per_scale
         left = z[k] - (b0 + u * (b1 + b3 * u + b4 * v) + v * (b2 + b5 * v))
         residuals[k] = weights[k] * left
-        squares += weights[k] * left * left
-    return residuals, squares
+    return residuals

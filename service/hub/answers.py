@@ -88,8 +88,9 @@ def _of_another_job(report: Report, capture_id: str, facts: JobFacts) -> str | N
 def _wrong_numbers(report: Report) -> str | None:
     if report.mean_spacing_mm <= 0 or report.noise_mm < 0:
         return "has a spacing or noise below zero"
-    r0 = report.settings.r0_factor * report.mean_spacing_mm
-    if not math.isclose(report.r0_mm, r0, rel_tol=_ROUNDING):
+    factor = report.settings.r0_factor
+    r0 = report.r0_mm if factor is None else factor * report.mean_spacing_mm
+    if not math.isclose(report.r0_mm, r0, rel_tol=_ROUNDING) or r0 <= 0:
         return f"has R0 {report.r0_mm:g} mm, its spacing and settings make {r0:g} mm"
     if report.candidates and report.candidates[0].box != report.face_box:
         return "has chosen another box than the face's"

@@ -8,6 +8,7 @@ from denseface.recon.detail import add_detail
 from denseface.recon.face import Seeds
 from denseface.recon.intermediate import Registration, SurfaceGrid
 from denseface.recon.registration import register
+from denseface.recon.noise import Noise, least_risk
 from denseface.recon.support import Support
 from denseface.recon.surface import Surface, fit_surface
 from tests.unit.frames import calibration, camera, frame
@@ -57,6 +58,10 @@ def box(x: float = 0.0, y: float = 0.0, z: float = NEAR, width_mm: float = 150.0
     return round(u - side / 2), round(v - side / 2), side, side
 
 
+NOISE = Noise(white_mm=1.2, smooth_mm=0.0, length_px=2.0, quantum_mm=0.0)
+"""White, of 1.2 mm."""
+
+
 def disc_seeds(
     spacing: float, radius: float, hole: float = 0.0, *, seed: int = 0, jitter: float = 0.1
 ) -> NDArray[np.float32]:
@@ -86,9 +91,10 @@ def fitted(
 
 def with_detail(
     broad: Surface, points: NDArray[np.float32], spacing: float, radius: float, *,
-    symmetry: bool = False,
+    symmetry: bool = False, noise: Noise = NOISE,
 ) -> SurfaceGrid:
     """A fit of some points with their detail."""
     support = Support.of(points, spacing)
+    plan = least_risk(noise, spacing, radius / spacing)
     return add_detail(broad.heights(support.xs, support.ys), support, points, spacing, radius,
-                      symmetry=symmetry)
+                      plan, symmetry=symmetry)

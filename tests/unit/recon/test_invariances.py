@@ -13,11 +13,12 @@ from denseface.capture.calibration import CameraModel, DepthToColor
 from denseface.capture.frame import RgbdFrame
 from denseface.recon import Settings
 from denseface.recon.face import DenseCloud, Seeds
-from denseface.recon.fitting import surface_of
+from denseface.recon.fitting import plan_fit, surface_of
 from denseface.recon.propagation import densify
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.settings import Neighbors
 from denseface.recon.surface import exact_spacing, mean_spacing
+from tests.unit.recon.shapes import NOISE
 
 HOW = Settings()
 
@@ -34,8 +35,8 @@ def dense_of(seeds: Seeds) -> DenseCloud:
     """What follows segmentation, as `reconstruct` does it, but with exact neighbours."""
     points = seeds.points
     spacing = exact_spacing(np.ascontiguousarray(points[:, :2]))
-    surface = surface_of(points, spacing, HOW)
-    return densify(seeds, surface, spacing, HOW.ratio, noise_fraction=0.5)
+    plan = plan_fit(HOW, NOISE, spacing)
+    return densify(seeds, surface_of(points, spacing, HOW, plan), spacing, HOW.ratio, plan)
 
 
 def off(one: DenseCloud, other: DenseCloud) -> np.ndarray:

@@ -22,7 +22,8 @@ from denseface.recon import (
     TooLittleDepthError,
     reconstruct,
 )
-from denseface.recon.fitting import surface_of
+from denseface.recon.fitting import plan_fit, surface_of
+from denseface.recon.noise import measure_noise
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import segment_face
 from denseface.recon.settings import Neighbors
@@ -373,7 +374,9 @@ def test_without_colour_the_face_is_that_of_depth(shot):
         tied = register(frame)
         seeds = segment_face(tied, box, frame.calibration.color.fx)
         spacing = mean_spacing(seeds.points, seeds.pixels, Neighbors.LATTICE)
-        surface = surface_of(seeds.points, spacing, Settings(shading=shading),
+        how = Settings(shading=shading)
+        plan = plan_fit(how, measure_noise(seeds.points, seeds.pixels, spacing), spacing)
+        surface = surface_of(seeds.points, spacing, how, plan,
                              partial(sample_colors, frame, tied))
         heights.append(surface.values[0])
     assert np.abs(heights[0] - heights[1]).mean() < 0.02

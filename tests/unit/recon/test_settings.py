@@ -9,8 +9,9 @@ from denseface.recon.settings import Changes, Neighbors, Preset, Settings
 
 def test_best_is_the_default():
     assert Settings() == Settings(preset=Preset.BEST) == Settings.of("best")
-    assert Settings().r0_factor == 14
-    assert Settings().detail_factor == 1.5
+    assert Settings().r0_factor is None
+    assert Settings().smoothing is None
+    assert Settings().detail_factor == 1.0
     assert Settings().symmetry
     assert Settings().shading
     assert Settings().neighbors is Neighbors.LATTICE
@@ -40,8 +41,8 @@ def test_a_report_of_an_older_face_may_name_a_setting_that_is_gone():
 def test_every_setting_of_a_preset_is_in_range(preset):
     settings = Settings.of(preset)
     assert Settings.model_validate(settings.model_dump()) == settings
-    assert settings.r0_factor >= 2
-    assert settings.smoothing >= 0.05
+    assert settings.r0_factor is None or settings.r0_factor >= 2
+    assert settings.smoothing is None or settings.smoothing >= 0.05
 
 
 def test_what_is_given_wins():
@@ -49,6 +50,7 @@ def test_what_is_given_wins():
     assert (settings.r0_factor, settings.ratio) == (9, 5)
     assert settings.smoothing == Settings.of("paper").smoothing
     assert Settings(detail_factor=None).detail_factor is None
+    assert Settings.of("paper", smoothing="measured").smoothing is None
     assert Settings(preset="faithful", neighbors="exact").neighbors is Neighbors.EXACT
 
 

@@ -35,7 +35,7 @@ def small_face(rows: int = 12, columns: int = 9, step: float = 2.0) -> Face:
     colors = np.stack([u * 20, v * 15, np.full_like(u, 90)], axis=1).astype(np.uint8)
     report = Report(
         capture_id="", face_box=(1, 2, 5, 4), candidates=(), initial_points=len(points[::4]),
-        dense_points=len(points), mean_spacing_mm=2 * step, r0_mm=Settings().r0_factor * 2 * step,
+        dense_points=len(points), mean_spacing_mm=2 * step, r0_mm=28 * step,
         noise_mm=0.5, timings_ms={"total": 1.0}, settings=Settings(), calibration="unspecified",
         skew_us=-1000, version="0")
     return Face(

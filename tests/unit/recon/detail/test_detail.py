@@ -69,10 +69,6 @@ def test_the_gradient_is_the_derivative(noisy):
         assert np.corrcoef(slope[INSIDE], moved[INSIDE])[0, 1] > 0.995
 
 
-def test_noise_is_what_the_seeds_are_off_the_surface(noisy):
-    assert noisy[1].noise == pytest.approx(1.2, rel=0.05)
-
-
 def test_without_noise_the_surface_is_that_of_the_seeds():
     _, detailed = surfaces(0.0)
     assert rms(detailed.sampled(XS, YS)[0], AWAY < 8) < 0.4
@@ -94,7 +90,6 @@ def test_inside_a_hole_the_surface_goes_on_from_its_border():
 def test_the_same_seeds_give_the_same_bytes(noisy):
     again = surfaces(1.2)[1]
     np.testing.assert_array_equal(noisy[1].values, again.values)
-    assert noisy[1].noise == again.noise
 
 
 def test_far_from_all_seeds_the_detail_stays_finite():

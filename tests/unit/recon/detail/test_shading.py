@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from denseface.recon.detail._shading import shading_detail, shape_from_shading
+from denseface.recon.noise import least_risk
+from tests.unit.recon.shapes import NOISE
 
 STEP = 1.2
 XS = np.arange(-50, 50, STEP)
@@ -27,13 +29,15 @@ def lit(heights, toward, ambient=0.35):
     return (ambient + 0.75 * np.maximum(normals @ toward, 0)).astype(np.float32)
 
 
+PLAN = least_risk(NOISE, 1.2, 1.0)._replace(error_mm=0.5, radius_mm=3.0)
 BALL = (700 - np.sqrt(90.0**2 - X**2 - Y**2)).astype(np.float64)
 WITH_BUMP = BALL - 0.8 * np.exp(-((X - 12) ** 2 + (Y + 8) ** 2) / (2 * 3.5**2))
 
 
 def found(brightness, weight=EVERYWHERE):
     """What is added to the ball without the bump."""
-    return shape_from_shading(np.asarray(brightness, np.float32), weight, slopes(BALL), STEP)
+    return shape_from_shading(np.asarray(brightness, np.float32), weight, slopes(BALL), STEP,
+                              1.2 * PLAN.error_mm, PLAN.radius_mm)
 
 
 def rms(values):
@@ -132,7 +136,7 @@ def image_of(brightness, seen=None, spoilt=None):
 def test_a_colour_image_tells_as_much_as_its_brightness():
     brightness = lit(WITH_BUMP, LIGHTS[0])
     added = shading_detail(BALL.astype(np.float32), EVERYWHERE, slopes(BALL), (XS, XS),
-                           image_of(brightness))
+                           image_of(brightness), PLAN)
     np.testing.assert_allclose(added, found(brightness), atol=0.05)
 
 
@@ -142,7 +146,8 @@ def test_what_is_hidden_or_saturated_does_not_count(how):
     place = np.hypot(X + 20, Y - 5) < 8
     sampler = (image_of(brightness, seen=~place) if how == "seen"
                else image_of(brightness, spoilt=place))
-    added, other = (shading_detail(BALL.astype(np.float32), weight, slopes(BALL), (XS, XS), image)
+    added, other = (shading_detail(BALL.astype(np.float32), weight, slopes(BALL), (XS, XS), image,
+                                   PLAN)
                     for weight, image in ((EVERYWHERE, sampler),
                                           ((EVERYWHERE * ~place), image_of(brightness))))
     np.testing.assert_array_equal(added, other)
@@ -150,5 +155,5 @@ def test_what_is_hidden_or_saturated_does_not_count(how):
 
 def test_a_face_that_is_nowhere_adds_nothing():
     added = shading_detail(BALL.astype(np.float32), 0 * EVERYWHERE, slopes(BALL), (XS, XS),
-                           image_of(EVERYWHERE))
+                           image_of(EVERYWHERE), PLAN)
     assert not added.any()

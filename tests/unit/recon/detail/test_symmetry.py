@@ -9,6 +9,7 @@ from scipy.ndimage import gaussian_filter
 from denseface.recon.detail._mirror_kernels import HeightField
 from denseface.recon.detail._mirror_plane import MirrorPlane
 from denseface.recon.detail._symmetry import symmetry_correction
+from denseface.recon.noise import Noise
 from denseface.recon.surface import fit_surface
 from tests.unit.recon.mirror_shapes import Pose, face_points, height
 from tests.unit.recon.shapes import with_detail
@@ -17,6 +18,8 @@ SPACING = 1.5
 # Parts of the variance and correlation lengths, points, as a Kinect's (`tests/simulator/noise.py`).
 NOISE_MM = 1.2
 NOISE_PARTS = ((0.18, 0.0), (0.46, 1.4), (0.36, 3.1))
+NOISE = Noise(white_mm=0.5, smooth_mm=1.1, length_px=2.0, quantum_mm=0.0)
+"""What is measured of it."""
 TURNED = Pose(yaw=12, roll=-5, shift=(20, -10, 0))
 
 
@@ -62,7 +65,7 @@ def errors(symmetry, pose=TURNED, one_side=None, hole=False, seeds=3):
             at = pose.own(points)
             points = points[np.hypot(at[:, 0] - 30, at[:, 1] + 22) > 12]
         broad = fit_surface(points, 14 * SPACING, 12)
-        surface = with_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=symmetry)
+        surface = with_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=symmetry, noise=NOISE)
         found.append([surface.sampled(true[k:k + 1, 0], true[k:k + 1, 1])[0, 0, 0]
                       for k in range(len(true))] - true[:, 2])
     return x, y, np.array(found)
@@ -128,7 +131,7 @@ def test_half_a_face_is_no_worse_for_it(half):
     at = TURNED.own(points)
     true = TURNED.placed(np.column_stack([at[:, :2], height(at[:, 0], at[:, 1])]))[::5]
     for symmetry in (False, True):
-        surface = with_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=symmetry)
+        surface = with_detail(broad, points, SPACING, 1.5 * SPACING, symmetry=symmetry, noise=NOISE)
         found.append(np.std([surface.sampled(one[:1], one[1:2])[0, 0, 0] - one[2] for one in true]))
     assert found[1] < 1.02 * found[0]
 
@@ -140,7 +143,7 @@ def test_a_plane_beside_the_face_adds_nothing(plane):
     planes[..., 0] = 700
     field = HeightField(planes, np.zeros(3), 1.5)
     none = np.zeros((30, 20), np.float32)
-    added = symmetry_correction(field, none, none, none, plane, 0.1, 11.0)
+    added = symmetry_correction(field, none, none, none, plane, 0.1, 0.25, 11.0)
     np.testing.assert_array_equal(added, 0)
 
 
@@ -155,7 +158,7 @@ def test_without_noise_nothing_changes():
     field = HeightField(planes, np.array([-30.0, -30.0, 0.0]), 1.0)
     none = np.zeros(z.shape, np.float32)
     added = symmetry_correction(field, detail.astype(np.float32), none, none,
-                                MirrorPlane(np.array([1.0, 0, 0]), 0.0), 0.0, 11.0)
+                                MirrorPlane(np.array([1.0, 0, 0]), 0.0), 0.0, 0.25, 11.0)
     assert np.isfinite(added).all()
     assert np.abs(added).max() < 0.01
 

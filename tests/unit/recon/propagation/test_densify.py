@@ -6,18 +6,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
+from denseface.recon.noise import least_risk
 from denseface.recon.openings import openings
 from denseface.recon.propagation import densify
 from denseface.recon.surface import exact_spacing
 from denseface.service.export.mesh import triangulate
 from tests.mesh_holes import mesh_faults
-from tests.unit.recon.shapes import disc_seeds, fitted, seeds
+from tests.unit.recon.shapes import NOISE, disc_seeds, fitted, seeds
+
+PLAN = least_risk(NOISE, 1.3, None, 6.0, 0.1)
 
 
 def dense_of(points, ratio=10.0, colors=None, smoothing=0.1):
     spacing = exact_spacing(np.ascontiguousarray(points[:, :2]))
     surface = fitted(points, spacing, 6 * spacing, smoothing)
-    return densify(seeds(points, colors), surface, spacing, ratio, noise_fraction=0.5)
+    return densify(seeds(points, colors), surface, spacing, ratio, PLAN)
 
 
 def raised(points, height):
@@ -131,7 +134,7 @@ def test_points_in_a_hole_are_coloured_by_what_is_seen_there():
         asked.append(some)
         return np.full((len(some), 3), (10, 20, 30), np.uint8), some[:, 0] > 0
 
-    dense = densify(seeds(points), surface, spacing, 10, 0.5, sampler)
+    dense = densify(seeds(points), surface, spacing, 10, PLAN, sampler)
     far, _ = cKDTree(points[:, :2]).query(dense.points[:, :2])
     inside = far > 2 * spacing
     assert len(asked[0]) >= inside.sum() > 100
@@ -160,7 +163,7 @@ def test_a_step_is_not_bridged_where_nothing_was_read():
     points = disc_seeds(1.0, 30)
     points = points[np.abs(points[:, 0]) > 1.8]
     points[:, 2] = np.where(points[:, 0] > 0, 740, 700)
-    dense = densify(seeds(points), fitted(points, 1.0, 4, 0.1), 1.0, 10, 0.5)
+    dense = densify(seeds(points), fitted(points, 1.0, 4, 0.1), 1.0, 10, PLAN)
     x, y, z = dense.points.T
     assert not ((np.abs(x) < 1) & (np.abs(y) < 28)).any()
     # Neither side loses its own.
@@ -178,7 +181,7 @@ def test_an_enclosed_bridge_closes_a_nose_s_side_but_joins_no_two_surfaces(step_
     x, y, _ = points.T
     steep = np.clip(x / 2 + 0.5, 0, 1) * np.clip(1.5 - np.abs(y) / 12, 0, 1)
     points[:, 2] = 700 + step_mm * np.where(x > 0, steep * np.clip(1.5 - x / 14, 0, 1), 0)
-    dense = densify(seeds(points), fitted(points, 1.0, 4, 0.1), 1.0, 10, 0.5)
+    dense = densify(seeds(points), fitted(points, 1.0, 4, 0.1), 1.0, 10, PLAN)
     found = openings(dense)
     assert (found.holes > 0) == stays_open
     assert mesh_faults(dense.points, triangulate(dense)).holes == found.holes
@@ -187,7 +190,7 @@ def test_an_enclosed_bridge_closes_a_nose_s_side_but_joins_no_two_surfaces(step_
 def test_a_gap_without_a_step_is_filled():
     points = disc_seeds(1.0, 30)
     points = points[np.abs(points[:, 0]) > 1.8]
-    dense = densify(seeds(points), fitted(points, 1.0, 4, 0.1), 1.0, 10, 0.5)
+    dense = densify(seeds(points), fitted(points, 1.0, 4, 0.1), 1.0, 10, PLAN)
     x, y, _ = dense.points.T
     assert ((np.abs(x) < 1.5) & (np.abs(y) < 28)).sum() == pytest.approx(
         3 * 56 / dense.grid_step_mm**2, rel=0.1)
@@ -196,6 +199,6 @@ def test_a_gap_without_a_step_is_filled():
 def test_what_was_read_stays_however_steep():
     points = disc_seeds(1.0, 30)
     points[:, 2] = 700 + 8 * points[:, 0]
-    dense = densify(seeds(points), fitted(points, 1.0, 8, 0.1), 1.0, 10, 0.5)
+    dense = densify(seeds(points), fitted(points, 1.0, 8, 0.1), 1.0, 10, PLAN)
     read, _ = cKDTree(dense.points[:, :2]).query(points[:, :2])
     assert np.quantile(read, 0.9) < 0.5

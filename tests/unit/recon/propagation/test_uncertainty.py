@@ -6,18 +6,19 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
+from denseface.recon.noise import least_risk
 from denseface.recon.propagation import densify
-from denseface.recon.propagation.uncertainty import fit_cutoff, node_statistics, noise_fraction
-from denseface.recon.settings import Preset, Settings
-from tests.unit.recon.shapes import disc_seeds, fitted, seeds
+from denseface.recon.propagation.uncertainty import _FIT_ALONE, node_statistics
+from tests.unit.recon.shapes import NOISE, disc_seeds, fitted, seeds
 
 FRACTION = 0.5
 MIN_SIGMA_MM = 0.05
 
 
-def dense_of(points, spacing, noise_fraction=FRACTION, ratio=10.0):
-    return densify(
-        seeds(points), fitted(points, spacing, 8 * spacing, 3.0), spacing, ratio, noise_fraction)
+def dense_of(points, spacing, ratio=10.0, least_mm=0.0):
+    plan = least_risk(NOISE, spacing, None, 8.0, 3.0)._replace(
+        bias_share=FRACTION / _FIT_ALONE.bias, white_share=0.0, smooth_share=0.0, least_mm=least_mm)
+    return densify(seeds(points), fitted(points, spacing, 8 * spacing, 3.0), spacing, ratio, plan)
 
 
 def noisy(xy, height, noise_mm, seed=0):
@@ -101,7 +102,8 @@ def test_it_is_larger_at_the_rim_of_the_same_slope():
 
 def test_nothing_is_known_better_than_whole_millimetres_allow():
     dense = dense_of(noisy(disc_seeds(1.3, 50), flat, 0), 1.3)
-    np.testing.assert_array_equal(dense.sigma[away(dense) < 45], np.float32(MIN_SIGMA_MM))
+    least = dense.sigma[away(dense) < 45] == np.float32(MIN_SIGMA_MM)
+    assert least.mean() > 0.99  # the others are in gaps between the seeds
 
 
 def test_it_moves_with_the_face():
@@ -112,18 +114,9 @@ def test_it_moves_with_the_face():
     assert len(there) == pytest.approx(len(here), rel=1e-2)
 
 
-def test_stronger_smoothing_leaves_less_noise():
-    paper, faithful, best = (noise_fraction(Settings.of(preset)) for preset in Preset)
-    assert paper > faithful > best > 0
-    fractions = [noise_fraction(Settings.of("faithful", smoothing=value))
-              for value in (0.05, 1, 30, 1000)]
-    assert fractions == sorted(fractions, reverse=True)
-    assert fractions[-1] > 0
-
-
-def test_the_cutoff_is_the_one_of_the_decision():
-    """L = 23 mm at 1.2 mm spacing: R0 = 14 h, lambda = 20 let pass what is longer than 23.7 h."""
-    assert 1 / fit_cutoff(14.0, 20.0) == pytest.approx(23.7, abs=0.1)
+def test_nothing_is_known_better_than_the_levels_of_depth_allow():
+    dense = dense_of(noisy(disc_seeds(1.3, 50), flat, 0), 1.3, least_mm=2.3)
+    np.testing.assert_array_equal(dense.sigma[away(dense) < 45], np.float32(2.3))
 
 
 def test_node_statistics_sum_what_is_near_each_node():

@@ -74,11 +74,6 @@ def test_a_quadratic_comes_back_whatever_the_smoothing():
     z = 800 + 0.3 * x - 0.2 * y + 0.004 * x * x + 0.002 * x * y - 0.003 * y * y
     surface = fit_surface(np.column_stack([x, y, z]), 15, 100)
     np.testing.assert_allclose(evaluated(surface, np.column_stack([x, y])), z, atol=1e-6)
-    assert surface.noise < 1e-6
-
-
-def test_noise_is_estimated():
-    assert 0.9 < fit_surface(bumpy(4000, 5), 12, 0.5).noise < 1.05
 
 
 @settings(deadline=None, max_examples=15)
