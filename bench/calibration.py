@@ -78,7 +78,8 @@ def main() -> int:
     if args.fit:
         found = fitted(_taken(CHOOSING, args.frames, _CHOOSING_SEED, distance=False))
         print("\nFor recon/propagation/uncertainty.py: "
-              + ", ".join(f"{name} = ({', '.join(f'{one:.3g}' for one in values)})" for name, values in found.items()))
+              + ", ".join(f"{name} = {[float(f'{one:.3g}') for one in values]}"
+                          for name, values in found.items()))
     taken = _taken(REPORTING, args.frames, _REPORTING_SEED, distance=True)
     for preset, of in reversed(taken.items()):
         print(f"\nPreset `{preset.value}`, {args.frames} frames:\n")

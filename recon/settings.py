@@ -45,7 +45,7 @@ class Preset(StrEnum):
     """The paper's R0 with the smoothing that a sensor's noise asks for."""
     BEST = "best", {"r0_factor": None, "smoothing": None, "detail_factor": 1.0, "symmetry": True,
                     "shading": True, "neighbors": Neighbors.LATTICE}
-    """The most accurate found: R0 and lambda follow from the noise that is measured in the frame."""
+    """The most accurate found: R0 and lambda follow from the noise measured in the frame."""
 
 
 class Changes(TypedDict, total=False):

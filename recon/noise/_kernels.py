@@ -100,7 +100,7 @@ def _trimmed(counts: Ints, sums: Doubles) -> float:
         seen += part * counts[k]
         if part < 1:
             break
-    return total / wanted / _KEPT_MEAN
+    return float(total / wanted / _KEPT_MEAN)
 
 
 @compiled

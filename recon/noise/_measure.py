@@ -94,7 +94,7 @@ def _gentle(heights: Floats, spacing: float) -> Bytes:
     middle = np.float32(heights.sum(dtype=np.float64) / max(float(measured.sum()), 1.0))
     weight = cv2.GaussianBlur(measured, (0, 0), _SLOPE_BLUR_PX)
     smooth = cv2.GaussianBlur(heights - middle * measured, (0, 0), _SLOPE_BLUR_PX)
-    smooth /= np.maximum(weight, np.float32(1e-3))
+    smooth = smooth / np.maximum(weight, np.float32(1e-3))
     by_x = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, ksize=1, scale=0.5 / spacing)
     by_y = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, ksize=1, scale=0.5 / spacing)
     return (by_x * by_x + by_y * by_y < np.float32(_MOST_SQUARED_SLOPE)).view(np.uint8)

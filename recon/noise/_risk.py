@@ -80,7 +80,7 @@ def least_risk(
     radius = -1.0 if detail_factor is None else detail_factor * spacing
     values = _least(_candidates(r0_factor, smoothing), noise.white_mm**2, noise.smooth_mm**2,
                     noise.length_px, spacing, radius)
-    return Risk(*values.tolist(), least_mm=noise.level_error_mm)
+    return Risk._make([*values.tolist(), noise.level_error_mm])
 
 
 @lru_cache(maxsize=16)
@@ -128,7 +128,8 @@ def _least(
             best[3] = np.sqrt(total / (error * waves * waves).sum())
             best[4] = ((1 - passed) ** 2 * face).sum() / left
             best[5] = (passed * passed * white_noise).sum() / left
-            best[6] = (passed * passed * smooth_noise).sum() / left * smooth / max(white + smooth, 1e-12)
+            best[6] = ((passed * passed * smooth_noise).sum() / left
+                       * smooth / max(white + smooth, 1e-12))
             best[7], best[8] = din, (fit * fit * noise).sum()
     best[2] = np.sqrt(best[2])
     return best

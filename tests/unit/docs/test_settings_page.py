@@ -37,7 +37,8 @@ def test_values_and_defaults_are_those_of_the_code(name):
     assert len(words) > 20
     if limits := bounds(name):
         assert values.startswith("{:g} to {:g}".format(*limits))
-        assert values.endswith(", or none") == (Settings.model_fields[name].default is None)
+        missing = values.endswith((", or none", ", or measured"))
+        assert missing == (Settings.model_fields[name].default is None)
     else:
         choices = list(Neighbors) if name == "neighbors" else ["true", "false"]
         assert sorted(values.split(", ")) == sorted(choices)

@@ -7,8 +7,8 @@ from denseface.capture.calibration import DepthToColor
 from denseface.recon.detail import add_detail
 from denseface.recon.face import Seeds
 from denseface.recon.intermediate import Registration, SurfaceGrid
-from denseface.recon.registration import register
 from denseface.recon.noise import Noise, least_risk
+from denseface.recon.registration import register
 from denseface.recon.support import Support
 from denseface.recon.surface import Surface, fit_surface
 from tests.unit.frames import calibration, camera, frame

@@ -48,7 +48,7 @@ def test_what_is_given_is_kept():
 
 
 def test_the_expected_error_is_that_of_the_smoother_on_such_fields():
-    """A Gaussian process of the face's density, seen with white noise, through the filter itself."""
+    """A Gaussian process of the face's density, with white noise, through the filter itself."""
     noise, n = Noise(1.2, 0, 2, 0), 256
     plan = least_risk(noise, SPACING, None, 12.0, 6.0)
     rng = np.random.default_rng(0)
