@@ -5,7 +5,7 @@ import numpy as np
 from denseface.recon.arrays import Bytes, Doubles, Floats, Ints
 from denseface.recon.numerics.jit import compiled
 
-_LAGS = np.array([1, 2, 3, 4, 6, 8])
+LAGS = np.array([1, 2, 3, 4, 6, 8])
 """Pixels."""
 _NORMS = np.array([6.0, 20.0])
 """Sum of the squared coefficients of a second (1, -2, 1) and a third (-1, 3, -3, 1) difference: so
@@ -17,7 +17,7 @@ _KEPT_MEAN = 0.3096
 _BINS, _BIN_MM = 2048, 0.01
 """Of the histogram of absolute differences, over the root of their norm."""
 
-_FACE = np.array([[4.87e-4, 3.59], [4.94e-5, 4.02]])
+FACE = np.array([[4.87e-4, 3.59], [4.94e-5, 4.02]])
 """(a, b) of second and third differences: a face's own part over a lag of x mm is a x^b, mm^2.
 Fitted to the heads that settings are chosen on."""
 _HIDDEN = np.array([0.30, 0.48])
@@ -52,11 +52,11 @@ def mean_square_differences(heights: Floats, gentle: Bytes, every: int) -> Doubl
     heights : (rows, columns), 0 where none is; gentle : 1 where differences count
     every : of the rows (for differences along them) and columns, so many
     """
-    out = np.zeros((2, len(_LAGS)))
-    for i in range(len(_LAGS)):
+    out = np.zeros((2, len(LAGS)))
+    for i in range(len(LAGS)):
         counts, sums = np.zeros((2, _BINS), np.int32), np.zeros((2, _BINS))
-        _collect(heights, gentle, every, _LAGS[i], counts, sums)
-        _collect(heights.T, gentle.T, every, _LAGS[i], counts, sums)
+        _collect(heights, gentle, every, LAGS[i], counts, sums)
+        _collect(heights.T, gentle.T, every, LAGS[i], counts, sums)
         for k in range(2):
             out[k, i] = _trimmed(counts[k], sums[k])
     return out
@@ -115,8 +115,8 @@ def explain(squares: Doubles, spacing: float) -> tuple[float, float, float]:
     """
     noise, weight = np.zeros(squares.shape), np.zeros(squares.shape)
     for k in range(2):
-        for i in range(len(_LAGS)):
-            face = _FACE[k, 0] * (_LAGS[i] * spacing) ** _FACE[k, 1]
+        for i in range(len(LAGS)):
+            face = FACE[k, 0] * (LAGS[i] * spacing) ** FACE[k, 1]
             if squares[k, i] > 0:
                 noise[k, i] = _without_face(squares[k, i], face, _HIDDEN[k])
                 error = _OWN_ERROR * squares[k, i] + _FACE_ERROR * max(
@@ -153,8 +153,8 @@ def _nonnegative_fit(
     """Give the cost and both variances for one length."""
     a = b = c = p = q = r = 0.0
     for k in range(2):
-        for i in range(len(_LAGS)):
-            alike = np.exp(-(np.arange(1, 4) * _LAGS[i] / (2 * length)) ** 2)
+        for i in range(len(LAGS)):
+            alike = np.exp(-(np.arange(1, 4) * LAGS[i] / (2 * length)) ** 2)
             part = (1 - (8 * alike[0] - 2 * alike[1]) / 6 if k == 0
                     else 1 - (30 * alike[0] - 12 * alike[1] + 2 * alike[2]) / 20)
             w, y = weight[k, i], noise[k, i]

@@ -80,7 +80,7 @@ def measure_noise(points: Floats, pixels: Ints, spacing: float) -> Noise:
     """
     heights = kernels.lattice(points, pixels)
     every = max(1, math.isqrt(len(points) // _SAMPLES + 1))
-    squares = kernels.mean_square_differences(heights, _gentle(heights, spacing), every)
+    squares = kernels.mean_square_differences(heights, gentle_places(heights, spacing), every)
     white, smooth, length = kernels.explain(squares, spacing)
     quantum = _quantum(points[:, 2])
     # Rounding alone makes that much; differences of few levels may hide it.
@@ -88,7 +88,7 @@ def measure_noise(points: Floats, pixels: Ints, spacing: float) -> Noise:
     return Noise(math.sqrt(white), math.sqrt(smooth), length, quantum)
 
 
-def _gentle(heights: Floats, spacing: float) -> Bytes:
+def gentle_places(heights: Floats, spacing: float) -> Bytes:
     """Say where a surface is not steep: (rows, columns) uint8, 0 or 1; heights 0 where none is."""
     measured = (heights > 0).astype(np.float32)
     middle = np.float32(heights.sum(dtype=np.float64) / max(float(measured.sum()), 1.0))

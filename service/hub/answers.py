@@ -13,6 +13,8 @@ _CLOCKS_S = 1.0
 """By so much a worker's clock may run ahead of the hub's during one job, seconds."""
 _ROUNDING = 1e-6
 """Relative difference of two numbers that are one."""
+_R0_FACTORS = (2.0, 40.0)
+"""Least and largest R0 in spacings where the worker may choose it."""
 
 
 @dataclass(frozen=True)
@@ -89,9 +91,11 @@ def _wrong_numbers(report: Report) -> str | None:
     if report.mean_spacing_mm <= 0 or report.noise_mm < 0:
         return "has a spacing or noise below zero"
     factor = report.settings.r0_factor
-    r0 = report.r0_mm if factor is None else factor * report.mean_spacing_mm
-    if not math.isclose(report.r0_mm, r0, rel_tol=_ROUNDING) or r0 <= 0:
-        return f"has R0 {report.r0_mm:g} mm, its spacing and settings make {r0:g} mm"
+    least, most = (one * report.mean_spacing_mm
+                   for one in ((factor, factor) if factor else _R0_FACTORS))
+    if not least * (1 - _ROUNDING) <= report.r0_mm <= most * (1 + _ROUNDING):
+        return (f"has R0 {report.r0_mm:g} mm, its spacing and settings make {least:g} to "
+                f"{most:g} mm")
     if report.candidates and report.candidates[0].box != report.face_box:
         return "has chosen another box than the face's"
     return None

@@ -199,7 +199,7 @@ def lying(**changes) -> object:
     ({"candidates": (FaceCandidate(box=(0, 0, 5, 4), depth_mm=700.0, width_mm=150.0,
                                    verdict="chosen"),)}, "another box"),
     ({"dense_points": 7}, "the report has"),
-    ({"r0_mm": 55.0}, "R0 55 mm"),
+    ({"r0_mm": 555.0}, "R0 555 mm"),
     ({"mean_spacing_mm": -1.0}, "below zero"),
     ({"noise_mm": -1.0}, "below zero"),
     ({"timings_ms": {"rbf": 9.0, "total": 1.0}}, "longer than all"),
