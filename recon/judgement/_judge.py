@@ -18,8 +18,9 @@ _FEWEST_POINTS = 80
 
 _WEIGHTS = np.array((3.47, 2.61, 2.30, -4.29, -0.67, -1.15, -2.70))
 _BIAS = 1.25
-"""Of `Likeness.figures`, for the logarithm of the odds: a logistic regression by
-`bench/judgement.py` on faces of the choosing heads and on things that are none."""
+"""Of `Likeness.figures`, for the logarithm of the odds: a logistic regression, that of
+`bench/judgement.py`, on 311 faces of the choosing heads (the scenes of recall, hard ones, and 35
+turned by 45 to 66 degrees) and on 399 things that are none."""
 LEAST_SCORE = 0.5
 """What has less is no face."""
 SURE_SCORE = 0.9
