@@ -124,7 +124,7 @@ class Support:
         left = self.without(removed)
         above = (left.margin > self.level).view(np.uint8)
         radius = _narrow(above, self.step)
-        broad = dilated(eroded(above, radius), radius)
+        broad = dilated(eroded(binary_fill_holes(above), radius), radius)
         _, parts = cv2.connectedComponents(broad)
         areas = np.bincount(parts.ravel())
         dropped = areas < _ISLAND_SHARE * areas[1:].max(initial=0)

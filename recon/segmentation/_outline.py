@@ -13,7 +13,7 @@ _BAY_MM = 16.0
 """Narrower bays of the outline are unmeasured spots at its edge, and are closed."""
 _SPUR_MM = 30.0
 """Narrower parts of a face are ear, hair, or the frayed edge of depth, and are dropped."""
-_TONGUE_MM = 10.0
+_TONGUE_MM = 5.0
 """And narrower ones of what is left without closed bays: hair of which a few readings remain."""
 _ISLAND_SHARE = 0.15
 """Parts cut off from the largest are dropped below this share of its area: an ear, or hair."""

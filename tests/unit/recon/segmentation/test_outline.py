@@ -25,7 +25,7 @@ def comb(width, gap):
     return face, teeth & ((U - MIDDLE[1] + 40) % (width + gap) < width)
 
 
-@pytest.mark.parametrize(("width", "stay"), [(4, False), (7, False), (14, True)])
+@pytest.mark.parametrize(("width", "stay"), [(3, False), (4, False), (12, True)])
 def test_strands_go_and_what_is_broad_stays(width, stay):
     face, teeth = comb(width, 5)
     found = kept(face | teeth)
@@ -40,7 +40,7 @@ def test_hair_of_which_little_is_measured_goes(px_per_mm):
     hair = (np.hypot(U - MIDDLE[1], V - 100) < 85) & (V < BROW)
     skin = FACE & (V > BROW)
     found = kept(skin | (hair & patchy), px_per_mm)
-    assert found[hair & patchy & (V < BROW - 8)].mean() < 0.1
+    assert found[hair & patchy & (V < BROW - 8)].mean() < 0.15
     assert found[skin].mean() > 0.99
 
 
