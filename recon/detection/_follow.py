@@ -27,10 +27,10 @@ _FOLLOWED_DEPTH = 0.15
 """How far its depth may be from what it was, as a share."""
 _FOLLOWED_MARGIN = 1.3
 """Half the side of the part of the image that is searched, by the width of the box."""
-_TURNED, _TURNED_MM = STRAIGHT._replace(face_px=34.0, scale_step=1.12), 1300.0
-"""How faces are looked for in the images turned by quarters, and no farther than that."""
-_CLOSE = STRAIGHT._replace(face_px=28.0, scale_step=1.18)
-"""A face that is too near fills the image."""
+_COARSE = STRAIGHT._replace(face_px=28.0, scale_step=1.18)
+"""Where a hint is given alone: that a face fills the image, or is there in turned images."""
+_TURNED_MM = 1300.0
+"""In turned images no face is looked for farther away."""
 _CLOSE_WIDTHS = 0.3, 1.0
 """Narrowest box of a face that is too near, by the image's width, and widest, by its height: at
 400 mm a Kinect's image is 490 mm wide."""
@@ -109,7 +109,7 @@ def turned_by(color: Bytes, registered: Registration, focal_px: float) -> int | 
     search = Search(color, registered, focal_px)
     near = [region for region in search.regions if region.near_mm < _TURNED_MM]
     for degrees in (90, 180, 270):
-        if search.nearest_face(_TURNED._replace(roll=-float(degrees)), near):
+        if search.nearest_face(_COARSE._replace(roll=-float(degrees)), near):
             return degrees
     return None
 
@@ -123,7 +123,7 @@ def close_face(color: Bytes) -> bool:
     height, width = gray.shape
     limits = _CLOSE_WIDTHS[0] * width, _CLOSE_WIDTHS[1] * height
     everywhere = CenterMask(np.ones((1, 1), np.bool_), float(max(width, height)))
-    return bool(run_pass(gray, (0, 0, width, height), _CLOSE, limits[0], limits, everywhere))
+    return bool(run_pass(gray, (0, 0, width, height), _COARSE, limits[0], limits, everywhere))
 
 
 def _around(last: FaceCandidate, depth_mm: float, shape: tuple[int, int]) -> Region:

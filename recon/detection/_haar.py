@@ -17,8 +17,9 @@ from denseface.recon.arrays import Bools, Bytes, Doubles, Ints, Sizes
 from denseface.recon.detection._haar_kernels import (
     Trees,
     WindowGrid,
+    WindowSizes,
     corner_offsets,
-    passing_windows,
+    windows_of_sizes,
 )
 from denseface.recon.face import Box
 
@@ -103,24 +104,26 @@ def passing_boxes(
     """
     height, width = gray.shape
     smallest, largest = size_limits
-    found = []
-    stride = -(-(width + 1) // _STRIDE_STEP) * _STRIDE_STEP
-    scale = 1.0
+    scales, scale = [], 1.0
     while (side := round(cascade.window * scale)) <= min(largest, height, width):
         if side >= smallest:
-            size = max(1, round(width / scale)), max(1, round(height / scale))
-            small = gray if scale == 1 else np.asarray(
-                cv2.resize(gray, size, interpolation=cv2.INTER_LINEAR_EXACT), np.uint8)
-            # To pixels of `gray`; whole numbers are pixel centres.
-            enlarge = np.array(
-                [[scale, 0, (scale - 1) / 2], [0, scale, (scale - 1) / 2], [0, 0, 1]])
-            grid = WindowGrid(cascade.window, 1 if scale >= _FULL_STEP_SCALE else 2, stride)
-            windows = passing_windows(small, cascade.trees, _offsets(cascade, grid), grid,
-                                      to_cells @ enlarge, allowed)
-            found += [(round(x * scale), round(y * scale), side, side)
-                      for x, y in windows.tolist()]
+            scales.append(scale)
         scale *= scale_step
-    return found
+    if not scales:
+        return []
+    stride = -(-(width + 1) // _STRIDE_STEP) * _STRIDE_STEP
+    sizes = WindowSizes(
+        np.array(scales), np.array([(max(1, round(height / scale)), max(1, round(width / scale)))
+                                    for scale in scales], np.int32),
+        sum(scale < _FULL_STEP_SCALE for scale in scales))
+    windows = windows_of_sizes(
+        gray, cascade.trees,
+        (_offsets(cascade, WindowGrid(cascade.window, 1, stride)),
+         _offsets(cascade, WindowGrid(cascade.window, 2, stride))),
+        WindowGrid(cascade.window, 1, stride), sizes, to_cells, allowed)
+    sides = [round(cascade.window * scale) for scale in scales]
+    return [(round(x * scales[size]), round(y * scales[size]), sides[size], sides[size])
+            for x, y, size in windows.tolist()]
 
 
 def _offsets(cascade: Cascade, grid: WindowGrid) -> Sizes:

@@ -65,6 +65,87 @@ def corner_offsets(corners: Ints, grid: WindowGrid) -> Sizes:
     return offsets.astype(np.uint64)
 
 
+class WindowSizes(NamedTuple):
+    """The sizes of window that are tried."""
+
+    scales: Doubles
+    """(sizes,), the window's side by the cascade's."""
+    shapes: Ints
+    """(sizes, 2), rows and columns of the image shrunk by it."""
+    first_full: int
+    """From this one on, windows are tried at every pixel of the shrunk image; before, at every
+    second."""
+
+
+@compiled
+def windows_of_sizes(
+    image: Bytes, trees: Trees, offsets: tuple[Sizes, Sizes], grid: WindowGrid,
+    sizes: WindowSizes, to_cells: Doubles, allowed: Bools,
+) -> Ints:
+    """Give the (n, 3) column, row and size of the windows that pass every stage.
+
+    image : (H, W)
+    offsets : those of the corners of each node's rectangles, in grids of step 1 and 2
+    grid : of step 1
+    to_cells : (2, 3), from pixels to column and row of `allowed`
+    allowed : where the centre of a window may be
+    """
+    buffer = np.empty(image.size, np.uint8)
+    passed = []
+    count = 0
+    for size in range(len(sizes.scales)):
+        rows, columns, scale = sizes.shapes[size, 0], sizes.shapes[size, 1], sizes.scales[size]
+        small = buffer[:rows * columns].reshape(rows, columns)
+        shrink_linearly(image, small)
+        # Whole numbers are pixel centres.
+        shrunk = to_cells.copy()
+        shrunk[:, :2] *= scale
+        shrunk[:, 2] += (to_cells[:, 0] + to_cells[:, 1]) * ((scale - 1) / 2)
+        step = 1 if size >= sizes.first_full else 2
+        found = passing_windows(small, trees, offsets[0] if step == 1 else offsets[1],
+                                WindowGrid(grid.window, step, grid.stride), shrunk, allowed)
+        passed.append(found)
+        count += len(found)
+    result = np.empty((count, 3), np.int32)
+    at = 0
+    for size in range(len(passed)):
+        found = passed[size]
+        result[at:at + len(found), :2] = found
+        result[at:at + len(found), 2] = size
+        at += len(found)
+    return result
+
+
+@compiled
+def shrink_linearly(image: Bytes, small: Bytes) -> None:
+    """Resize as OpenCV's INTER_LINEAR_EXACT does, with weights of eight bits."""
+    height, width = image.shape
+    rows, columns = small.shape
+    left, weight = np.empty(columns, np.int32), np.empty(columns, np.int32)
+    for x in range(columns):
+        left[x], weight[x] = _between(x, width, columns)
+    for y in range(rows):
+        top, down = _between(y, height, rows)
+        bottom = min(top + 1, height - 1)
+        for x in range(columns):
+            right = min(left[x] + 1, width - 1)
+            above = (256 - weight[x]) * image[top, left[x]] + weight[x] * image[top, right]
+            below = (256 - weight[x]) * image[bottom, left[x]] + weight[x] * image[bottom, right]
+            small[y, x] = ((256 - down) * above + down * below + 32768) >> 16
+
+
+@compiled
+def _between(target: int, source_size: int, target_size: int) -> tuple[int, int]:
+    """Give the pixel before a target pixel's middle, and the weight of the one after, of 256."""
+    at = (target + 0.5) * source_size / target_size - 0.5
+    first = int(np.floor(at))
+    if first < 0:
+        return 0, 0
+    if first >= source_size - 1:
+        return source_size - 1, 0
+    return first, int(np.rint((at - first) * 256))
+
+
 @compiled
 def passing_windows(
     image: Bytes, trees: Trees, offsets: Sizes, grid: WindowGrid, to_cells: Doubles, allowed: Bools

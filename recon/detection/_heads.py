@@ -87,23 +87,27 @@ def _sample(
     nearest: Floats, i: int, j: int, steps: Floats, circle: int, front: float, behind: Floats
 ) -> None:
     """Set how far a circle's points lie behind `front`, mm; -`NO_DEPTH_MM` outside the image."""
+    scale = 1 / nearest[i, j]
     for k in range(steps.shape[1]):
-        row = int(np.floor(i + 0.5 + steps[circle, k, 0] / nearest[i, j]))
-        column = int(np.floor(j + 0.5 + steps[circle, k, 1] / nearest[i, j]))
+        row = int(np.floor(i + 0.5 + steps[circle, k, 0] * scale))
+        column = int(np.floor(j + 0.5 + steps[circle, k, 1] * scale))
         inside = 0 <= row < nearest.shape[0] and 0 <= column < nearest.shape[1]
         behind[circle, k] = nearest[row, column] - front if inside else -NO_DEPTH_MM
 
 
 @compiled
 def _front(nearest: Floats, i: int, j: int, steps: Floats, behind: Floats) -> float:
-    """Give the depth of a middle, of several readings, mm."""
+    """Give the depth of a middle, of several readings, mm, and sample the first circle."""
     _sample(nearest, i, j, steps, 0, nearest[i, j], behind)
     middle, count = 0.0, 1
     for k in range(steps.shape[1]):
         if abs(behind[0, k]) < _SOLID_MM:
             middle += behind[0, k]
             count += 1
-    front: float = nearest[i, j] + middle / count
+    middle /= count
+    for k in range(steps.shape[1]):
+        behind[0, k] -= middle
+    front: float = nearest[i, j] + middle
     return front
 
 
@@ -114,7 +118,8 @@ def _is_solid(
     """Judge the inner circles: on the head, and not flat."""
     solid = known = 0
     for circle in range(len(_INNER_MM)):
-        _sample(nearest, i, j, steps, circle, front, behind)
+        if circle > 0:
+            _sample(nearest, i, j, steps, circle, front, behind)
         for k in range(steps.shape[1]):
             # No reading, in an eye or in dark hair, says nothing.
             if abs(behind[circle, k]) < NO_DEPTH_MM / 2:
