@@ -111,7 +111,7 @@ def sample(frame: RgbdFrame, truth: Truth, preset: Preset, *, distance: bool) ->
     """Reconstruct a frame and draw some of its points; None where it gives no face."""
     try:
         with _recorded() as (recorded, plans):
-            case = Case("", frame, truth, reconstruct(frame, with_preset(preset)))
+            case = Case("", frame, truth, reconstruct(frame, with_preset(preset, beyond=True)))
     except ReconstructionError:
         return None
     dense = case.face.dense

@@ -88,9 +88,13 @@ class Case:
         return np.column_stack([self.queries, z])
 
 
-def with_preset(preset: Preset) -> Settings:
-    """Give a preset that works on the very seeds and grid of `Case`, whatever its own."""
-    return Settings.of(preset, neighbors=Neighbors.LATTICE)
+def with_preset(preset: Preset, *, beyond: bool = False) -> Settings:
+    """Give a preset that works on the very seeds and grid of `Case`, whatever its own.
+
+    beyond : with the points past the outline where it adds some, which no peer has
+    """
+    known = Settings.of(preset, neighbors=Neighbors.LATTICE)
+    return known if beyond else known.model_copy(update={"prior": False})
 
 
 def recorded(frames: int) -> Iterator[Case]:
@@ -118,21 +122,25 @@ def simulated(count: int) -> Iterator[Case]:
 
 def posed(
     head: str, distance: float, yaw: float, holes: float, seed: int,
-    preset: Preset = Preset.BEST,
+    preset: Preset = Preset.BEST, *, beyond: bool = False,
 ) -> Case | None:
     """Simulate one head at a distance, mm, turned by degrees; None, and a line, where it fails.
 
     holes : `Scene.holes`; seed : of noise, holes and the wall's pattern, at least 100
+    beyond : as of `with_preset`
     """
     scene = Scene((Person(head, distance, yaw=yaw),), holes=holes, decor=seed - 100)
     shot, = simulate(scene, KINECT_CALIBRATED, seed=seed)
     name = f"{head} {distance:.0f} mm {yaw:+.0f} deg"
     try:
-        return _case(name, shot.frame, shot.truth, preset)
+        return _case(name, shot.frame, shot.truth, preset, beyond=beyond)
     except ReconstructionError as error:
         print(f"{name} is left out: {error}", file=sys.stderr)
         return None
 
 
-def _case(name: str, frame: RgbdFrame, truth: Truth, preset: Preset = Preset.BEST) -> Case:
-    return Case(name, frame, truth, reconstruct(frame, with_preset(preset)))
+def _case(
+    name: str, frame: RgbdFrame, truth: Truth, preset: Preset = Preset.BEST, *,
+    beyond: bool = False,
+) -> Case:
+    return Case(name, frame, truth, reconstruct(frame, with_preset(preset, beyond=beyond)))

@@ -100,7 +100,7 @@ def _cases(
                     distance, yaw = rng.uniform(low, high), rng.uniform(left, right)
                     head = heads[(i + j + k + seed) % len(heads)]
                     holes = _HOLES[(i + j // 2 + seed) % len(_HOLES)]
-                    case = posed(head, distance, yaw, holes, 100 + index, preset)
+                    case = posed(head, distance, yaw, holes, 100 + index, preset, beyond=True)
                     index += 1
                     if case is not None:
                         yield case, distance, yaw

@@ -10,13 +10,17 @@ from denseface.recon.arrays import Bools, Bytes, Doubles, Floats
 from denseface.recon.numerics.bilinear import add_resampled
 from denseface.recon.support import Support
 
-__all__ = ["NO_DEPTH_MM", "ColorSampler", "Registration", "SurfaceGrid", "ZBuffer"]
+__all__ = ["NO_DEPTH_MM", "ColorSampler", "DepthReader", "Registration", "SurfaceGrid", "ZBuffer"]
 
 NO_DEPTH_MM = np.float32(1e30)
 """z of a cell without any depth, mm. Not inf: compiled code assumes finite numbers."""
 
 ColorSampler = Callable[[Floats], tuple[Bytes, Bools]]
 """Points, (n, 3) float32, mm, to their colours, (n, 3) uint8, and which are seen, (n,) bool."""
+
+DepthReader = Callable[[Floats], Floats]
+"""Points, (n, 3) float32, mm, to the depths that were read along their rays, (n,) float32, mm; 0
+where nothing was."""
 
 
 class ZBuffer(NamedTuple):

@@ -18,6 +18,7 @@ from denseface.arguments import expect
 from denseface.capture.doubts import doubts_of
 from denseface.capture.frame import FrameOrigin, RgbdFrame
 from denseface.recon.arrays import Floats
+from denseface.recon.detail import beyond_outline
 from denseface.recon.detection import REJECTED
 from denseface.recon.errors import (
     ImpossibleFrameError,
@@ -181,6 +182,8 @@ def _shape(settings: Settings, clock: "_Stopwatch", found: Found) -> Face:
     if like:
         raise NoFaceError(f"no face found: what the box at {box} shows is {like} "
                           f"(score {score:.2f}, a face has {LEAST_SCORE} or more)")
+    if settings.prior:  # after the judgement: what a model adds is like a face
+        surface = beyond_outline(surface, partial(_depths_at, frame))
     dense = densify(seeds, surface, spacing, settings.ratio, plan, sampler)
     left_open = openings(dense)
     clock.lap("propagation")
@@ -217,6 +220,16 @@ def _check_seeds(points: Floats) -> None:
     if not max(width, height) <= _MOST_MM:
         raise ImpossibleFrameError(f"the readings on the face are {width:.6g} x {height:.6g} mm "
                                    "across: is the calibration right?")
+
+
+def _depths_at(frame: RgbdFrame, points: Floats) -> Floats:
+    """Give what was read where points, (n, 3) mm, are seen: (n,) float32, mm; 0 where nothing."""
+    columns, rows = np.rint(frame.depth_camera.project(points)).T
+    height, width = frame.depth.shape
+    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+    found = np.zeros(len(points), np.float32)
+    found[inside] = frame.depth[rows[inside].astype(np.intp), columns[inside].astype(np.intp)]
+    return found * np.float32(frame.depth_meaning.unit_um / 1000)
 
 
 @cache

@@ -44,7 +44,7 @@ class Preset(StrEnum):
     FAITHFUL = "faithful", {"r0_factor": 6.0, "smoothing": 3.0, "neighbors": Neighbors.RANDOMIZED}
     """The paper's R0 with the smoothing that a sensor's noise asks for."""
     BEST = "best", {"r0_factor": None, "smoothing": None, "detail_factor": 1.0, "symmetry": True,
-                    "shading": True, "neighbors": Neighbors.LATTICE}
+                    "shading": True, "prior": True, "neighbors": Neighbors.LATTICE}
     """The most accurate found: R0 and lambda follow from the noise measured in the frame."""
 
 
@@ -56,6 +56,7 @@ class Changes(TypedDict, total=False):
     detail_factor: float | None
     symmetry: bool
     shading: bool
+    prior: bool
     neighbors: Neighbors | str
     ratio: float
 
@@ -93,6 +94,9 @@ class Settings(CheckedModel):
     shading: bool = False
     """Let the colour image's shading tell slopes that depth's noise hides; only where detail is
     added (`detail_factor`)."""
+    prior: bool = False
+    """Let the face go on a few millimetres past its outline, where the sensor read nothing and a
+    model of faces says that it does."""
     neighbors: Neighbors = Neighbors.LATTICE
     """How the mean spacing is measured."""
     ratio: Annotated[float, Field(ge=1, le=100)] = 10.0

@@ -101,6 +101,12 @@ class Support:
         whole = binary_fill_holes(broad)[radius:, radius:]
         return replace(self, margin=_reshaped(self.margin, whole, self.level))
 
+    def without_holes(self) -> Self:
+        """Give the support with what it encloses."""
+        above = (self.margin > self.level).view(np.uint8)
+        enclosed = binary_fill_holes(above) > above
+        return self.including(enclosed) if enclosed.any() else self
+
     @property
     def inside(self) -> Bools:
         """Which of the grid's points are supported, (rows, columns)."""
@@ -130,6 +136,11 @@ class Support:
         dropped = areas < _ISLAND_SHARE * areas[1:].max(initial=0)
         dropped[0] = True
         return left.without(dropped[parts] & (above > 0))
+
+    def including(self, added: Bools) -> Self:
+        """Add some of the grid's points."""
+        # Twice the level: what lies between two points that are above it is so, too.
+        return replace(self, margin=np.where(added, np.float32(2 * self.level), self.margin))
 
     def coordinates(self, xs: Doubles, ys: Doubles) -> tuple[Floats, Floats]:
         """Turn x and y, (k,), (m,) mm, into fractional columns and rows, clipped to the grid."""

@@ -60,7 +60,7 @@ def _run_every_stage() -> None:
     surface = surface_of(seeds.points, spacing, settings, plan, sampler)
     judge_shape(surface)
     densify(seeds, surface, spacing, settings.ratio, plan, sampler)
-    heights, _, known = mean_face(_NEAREST_MM).heights((-90.0, -90.0), 4.0, (45, 45))
+    heights, known = mean_face(_NEAREST_MM).heights((-90.0, -90.0), 4.0, (45, 45))
     fit_face(Heights(heights, known.astype(np.float32), (-90.0, -90.0), 4.0))
 
 

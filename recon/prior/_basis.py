@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from denseface.recon.arrays import Floats, Ints
+from denseface.recon.arrays import Doubles, Floats, Ints
 
 __all__ = ["Basis", "basis"]
 
@@ -35,6 +35,12 @@ class Basis(NamedTuple):
     normals: Floats
     modes: Floats
     missing_mm: float
+
+    def points(self, weights: Doubles, count: int | None = None) -> Floats:
+        """Give the first points, or all, of the face with these weights, (n, 3) float32, mm."""
+        # One product of a matrix: over three axes numpy takes one for each point.
+        flat = self.modes[:count].reshape(-1, len(weights)) @ weights.astype(np.float32)
+        return self.vertices[:count] + flat.reshape(-1, 3)
 
 
 @cache

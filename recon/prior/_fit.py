@@ -18,22 +18,22 @@ __all__ = ["FittedFace", "Heights", "fit_face", "mean_face"]
 
 Heights = kernels.Heights
 
-_COARSE, _FINE = 250, 900
-"""Points of the model that find the pose, and that tell its modes."""
+_COARSE = 150
+"""Points of the model that find the pose."""
 _YAWS = np.radians((-20.0, 0.0, 20.0))
 """Turns of the mean face to start from, where the plane of symmetry is not known, rad."""
 _ALONG_MM = (-25.0, 0.0, 25.0)
 """Where its middle is along its own y to start from, from the heights' middle, mm."""
-_COARSE_SCALES = np.array([30.0, 15.0, 8.0, 5.0, 4.0])
+_COARSE_SCALES = np.array([30.0, 15.0, 8.0, 5.0])
 """Scales of the robust weights in the steps of the pose, mm."""
-_FINE_SCALES = (5.0, 4.0, 3.0, 3.0, 3.0, 3.0)
-"""The same in the steps of pose and modes, mm."""
+_FINE = ((300, 4.0), (300, 3.0), (600, 3.0), (600, 3.0))
+"""Steps of pose and modes: by how many points, and the scale of their weights, mm."""
 _FAR_MM, _MISSING = 8.0, 0.1
 """When poses are compared: larger distances cost the same; cost of a point that meets nothing, as a
 part of that."""
-_MISFIT_MM = 2.5
-"""Standard deviation of what a point is off the model. Faces are off by 1 mm, but neighbours
-alike."""
+_MISFIT_MM = 2.0
+"""Standard deviation of what one of 600 points is off the model. Faces are off by 1 mm, but
+neighbours alike."""
 _POSE_RIDGE = 1e-6
 """What is known of turns and shifts before: next to nothing, 1 / rad^2 and 1 / mm^2."""
 _FARTHEST_MM = np.float32(1e30)
@@ -50,7 +50,6 @@ class FittedFace:
     ----------
     rotation, shift : (3, 3) and (3,) mm, from the model's frame
     weights : (k,), of the modes, in standard deviations
-    covariance : (6 + k, 6 + k), of turns, rad, shifts, mm, and weights
     rms_mm : root mean square distance from the heights, robust
     met : what part of the points that are turned to the camera meet a height, 0-1
     """
@@ -58,7 +57,6 @@ class FittedFace:
     rotation: Doubles
     shift: Doubles
     weights: Doubles
-    covariance: Doubles
     rms_mm: float
     met: float
 
@@ -69,33 +67,28 @@ class FittedFace:
 
     def heights(
         self, origin: tuple[float, float], step: float, shape: tuple[int, int]
-    ) -> tuple[Floats, Floats, Bools]:
-        """Predict the heights on a grid.
+    ) -> tuple[Floats, Bools]:
+        """Draw it on a grid.
 
         origin, step : x and y of the first point, and the distance of points, mm
         shape : rows, columns
 
-        Gives the heights, mm, their variance, mm^2, as far as the model's, (rows, columns) float32,
-        and where there are any: both are 0 elsewhere.
+        Gives the heights, mm, (rows, columns) float32, and where there are any: 0 elsewhere.
         """
         model = basis()
-        points = model.vertices + model.modes @ self.weights.astype(np.float32)
-        J = np.empty((len(points), 6 + len(self.weights)), np.float32)
-        kernels.gradients(points, model.normals, model.modes, self.rotation, J)
-        variance = np.einsum("ij,ij->i", J @ self.covariance.astype(np.float32), J)
-        posed = (points @ self.rotation.T + self.shift).astype(np.float32)
-        heights, drawn = np.full(shape, _FARTHEST_MM, np.float32), np.zeros(shape, np.float32)
-        kernels.draw(posed, variance, model.triangles, origin, step, heights, drawn)
+        posed = (model.points(self.weights) @ self.rotation.T.astype(np.float32)
+                 + self.shift.astype(np.float32))
+        heights = np.full(shape, _FARTHEST_MM, np.float32)
+        kernels.draw(posed, model.triangles, origin, step, heights)
         known = heights < _FARTHEST_MM
         heights[~known] = 0
-        return heights, drawn, known
+        return heights, known
 
 
 def mean_face(distance_mm: float) -> FittedFace:
-    """Give the mean face, upright and looking at the camera, at a distance; of no variance."""
-    modes = basis().modes.shape[2]
-    return FittedFace(np.eye(3), np.array([0.0, 0.0, distance_mm]), np.zeros(modes),
-                      np.zeros((6 + modes, 6 + modes)), 0.0, 1.0)
+    """Give the mean face, upright and looking at the camera, at a distance, mm."""
+    return FittedFace(np.eye(3), np.array([0.0, 0.0, distance_mm]),
+                      np.zeros(basis().modes.shape[2]), 0.0, 1.0)
 
 
 def fit_face(field: Heights, across: Doubles | None = None) -> FittedFace | None:
@@ -104,15 +97,17 @@ def fit_face(field: Heights, across: Doubles | None = None) -> FittedFace | None
     field : of a face that is within 30 degrees or so of upright, facing the camera, -z
     across : (3,), normal of its plane of symmetry, where that is known: any roll will do
     """
-    rows, columns = np.nonzero(field.weights > 0)
-    if len(rows) < _FEWEST:
+    in_rows, in_columns = field.weights.sum(axis=1), field.weights.sum(axis=0)
+    measured = float(in_rows.sum())
+    if measured < _FEWEST:
         return None
     model = basis()
     turned = _starts(across)
     rotations = np.repeat(turned, len(_ALONG_MM), axis=0)
     shifts = rotations[:, :, 1] * np.tile(_ALONG_MM, len(turned))[:, None]
-    shifts[:, 0] += field.origin[0] + field.step * columns.mean()
-    shifts[:, 1] += field.origin[1] + field.step * rows.mean()
+    for axis, weights in enumerate((in_columns, in_rows)):
+        middle = float(weights @ np.arange(len(weights))) / measured
+        shifts[:, axis] += field.origin[axis] + field.step * middle
     best = kernels.best_pose(
         field, model.vertices[:_COARSE], model.normals[:_COARSE], rotations, shifts,
         _COARSE_SCALES, _FAR_MM**2, _MISSING * _FAR_MM**2)
@@ -133,19 +128,19 @@ def _starts(across: Doubles | None) -> Doubles:
 def _fit_modes(field: Heights, rotation: Doubles, shift: Doubles) -> FittedFace | None:
     """Take Gauss-Newton steps of pose and modes."""
     model = basis()
-    vertices, normals, modes = model.vertices[:_FINE], model.normals[:_FINE], model.modes[:_FINE]
-    weights = np.zeros(modes.shape[2])
+    most, _ = _FINE[-1]
+    weights = np.zeros(model.modes.shape[2])
     ridge = np.r_[np.full(6, _POSE_RIDGE), np.ones(len(weights))]
-    J = np.empty((len(vertices), 6 + len(weights)), np.float32)
-    rests, trust = np.empty(len(vertices), np.float32), np.empty(len(vertices), np.float32)
-    for scale in _FINE_SCALES:
-        points = vertices + modes @ weights.astype(np.float32)
+    J = np.empty((most, 6 + len(weights)), np.float32)
+    rests, trust = np.empty(most, np.float32), np.empty(most, np.float32)
+    for some, scale in _FINE:
         count, seen = kernels.equations(
-            field, points, normals, modes, rotation, shift, scale, J, rests, trust)
-        if count < _FEWEST:
+            field, model.points(weights, some), model.normals[:some], model.modes[:some],
+            rotation, shift, scale, J, rests, trust)
+        if count * most < _FEWEST * some:
             return None
         met, rest, trusted = J[:count], rests[:count], trust[:count]
-        weighted = met * (trusted / np.float32(_MISFIT_MM**2))[:, None]
+        weighted = met * (trusted * np.float32(most / some / _MISFIT_MM**2))[:, None]
         precision = (weighted.T @ met).astype(np.float64)
         precision[np.diag_indices_from(precision)] += ridge
         right = -(rest @ weighted).astype(np.float64)
@@ -155,5 +150,4 @@ def _fit_modes(field: Heights, rotation: Doubles, shift: Doubles) -> FittedFace 
         shift = shift + moved[3:6]
         weights += moved[6:]
     rms = float(np.sqrt(trusted @ (rest * rest) / max(float(trusted.sum()), 1e-6)))
-    covariance = np.linalg.inv(precision).astype(np.float64)
-    return FittedFace(rotation, shift, weights, covariance, rms, count / seen)
+    return FittedFace(rotation, shift, weights, rms, count / seen)

@@ -182,33 +182,14 @@ def equations(
 
 
 @compiled
-def gradients(
-    points: Floats, normals: Floats, modes: Floats, rotation: Doubles, J: Floats
-) -> None:
-    """Write how the height of each point's surface changes, mm: J, (n, 6 + k) as in `equations`.
-
-    Where the surface is turned away it counts as just seen.
-    """
-    at, normal, back = np.empty(3), np.empty(3), np.empty(3)
-    for i in range(len(points)):
-        _turn(rotation, normals[i], normal)
-        _turn(rotation, points[i], at)
-        facing = min(normal[2], _TURNED_AWAY)
-        nx, ny = normal[0] / facing, normal[1] / facing
-        _pose_gradient(at, nx, ny, 1.0, J[i])
-        _mode_gradient(rotation, nx, ny, 1.0, modes[i], back, J[i])
-
-
-@compiled
 def draw(
-    points: Floats, values: Floats, triangles: Ints, origin: tuple[float, float], step: float,
-    heights: Floats, drawn: Floats,
+    points: Floats, triangles: Ints, origin: tuple[float, float], step: float, heights: Floats
 ) -> None:
-    """Draw a mesh as the camera's side sees it: its heights, and a value that varies over it.
+    """Draw a mesh as the camera's side sees it.
 
-    points : (n, 3) mm, in the heights' frame; values : (n,)
+    points : (n, 3) mm, in the heights' frame
     triangles : (m, 3), clockwise where they face the camera
-    heights, drawn : (rows, columns), changed where the mesh is nearer than `heights`, mm
+    heights : (rows, columns), mm, changed where the mesh is nearer
     """
     rows, columns = heights.shape
     for t in range(len(triangles)):
@@ -219,19 +200,17 @@ def draw(
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if area >= -1e-9:
             continue
+        per_area = 1 / area
         top, bottom = max(0, math.ceil(min(ay, by, cy))), min(rows - 1, int(max(ay, by, cy)))
         left, right = max(0, math.ceil(min(ax, bx, cx))), min(columns - 1, int(max(ax, bx, cx)))
         for i in range(top, bottom + 1):
             for j in range(left, right + 1):
-                of_b = ((j - ax) * (cy - ay) - (i - ay) * (cx - ax)) / area
-                of_c = ((bx - ax) * (i - ay) - (by - ay) * (j - ax)) / area
+                of_b = ((j - ax) * (cy - ay) - (i - ay) * (cx - ax)) * per_area
+                of_c = ((bx - ax) * (i - ay) - (by - ay) * (j - ax)) * per_area
                 if of_b < 0 or of_c < 0 or of_b + of_c > 1:
                     continue
-                of_a = 1 - of_b - of_c
-                z = of_a * points[a, 2] + of_b * points[b, 2] + of_c * points[c, 2]
-                if z < heights[i, j]:
-                    heights[i, j] = z
-                    drawn[i, j] = of_a * values[a] + of_b * values[b] + of_c * values[c]
+                z = (1 - of_b - of_c) * points[a, 2] + of_b * points[b, 2] + of_c * points[c, 2]
+                heights[i, j] = min(heights[i, j], z)
 
 
 @compiled

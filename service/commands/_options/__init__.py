@@ -129,7 +129,7 @@ def add_mode(parser: argparse.ArgumentParser) -> None:
                              "this user alone)")
 
 
-SETTINGS = ("r0_factor", "smoothing", "detail_factor", "symmetry", "shading", "neighbors",
+SETTINGS = ("r0_factor", "smoothing", "detail_factor", "symmetry", "shading", "prior", "neighbors",
             "ratio")
 """Fields of `Settings` beside the preset: the help is to be quick, and imports none of them."""
 

@@ -14,6 +14,7 @@ def test_best_is_the_default():
     assert Settings().detail_factor == 1.0
     assert Settings().symmetry
     assert Settings().shading
+    assert Settings().prior
     assert Settings().neighbors is Neighbors.LATTICE
 
 
@@ -26,6 +27,7 @@ def test_the_papers_presets_have_its_r0_and_its_trees(preset):
     assert settings.detail_factor is None
     assert not settings.symmetry
     assert not settings.shading
+    assert not settings.prior
     assert settings.ratio == 10
 
 
@@ -104,7 +106,7 @@ def test_a_list_is_no_settings():
     ({"preset": "fast"}, "preset: expected 'paper', 'faithful' or 'best', found 'fast'"),
     ({"preset": None}, "preset: expected 'paper', 'faithful' or 'best', found None"),
     ({"smooting": 3}, "smooting: no such field, expected one of preset, r0_factor, smoothing, "
-                      "detail_factor, symmetry, shading, neighbors, ratio"),
+                      "detail_factor, symmetry, shading, prior, neighbors, ratio"),
     ({"ratio": 1e9}, "ratio: expected at most 100, found 1000000000.0"),
     ({"preset": "paper", "neighbors": [1]},
      "neighbors: expected 'randomized', 'exact' or 'lattice', found [1]"),

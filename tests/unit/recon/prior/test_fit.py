@@ -15,12 +15,12 @@ MODES = basis().modes.shape[2]
 def person(seed, yaw=0.0, pitch=0.0, roll=0.0):
     weights = np.random.default_rng(seed).standard_normal(MODES).clip(-2, 2)
     turn = Rotation.from_euler("ZYX", [roll, yaw, pitch], degrees=True).as_matrix()
-    return FittedFace(turn, SHIFT, weights, np.eye(6 + MODES), 0.0, 1.0)
+    return FittedFace(turn, SHIFT, weights, 0.0, 1.0)
 
 
 def seen(face, noise=0.0):
     """The heights of a face within an oval."""
-    heights, _, known = face.heights(ORIGIN, STEP, SHAPE)
+    heights, known = face.heights(ORIGIN, STEP, SHAPE)
     known &= ((X - SHIFT[0]) / 62) ** 2 + ((Y - SHIFT[1]) / 85) ** 2 < 1
     heights += np.random.default_rng(3).normal(0, noise, SHAPE).astype(np.float32)
     return field(heights, known)
@@ -43,10 +43,10 @@ PEOPLE = [person(0), person(1, yaw=20), person(2, yaw=-20, pitch=10), person(3, 
 def test_a_face_of_the_model_is_found_again(face):
     true = seen(face)
     found = fit_face(true)
-    heights, _, known = found.heights(ORIGIN, STEP, SHAPE)
+    heights, known = found.heights(ORIGIN, STEP, SHAPE)
     both = known & (true.weights > 0)
     assert both.sum() > 0.97 * (true.weights > 0).sum()
-    assert np.abs(heights - true.heights)[both].mean() < 0.7
+    assert np.abs(heights - true.heights)[both].mean() < 0.9
     assert np.degrees(np.arccos((np.trace(found.rotation.T @ face.rotation) - 1) / 2)) < 5
     assert np.corrcoef(found.weights[:12], face.weights[:12])[0, 1] > 0.8
     assert found.rms_mm < 0.5
@@ -55,24 +55,13 @@ def test_a_face_of_the_model_is_found_again(face):
 
 @pytest.mark.parametrize("face", PEOPLE[:3])
 @pytest.mark.parametrize(("x", "y"), [(35, -15), (10, 45)], ids=["cheek", "chin"])
-def test_what_is_hidden_is_predicted_within_its_variance(face, x, y):
+def test_what_is_hidden_is_predicted(face, x, y):
     noisy = seen(face, noise=0.7)
     holed, hole = without(noisy, SHIFT[0] + x, SHIFT[1] + y, 14)
-    heights, variance, known = fit_face(holed).heights(ORIGIN, STEP, SHAPE)
+    heights, known = fit_face(holed).heights(ORIGIN, STEP, SHAPE)
     hidden = hole & known & (noisy.weights > 0)
     error = (heights - seen(face).heights)[hidden]
     assert np.abs(error).mean() < 1.2
-    assert np.abs(error).mean() < 3 * np.sqrt(variance[hidden].mean())
-
-
-def test_what_is_hidden_is_less_certain():
-    whole = seen(PEOPLE[0])
-    holed, hole = without(whole, SHIFT[0], SHIFT[1] + 50, 25)
-    _, certain, known = fit_face(whole).heights(ORIGIN, STEP, SHAPE)
-    _, less, _ = fit_face(holed).heights(ORIGIN, STEP, SHAPE)
-    inside = hole & known & (whole.weights > 0)
-    assert less[inside].mean() > 1.2 * certain[inside].mean()
-    assert (certain[known] > 0).all()
 
 
 def test_the_plane_of_symmetry_may_be_told():
@@ -84,10 +73,9 @@ def test_the_plane_of_symmetry_may_be_told():
 
 def test_the_mean_face_is_itself():
     face = mean_face(700.0)
-    heights, variance, known = face.heights(ORIGIN, STEP, SHAPE)
+    heights, known = face.heights(ORIGIN, STEP, SHAPE)
     found = fit_face(field(heights, known))
     assert np.abs(found.weights).max() < 0.3
-    assert not variance.any()
 
 
 @pytest.mark.parametrize("heights", [
@@ -111,7 +99,7 @@ def test_nothing_is_fitted_to_next_to_nothing():
 def test_the_nearest_of_two_sides_is_drawn():
     """The nose hides a part of the cheek from a camera at the side."""
     turned = person(0, yaw=35)
-    heights, _, known = turned.heights(ORIGIN, STEP, SHAPE)
+    heights, known = turned.heights(ORIGIN, STEP, SHAPE)
     model = basis()
     points = model.vertices + model.modes @ turned.weights.astype(np.float32)
     points = points @ turned.rotation.T + turned.shift
