@@ -20,6 +20,8 @@ _AROUND_MM = 20.0
 """How far about a head-like place the middle of a cascade's box may be."""
 _DEEPER_MM = 50.0
 """How far a face's middle may lie behind the nearest reading of its cell."""
+_MOST_CELLS = 1e6
+"""Cells to a millimetre at a distance of 1 mm; a Kinect has 72."""
 _HALF_NARROWEST_MM, _HALF_WIDEST_MM = 55.0, 105.0
 """Half of the narrowest and of the widest face."""
 
@@ -71,8 +73,10 @@ def head_regions(cells: DepthCells, nearer_than_mm: float = _FARTHEST_MM) -> lis
     nearest, shape, focal_px = cells
     cell = cells.cell_px
     farthest = min(nearer_than_mm, _FARTHEST_MM)
-    likely = head_like(nearest, focal_px / cell, _NEAREST_MM, farthest)
-    _clear_border(likely, nearest, focal_px / cell)
+    # An absurd calibration leads out of any image, too, but in numbers.
+    cells_at_1_mm = min(focal_px / cell, _MOST_CELLS)
+    likely = head_like(nearest, cells_at_1_mm, _NEAREST_MM, farthest)
+    _clear_border(likely, nearest, cells_at_1_mm)
     count, labels, pieces, _ = cv2.connectedComponentsWithStats(
         likely.view(np.uint8), connectivity=8)
     regions = []
