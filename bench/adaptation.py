@@ -20,6 +20,7 @@ from scipy.spatial import cKDTree
 from bench.cases import HOLE_SPACINGS
 from bench.heads import CHOOSING, REPORTING, at_hand
 from bench.machine import describe
+from bench.sensor_scenes import DISTANCES_MM, left_out, scenes
 from denseface.recon import ReconstructionError, Settings
 from denseface.recon.face import DenseCloud, Seeds
 from denseface.recon.finding import find_face
@@ -30,16 +31,11 @@ from denseface.recon.propagation import densify
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import box_window, segment_face
 from denseface.recon.surface import mean_spacing
-from tests.simulator import Label, Person, Scene, Truth, simulate
+from tests.simulator import Label, Truth, simulate
 from tests.simulator.sensors import SENSORS
 
 __all__ = ["FIXED", "PLAIN", "Prepared", "Row", "compare", "prepared"]
 
-_DISTANCES_MM = (650.0, 800.0, 1000.0)
-_YAW, _PITCH = 18.0, 6.0
-"""Largest turns, degrees."""
-_HOLES = (0.25, 1.0)
-"""`Scene.holes` by turns."""
 _POINTS = 4000
 """Points drawn from a frame."""
 _MOST_MM = 20.0
@@ -93,25 +89,19 @@ class Prepared:
 
 def prepared(heads: tuple[str, ...], sensor: str) -> Iterator[Prepared]:
     """Give frames of some heads as a sensor sees them."""
-    for i, head in enumerate(at_hand(heads)):
-        for j, distance in enumerate(_DISTANCES_MM):
-            rng = np.random.default_rng([11, i, j])
-            person = Person(head, distance, yaw=rng.uniform(-_YAW, _YAW),
-                            pitch=rng.uniform(-_PITCH, _PITCH))
-            scene = Scene((person,), holes=_HOLES[(i + j) % 2], decor=10 * i + j)
-            shot, = simulate(scene, SENSORS[sensor], seed=5000 + 10 * i + j)
-            frame = shot.frame
-            try:
-                found = find_face(frame, lambda _: None)
-                tied = register(frame, *box_window(found.overview, found.detection.box))
-                seeds = segment_face(tied, found.detection.box, frame.calibration.color.fx)
-            except ReconstructionError as error:
-                print(f"{sensor}, {head} at {distance:.0f} mm is left out: {error}",
-                      file=sys.stderr)
-                continue
-            spacing = mean_spacing(seeds.points, seeds.pixels, Settings().neighbors)
-            yield Prepared(seeds, spacing, measure_noise(seeds.points, seeds.pixels, spacing),
-                           partial(sample_colors, frame, tied), shot.truth)
+    for scene, seed in scenes(heads):
+        shot, = simulate(scene, SENSORS[sensor], seed=seed)
+        frame = shot.frame
+        try:
+            found = find_face(frame, lambda _: None)
+            tied = register(frame, *box_window(found.overview, found.detection.box))
+            seeds = segment_face(tied, found.detection.box, frame.calibration.color.fx)
+        except ReconstructionError as error:
+            print(left_out(scene, sensor, error), file=sys.stderr)
+            continue
+        spacing = mean_spacing(seeds.points, seeds.pixels, Settings().neighbors)
+        yield Prepared(seeds, spacing, measure_noise(seeds.points, seeds.pixels, spacing),
+                       partial(sample_colors, frame, tied), shot.truth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +186,7 @@ def main() -> int:
     args = parser.parse_args()
     heads = CHOOSING if args.choosing else REPORTING
     print(describe(" ".join(["script/bench adaptation", *sys.argv[1:]])))
-    print(f"\nHeads {', '.join(at_hand(heads))} at {', '.join(f'{d:.0f}' for d in _DISTANCES_MM)} "
+    print(f"\nHeads {', '.join(at_hand(heads))} at {', '.join(f'{d:.0f}' for d in DISTANCES_MM)} "
           "mm; errors on the face, mm:\n")
     print("| sensor | noise measured: mm, alike over px, levels, mm | raw | `best` "
           "| best fixed (R0, lambda, detail) | against it, % | best single fit (R0, lambda) "

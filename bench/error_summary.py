@@ -6,12 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.simulator.accuracy import GROSS_MM
+from tests.simulator.accuracy import ERROR_BINS_MM, GROSS_MM
 
-__all__ = ["BINS", "HEADINGS", "ErrorSummary"]
+__all__ = ["HEADINGS", "ErrorSummary"]
 
-BINS = np.linspace(0, GROSS_MM, 56)
-"""Edges of the histogram of errors, mm."""
 HEADINGS = ("method", "mean over the face, mm", "ours at the same places, mm",
             "inside holes, mm", "holes filled, %", "> 5.5 mm, %", "places covered, %", "ms")
 _MIN_FILLED = 0.5
@@ -26,7 +24,8 @@ class ErrorSummary:
     means: list[float] = field(default_factory=list)
     ours: list[float] = field(default_factory=list)
     milliseconds: list[float] = field(default_factory=list)
-    counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(len(BINS) - 1, np.int64))
+    counts: NDArray[np.int64] = field(
+        default_factory=lambda: np.zeros(len(ERROR_BINS_MM) - 1, np.int64))
     points: int = 0
     places: int = 0
     gross: int = 0
@@ -50,7 +49,7 @@ class ErrorSummary:
         if ours is not None:
             self.ours.append(float(ours[known].mean()))
         self.milliseconds.append(took_ms)
-        self.counts += np.histogram(errors[known], BINS)[0]
+        self.counts += np.histogram(errors[known], ERROR_BINS_MM)[0]
         self.points += int(known.sum())
         self.places += len(errors)
         self.gross += int((errors[known] > GROSS_MM).sum())

@@ -9,15 +9,21 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from bench.cases import Case
-from bench.error_summary import BINS, ErrorSummary
+from bench.error_summary import ErrorSummary
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from tests.simulator.accuracy import GROSS_MM
+from tests.simulator.accuracy import ERROR_BINS_MM, GROSS_MM
 
-__all__ = ["error_histogram", "error_maps", "sigma_calibration", "time_against_seeds"]
+__all__ = [
+    "error_distribution",
+    "error_histogram",
+    "error_maps",
+    "sigma_calibration",
+    "time_against_seeds",
+]
 
 _MAP_LARGEST_MM = 3.0
 """Larger errors are red in an error map, mm."""
@@ -50,14 +56,34 @@ def error_maps(case: Case, errors: dict[str, NDArray[np.float64]], path: Path) -
 def error_histogram(summaries: list[ErrorSummary], path: Path) -> None:
     """Draw the share of points by error, 0-5.5 mm, the range of the paper's Figure 9."""
     figure, axis = plt.subplots(figsize=(8, 5), layout="constrained")
-    width = BINS[1] - BINS[0]
+    width = ERROR_BINS_MM[1] - ERROR_BINS_MM[0]
     for summary in summaries:
         ours = summary.name.startswith("ours")
-        axis.stairs(100 * summary.counts / summary.points / width, BINS, label=summary.name,
-                    linewidth=1.8 if ours else 0.9, linestyle="-" if ours else "--")
+        axis.stairs(100 * summary.counts / summary.points / width, ERROR_BINS_MM,
+                    label=summary.name, linewidth=1.8 if ours else 0.9,
+                    linestyle="-" if ours else "--")
     axis.set(xlim=(0, GROSS_MM), yscale="log", ylim=(0.02, 200),
              xlabel="distance from the true surface, mm", ylabel="points, % per mm")
     figure.legend(fontsize=6, loc="outside lower center", ncols=2)
+    _save(figure, path, 90)
+
+
+def error_distribution(shown: dict[str, NDArray[np.float64]], path: Path) -> None:
+    """Draw shares of points per mm of error beside the paper's, the last of `shown`.
+
+    shown : (55,) share per mm between `ERROR_BINS_MM`, by name
+    """
+    figure, axis = plt.subplots(figsize=(8, 5), layout="constrained")
+    *ours, paper = shown.items()
+    axis.stairs(100 * paper[1], ERROR_BINS_MM, label=paper[0], fill=True, color="lightgray")
+    presets = list(dict.fromkeys(name.split(",")[0] for name, _ in ours))
+    for name, shares in ours:
+        axis.stairs(100 * shares, ERROR_BINS_MM, label=name.replace("`", ""), linewidth=1.3,
+                    color=f"C{presets.index(name.split(',')[0])}",
+                    linestyle="--" if name.endswith("sensors") else "-")
+    axis.set(xlim=(0, GROSS_MM), ylim=(0, None), xlabel="distance from the true surface, mm",
+             ylabel="points, % per mm")
+    figure.legend(fontsize=7, loc="outside lower center", ncols=2)
     _save(figure, path, 90)
 
 

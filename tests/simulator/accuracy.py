@@ -1,6 +1,6 @@
 """How near a reconstructed face is to the true one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,12 @@ from denseface.recon.face import Face
 from tests.simulator.labels import Label
 from tests.simulator.truth import Truth
 
-__all__ = ["GROSS_MM", "NEAR_MM", "Accuracy", "measure"]
+__all__ = ["ERROR_BINS_MM", "GROSS_MM", "NEAR_MM", "Accuracy", "measure"]
 
 GROSS_MM = 5.5
 """The paper's Figure 9 ends here."""
+ERROR_BINS_MM = np.linspace(0, GROSS_MM, 56)
+"""Edges of a histogram of errors, mm."""
 NEAR_MM = 2.0
 
 # A point this far off the head's surface is not its rim but on something else.
@@ -46,6 +48,8 @@ class Accuracy:
     """Share of the sensor's readings of the true face that are not in the initial cloud."""
     elsewhere: float
     """Share of the dense cloud on walls, shoulders, other people, a hand, or glasses."""
+    per_mm: NDArray[np.float64] = field(compare=False, repr=False)
+    """(55,) share of the dense cloud per mm of error, between `ERROR_BINS_MM`."""
 
     @property
     def ratio(self) -> float:
@@ -68,6 +72,7 @@ def measure(face: Face, truth: Truth, frame: RgbdFrame) -> Accuracy:
         covered=float(np.isfinite(nearest).mean()),
         lost=_lost(face, truth, frame),
         elsewhere=_elsewhere(face.dense.points, errors, truth),
+        per_mm=np.histogram(errors, ERROR_BINS_MM)[0] / (len(errors) * np.diff(ERROR_BINS_MM)),
     )
 
 
