@@ -43,9 +43,9 @@ class _Coefficients(NamedTuple):
     rim_jitter: float
 
 
-_DETAILED = _Coefficients(1.35, 0.85, 2.2, 0.11, 0.14, 0.42, 1.1)
+_DETAILED = _Coefficients(4.0, 0.65, 1.3, 0.18, 0.06, 0.33, 2.6)
 """Of a fit with detail, which has a broad average at the rim."""
-_FIT_ALONE = _Coefficients(2.0, 2.0, 2.1, 0.38, 0.20, 1.50, 2.18)
+_FIT_ALONE = _Coefficients(2.7, 2.6, 3.4, 0.44, 0.1, 1.5, 10.0)
 """Of a fit without."""
 
 _STEEP, _FLAT = 0.8, 0.3
