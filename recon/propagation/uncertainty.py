@@ -43,9 +43,9 @@ class _Coefficients(NamedTuple):
     rim_jitter: float
 
 
-_DETAILED = _Coefficients(4.0, 0.65, 1.3, 0.18, 0.06, 0.33, 2.6)
+_DETAILED = _Coefficients(4.0, 0.65, 1.3, 0.25, 0.06, 0.33, 2.6)
 """Of a fit with detail, which has a broad average at the rim."""
-_FIT_ALONE = _Coefficients(2.7, 2.6, 3.4, 0.44, 0.1, 1.5, 10.0)
+_FIT_ALONE = _Coefficients(2.0, 2.4, 2.6, 0.5, 0.1, 1.9, 9.0)
 """Of a fit without."""
 
 _STEEP, _FLAT = 0.8, 0.3
