@@ -20,7 +20,7 @@ from denseface.recon.arrays import Doubles
 from denseface.recon.noise._measure import Noise
 from denseface.recon.numerics.jit import compiled
 
-_FACE_DENSITY, _FACE_FALL = 0.045, 4.5
+_FACE_DENSITY, _FACE_FALL = 0.035, 4.5
 """A and p, k in 1/mm, S in mm^4: of faces less their quadratic trend. Chosen so that the least
 risk is the least error of the heads that settings are chosen on (docs/method.md)."""
 _LONGEST_MM = 150.0
@@ -45,8 +45,7 @@ class Risk(NamedTuple):
     radius_mm : of the Gaussian whose self-convolution is that error's covariance
     bias_share, white_share, smooth_share : expected squares of what the fit takes off the face, and
         of the white and the smooth noise that it lets pass, each over that of the seeds about the
-        surface; the last counts by its part of all noise: beside much that is white, what seems
-        smooth is mostly face
+        surface
     detail_noise : variance of the noise in what local averages add, mm^2
     fit_noise : variance of the noise in the fit, mm^2
     least_mm : the error that the levels of depth alone leave, `Noise.level_error_mm`
@@ -104,6 +103,8 @@ def _least(
     measure = waves * waves * np.log(ratio) / (2 * np.pi)
     face = _FACE_DENSITY * waves ** -_FACE_FALL * measure
     spread = (length * h) ** 2
+    # Beside much that is white, what seems smooth is mostly face: it counts by its part of all.
+    smooth *= smooth / max(white + smooth, 1e-12)
     white_noise = white * h * h * measure
     smooth_noise = smooth * 4 * np.pi * spread * np.exp(-waves**2 * spread) * measure
     noise = white_noise + smooth_noise
@@ -128,8 +129,7 @@ def _least(
             best[3] = np.sqrt(total / (error * waves * waves).sum())
             best[4] = ((1 - passed) ** 2 * face).sum() / left
             best[5] = (passed * passed * white_noise).sum() / left
-            best[6] = ((passed * passed * smooth_noise).sum() / left
-                       * smooth / max(white + smooth, 1e-12))
+            best[6] = (passed * passed * smooth_noise).sum() / left
             best[7], best[8] = din, (fit * fit * noise).sum()
     best[2] = np.sqrt(best[2])
     return best

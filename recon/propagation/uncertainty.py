@@ -1,6 +1,6 @@
 """Stage 6: how far off each dense point may be, along its viewing ray.
 
-    sigma^2 = r^2 (B b + W w + M m) + H d^2 + S j^2 h^2 g^4 + e g^2 (E h^2 + J j^2)
+    sigma^2 = r^2 (B b + W w + M m) + H d^2 (1 + g^2) + S j^2 h^2 g^4 + e g^2 (E h^2 + J j^2)
 
 r, mm : what the seeds around the point are off the surface, root mean square
 b, w, m : expected squares of what the fit takes off the face, and of white and smooth noise that it
@@ -43,9 +43,9 @@ class _Coefficients(NamedTuple):
     rim_jitter: float
 
 
-_DETAILED = _Coefficients(4.0, 0.65, 1.3, 0.25, 0.06, 0.33, 2.6)
+_DETAILED = _Coefficients(5.0, 0.5, 0.8, 0.13, 0.05, 0.3, 3.2)
 """Of a fit with detail, which has a broad average at the rim."""
-_FIT_ALONE = _Coefficients(2.0, 2.4, 2.6, 0.5, 0.1, 1.9, 9.0)
+_FIT_ALONE = _Coefficients(0.5, 3.6, 2.6, 0.3, 0.03, 0.8, 16.0)
 """Of a fit without."""
 
 _STEEP, _FLAT = 0.8, 0.3
@@ -65,7 +65,7 @@ class VarianceComponents(NamedTuple):
 
     Attributes
     ----------
-    noise, hole, slope, rim, rim_jitter : r^2, d^2, j^2 h^2 g^4, e h^2 g^2, e j^2 g^2,
+    noise, hole, slope, rim, rim_jitter : r^2, d^2 (1 + g^2), j^2 h^2 g^4, e h^2 g^2, e j^2 g^2,
         (rows, columns) float32, mm^2
     every : grid points from node to node
     """
@@ -107,7 +107,7 @@ def variance_components(
     area = np.float32(spacing**2)
     edge = slope * np.clip(2 - 2 * covered, np.float32(0), np.float32(1))
     return VarianceComponents(
-        noise=np.asarray(noise, np.float32), hole=np.asarray(deep * deep, np.float32),
+        noise=np.asarray(noise, np.float32), hole=np.asarray(deep * deep * (1 + slope), np.float32),
         slope=np.asarray(jitter * area * slope * slope, np.float32),
         rim=np.asarray(area * edge, np.float32), rim_jitter=np.asarray(jitter * edge, np.float32),
         every=every)

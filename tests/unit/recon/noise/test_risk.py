@@ -55,7 +55,7 @@ def test_the_expected_error_is_that_of_the_smoother_on_such_fields():
     k = 2 * np.pi * np.hypot(*np.meshgrid(np.fft.fftfreq(n, SPACING), np.fft.fftfreq(n, SPACING)))
     density = np.zeros_like(k)
     seen = (k > 2 * np.pi / 150) & (k < 0.9 * np.pi / SPACING)
-    density[seen] = 0.045 * k[seen] ** -4.5
+    density[seen] = 0.035 * k[seen] ** -4.5
     face = np.fft.ifft2(np.fft.fft2(rng.standard_normal((n, n))) * np.sqrt(density) / SPACING).real
     r0 = plan.r0_factor * SPACING
     gaussian = np.pi * r0**2 * np.exp(-((k * r0) ** 2) / 4)

@@ -92,7 +92,7 @@ def test_it_follows_the_noise_around_a_point():
 def test_it_is_larger_where_the_surface_is_steep():
     xy = disc_seeds(1.3, 50)
     found = [middle(dense_of(noisy(xy, height, 0.5), 1.3), 40) for height in (flat, tilted)]
-    assert found[1] > 1.2 * found[0]
+    assert found[1] > 1.1 * found[0]
 
 
 def test_it_is_larger_at_the_rim_of_the_same_slope():
