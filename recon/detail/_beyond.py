@@ -15,7 +15,7 @@ import numpy as np
 
 from denseface.recon.arrays import Bools, Floats
 from denseface.recon.intermediate import DepthReader, SurfaceGrid
-from denseface.recon.numerics.filters import blurred, downsampled, upsampled
+from denseface.recon.numerics.filters import blurred, downsampled
 from denseface.recon.numerics.morphology import binary_fill_holes, disc
 from denseface.recon.numerics.percentile import percentile
 from denseface.recon.numerics.scatter import interpolate
@@ -38,8 +38,10 @@ _ALIKE_MM = 10.0
 """A reading in an enclosed pocket that is so near to the model is of the face, mm."""
 _SPECK = 4
 """Fewer readings of something else in a pocket are stray, every second point each way."""
-_WHOLE, _HALF = 0.99, 0.5
-"""Parts of four points that are the face: all of them; enough to be one of it."""
+_WHOLE = 0.99
+"""Part of four points that are the face where all of them are."""
+_HALF = 0.5
+"""Part of a blurred area within which its outline lies."""
 _NARROWEST_MM = 5.0
 """What is added makes no tongue narrower than this, mm."""
 
@@ -135,9 +137,9 @@ def _closed(wanted: Bools, pockets: Bools, right: Bools, known: Bools) -> Bools:
 def _finer(wanted: Bools, face: Bools, shape: tuple[int, ...]) -> Bools:
     """Give what is wanted on twice the points each way, up to the face: no slit is left between."""
     beside = cv2.dilate(wanted.view(np.uint8), np.ones((3, 3), np.uint8))
-    both = np.asarray(cv2.merge([(wanted | face).astype(np.float32), beside.astype(np.float32)]),
-                      np.float32)
-    return np.asarray((upsampled(both, shape) > _HALF).all(axis=2))
+    each = cv2.resize(beside & (wanted | face).view(np.uint8), None, fx=2, fy=2,
+                      interpolation=cv2.INTER_NEAREST)
+    return np.asarray(each[:shape[0], :shape[1]].astype(bool))
 
 
 def _with(surface: SurfaceGrid, added: Bools, halved: list[Floats]) -> SurfaceGrid:
