@@ -177,13 +177,13 @@ def _shape(settings: Settings, clock: "_Stopwatch", found: Found) -> Face:
     plan = plan_fit(settings, noise, spacing)
     surface = surface_of(seeds.points, spacing, settings, plan, sampler)
     clock.lap("rbf")
-    score, like = judge_shape(surface)
+    score, like, pose = judge_shape(surface)
     clock.lap("judgement")
     if like:
         raise NoFaceError(f"no face found: what the box at {box} shows is {like} "
                           f"(score {score:.2f}, a face has {LEAST_SCORE} or more)")
     if settings.prior:  # after the judgement: what a model adds is like a face
-        surface = beyond_outline(surface, partial(_depths_at, frame))
+        surface = beyond_outline(surface, partial(_depths_at, frame), pose)
     dense = densify(seeds, surface, spacing, settings.ratio, plan, sampler)
     left_open = openings(dense)
     clock.lap("propagation")

@@ -1,7 +1,8 @@
 """The last stage: whether depth is fine enough for a face, and what was made of it is one."""
 
-from denseface.recon.judgement._judge import LEAST_SCORE, SURE_SCORE, judge_shape
+from denseface.recon.judgement._judge import LEAST_SCORE, SURE_SCORE, Judgement, judge_shape
 from denseface.recon.judgement._likeness import Likeness
 from denseface.recon.judgement._size_and_steps import check_face, check_steps
 
-__all__ = ["LEAST_SCORE", "SURE_SCORE", "Likeness", "check_face", "check_steps", "judge_shape"]
+__all__ = ["LEAST_SCORE", "SURE_SCORE", "Judgement", "Likeness", "check_face", "check_steps",
+           "judge_shape"]

@@ -1,14 +1,16 @@
 """Whether a surface has a face's shape: a score from 0 to 1, and in words what it is else."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from denseface.recon.arrays import Doubles
 from denseface.recon.intermediate import SurfaceGrid
 from denseface.recon.judgement._likeness import Likeness, likenesses
+from denseface.recon.prior import HeadPose
 
-__all__ = ["LEAST_SCORE", "SURE_SCORE", "judge_points", "judge_shape", "score_of",
+__all__ = ["LEAST_SCORE", "SURE_SCORE", "Judgement", "judge_points", "judge_shape", "score_of",
            "surface_points"]
 
 _STEP_MM = 4.0
@@ -33,7 +35,22 @@ _STRAIGHT = 0.25
 """Of the larger curvature: a smaller one along a tin."""
 
 
-def judge_shape(surface: SurfaceGrid) -> tuple[float, str]:
+class Judgement(NamedTuple):
+    """How sure it is that a surface is a face's.
+
+    Attributes
+    ----------
+    score : 0-1, at least `LEAST_SCORE` for a face
+    like : what the surface is like, in words, empty for a face
+    pose : how the mean face lies on it best; None where it was not laid on
+    """
+
+    score: float
+    like: str
+    pose: HeadPose | None
+
+
+def judge_shape(surface: SurfaceGrid) -> Judgement:
     """Say how sure it is that a surface is a face's.
 
     The mean face is laid on it. A face's eyes, nose and mouth then stand where the mean face's do:
@@ -42,25 +59,22 @@ def judge_shape(surface: SurfaceGrid) -> tuple[float, str]:
     Parameters
     ----------
     surface : the fit over (X, Y), with its detail
-
-    Returns
-    -------
-    the score, 0-1, at least `LEAST_SCORE` for a face; and what the surface is like, in words,
-    empty for a face
     """
     return judge_points(surface_points(surface))
 
 
-def judge_points(points: Doubles) -> tuple[float, str]:
+def judge_points(points: Doubles) -> Judgement:
     """Judge points of a surface, (n, 3) mm, `_STEP_MM` apart along x and y: see `judge_shape`."""
     if len(points) < _FEWEST_POINTS:
-        return 0.0, "too small"
-    score = 0.0
+        return Judgement(0.0, "too small", None)
+    score, pose = 0.0, None
     for likeness in likenesses(points):
-        score = max(score, score_of(likeness))
+        of_this = score_of(likeness)
+        if of_this > score:
+            score, pose = of_this, likeness.pose
         if score >= SURE_SCORE:
             break
-    return score, "" if score >= LEAST_SCORE else _what_it_is(points)
+    return Judgement(score, "" if score >= LEAST_SCORE else _what_it_is(points), pose)
 
 
 def surface_points(surface: SurfaceGrid) -> Doubles:

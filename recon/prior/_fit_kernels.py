@@ -192,25 +192,34 @@ def draw(
     heights : (rows, columns), mm, changed where the mesh is nearer
     """
     rows, columns = heights.shape
+    flat, placed = heights.ravel(), np.empty((len(points), 2))
+    for i in range(len(points)):
+        for axis in range(2):
+            placed[i, axis] = (points[i, axis] - origin[axis]) / step
     for t in range(len(triangles)):
         a, b, c = triangles[t]
-        ax, ay = (points[a, 0] - origin[0]) / step, (points[a, 1] - origin[1]) / step
-        bx, by = (points[b, 0] - origin[0]) / step, (points[b, 1] - origin[1]) / step
-        cx, cy = (points[c, 0] - origin[0]) / step, (points[c, 1] - origin[1]) / step
+        ax, ay = placed[a]
+        bx, by = placed[b]
+        cx, cy = placed[c]
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if area >= -1e-9:
             continue
         per_area = 1 / area
         top, bottom = max(0, math.ceil(min(ay, by, cy))), min(rows - 1, int(max(ay, by, cy)))
         left, right = max(0, math.ceil(min(ax, bx, cx))), min(columns - 1, int(max(ax, bx, cx)))
+        b_right, b_down = (cy - ay) * per_area, (ax - cx) * per_area
+        c_right, c_down = (ay - by) * per_area, (bx - ax) * per_area
+        z = points[a, 2]
+        to_b, to_c = points[b, 2] - z, points[c, 2] - z
         for i in range(top, bottom + 1):
-            for j in range(left, right + 1):
-                of_b = ((j - ax) * (cy - ay) - (i - ay) * (cx - ax)) * per_area
-                of_c = ((bx - ax) * (i - ay) - (by - ay) * (j - ax)) * per_area
-                if of_b < 0 or of_c < 0 or of_b + of_c > 1:
-                    continue
-                z = (1 - of_b - of_c) * points[a, 2] + of_b * points[b, 2] + of_c * points[c, 2]
-                heights[i, j] = min(heights[i, j], z)
+            of_b = (i - ay) * b_down + (left - ax) * b_right
+            of_c = (i - ay) * c_down + (left - ax) * c_right
+            for at in range(np.uint64(i * columns + left), np.uint64(i * columns + right + 1)):
+                # A little beyond the edges: no point falls between two triangles.
+                if of_b >= -1e-9 and of_c >= -1e-9 and of_b + of_c <= 1 + 1e-9:
+                    flat[at] = min(flat[at], np.float32(z + of_b * to_b + of_c * to_c))
+                of_b += b_right
+                of_c += c_right
 
 
 @compiled

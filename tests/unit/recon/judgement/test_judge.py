@@ -73,20 +73,20 @@ def mean_face_seen(*turn, scale=1.0):
     (tin, "round like a tin"), (ball, "round like a ball"), (carton, "uneven"), (flat, "flat"),
     (waves, "uneven")])
 def test_things_are_no_faces_and_are_named(thing, like):
-    score, said = judge_points(thing())
+    score, said, _ = judge_points(thing())
     assert score < 0.2
     assert said.startswith(like)
 
 
 def test_a_few_points_are_no_face():
-    assert judge_points(tin()[:50]) == (0.0, "too small")
+    assert judge_points(tin()[:50]) == (0.0, "too small", None)
 
 
 @pytest.mark.parametrize("turn", [
     (0, 0, 0), (0, 40, 0), (0, -55, 0), (25, 0, 0), (-25, 20, 0), (0, 0, 20), (0, 0, -20)])
 @pytest.mark.parametrize("scale", [0.75, 1.0])
 def test_a_face_is_one_however_it_is_turned(turn, scale):
-    score, said = judge_points(mean_face_seen(*turn, scale=scale))
+    score, said, _ = judge_points(mean_face_seen(*turn, scale=scale))
     assert score > SURE_SCORE
     assert said == ""
 

@@ -4,6 +4,7 @@ import pytest
 
 from denseface.recon import NoFaceError, pipeline, reconstruct
 from denseface.recon.detection import REJECTED
+from denseface.recon.judgement import Judgement
 from tests.simulator import Person, Scene, simulate
 
 FAR_MM = 1100.0
@@ -24,7 +25,7 @@ def judged(monkeypatch):
 
         def judge(_surface):
             score = left.pop(0)
-            return score, "" if score >= 0.5 else "round like a tin"
+            return Judgement(score, "" if score >= 0.5 else "round like a tin", None)
         monkeypatch.setattr(pipeline, "judge_shape", judge)
         return left
     return by
