@@ -131,7 +131,9 @@ class Support:
         above = (left.margin > self.level).view(np.uint8)
         radius = _narrow(above, self.step)
         broad = dilated(eroded(binary_fill_holes(above), radius), radius)
-        _, parts = cv2.connectedComponents(broad)
+        count, parts = cv2.connectedComponents(broad)
+        if count <= 2:
+            return left
         areas = np.bincount(parts.ravel())
         dropped = areas < _ISLAND_SHARE * areas[1:].max(initial=0)
         dropped[0] = True

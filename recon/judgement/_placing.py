@@ -10,6 +10,7 @@ import numpy as np
 from denseface.recon.arrays import Doubles
 from denseface.recon.judgement._mould_kernels import Mould
 from denseface.recon.judgement._placing_kernels import refine
+from denseface.recon.numerics.percentile import percentile
 
 __all__ = ["mean_face", "placements"]
 
@@ -61,7 +62,7 @@ def placements(points: Doubles) -> Iterator[Doubles]:
     Yields (13,), by `_mould_kernels`.
     """
     few, some = (points[::max(1, len(points) // count)].copy() for count in (_FEW, _SOME))
-    low, high = np.percentile(points[:, 1], _ENDS)
+    low, high = (percentile(points[:, 1], percent) for percent in _ENDS)
     scale = min(max((high - low) / _HEIGHT_MM, _SCALES[0]), _SCALES[1])
     yield from _refined(few, some, _starts_on(few, points, scale, 1, _UPRIGHT), 1)
     for factor in (1.0, _SMALLER):
@@ -71,7 +72,7 @@ def placements(points: Doubles) -> Iterator[Doubles]:
 def _front(points: Doubles, scale: float = 1.0) -> Doubles:
     """Give the middle of those of points, (n, 3), that lie a little behind the nearest at most."""
     depth = points[:, 2]
-    front = np.percentile(depth, _FRONT_PERCENT)
+    front = percentile(depth, _FRONT_PERCENT)
     return np.asarray(points[depth < front + scale * _FRONT_MM].mean(axis=0))
 
 

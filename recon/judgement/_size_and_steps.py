@@ -5,6 +5,7 @@ import numpy as np
 from denseface.recon.arrays import Floats
 from denseface.recon.errors import CoarseDepthError, NoFaceError
 from denseface.recon.face import Box
+from denseface.recon.numerics.percentile import percentile
 
 __all__ = ["check_face", "check_steps"]
 
@@ -32,6 +33,8 @@ _MIN_RELIEF_MM = 10.0
 """Depth of what was cut out; of those frames the least has 33."""
 _ENDS = (2, 98)
 """Percentiles between which it is measured."""
+_SAMPLES = 4000
+"""About so many seeds tell these."""
 
 
 def check_steps(z: Floats, middle_mm: float) -> str:
@@ -79,9 +82,10 @@ def check_face(points: Floats, pixel_mm2: float, box: Box) -> None:
     NoFaceError
         They have not.
     """
-    low, high = np.percentile(points, _ENDS, axis=0)
-    width, height, relief = (high - low).tolist()
-    area = len(points) * pixel_mm2 * float(np.median(points[:, 2])) ** 2
+    some = points[::max(1, len(points) // _SAMPLES)].T.copy()
+    width, height, relief = (
+        percentile(along, _ENDS[1]) - percentile(along, _ENDS[0]) for along in some)
+    area = len(points) * pixel_mm2 * percentile(some[2], 50) ** 2
     if (_WIDTH_MM[0] <= width <= _WIDTH_MM[1] and _HEIGHT_MM[0] <= height <= _HEIGHT_MM[1]
             and area >= _MIN_AREA_MM2 and relief >= _MIN_RELIEF_MM):
         return

@@ -15,6 +15,7 @@ import numpy as np
 
 from denseface.recon.arrays import Bytes, Floats, Ints
 from denseface.recon.noise import _kernels as kernels
+from denseface.recon.numerics.percentile import percentile
 
 _SLOPE_BLUR_PX = 3.0
 """Standard deviation of the Gaussian before slopes are taken, pixels."""
@@ -103,7 +104,7 @@ def gentle_places(heights: Floats, spacing: float) -> Bytes:
 def _quantum(z: Floats) -> float:
     """Give the mean distance of the levels that depths have, mm."""
     levels = np.unique(z[::max(1, len(z) // _LEVELS_OF)])
-    low, high = np.percentile(z, _MIDDLE)
+    low, high = (percentile(z, percent) for percent in _MIDDLE)
     inner = levels[(levels >= low) & (levels <= high)]
     if len(inner) < 2:
         inner = levels
