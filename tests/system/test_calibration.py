@@ -35,7 +35,7 @@ def within(of: Samples, chosen):
 def test_sigma_is_honest_on_every_recording(taken):
     for name, of in taken.items():
         once, twice = within(of, of.everywhere)
-        assert 0.60 <= once <= 0.77, name
+        assert 0.58 <= once <= 0.78, name
         assert 0.88 <= twice <= 0.99, name
 
 
@@ -47,9 +47,10 @@ def test_sigma_is_honest_at_the_rim(taken):
 
 
 def test_sigma_is_not_far_off_in_holes(taken):
+    """Away from the rim: past the outline, where a model goes on, some lie over another layer."""
     of = Samples.joined(list(taken.values()))
-    once, twice = within(of, of.hole)
-    assert 0.50 <= once <= 0.80  # past the outline some lie over another layer
+    once, twice = within(of, of.hole & ~of.rim)
+    assert 0.54 <= once <= 0.80
     assert 0.84 <= twice <= 0.99
 
 
