@@ -45,7 +45,7 @@ class _Coefficients(NamedTuple):
 
 _DETAILED = _Coefficients(5.0, 0.5, 0.8, 0.13, 0.05, 0.3, 3.2)
 """Of a fit with detail, which has a broad average at the rim."""
-_FIT_ALONE = _Coefficients(0.5, 3.6, 2.6, 0.3, 0.03, 0.8, 16.0)
+_FIT_ALONE = _Coefficients(0.5, 3.8, 2.75, 0.36, 0.03, 0.9, 17.0)
 """Of a fit without."""
 
 _STEEP, _FLAT = 0.8, 0.3
