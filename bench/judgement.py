@@ -16,29 +16,36 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from bench.composites import composites
-from bench.hard_faces import hard_views
+from bench.hard_faces import hard_views, sensor_views, turned_views
 from bench.heads import CHOOSING, REPORTING
 from bench.recall_scenes import face_views, taken
 from denseface.capture import RgbdFrame
+from denseface.capture.npz import load_frame, save_frame
 from denseface.recon.detection import detect_face
 from denseface.recon.errors import ReconstructionError
 from denseface.recon.face import Box
-from denseface.recon.fitting import surface_of
+from denseface.recon.fitting import plan_fit, surface_of
 from denseface.recon.judgement import LEAST_SCORE, check_face
 from denseface.recon.judgement._judge import score_of, surface_points
 from denseface.recon.judgement._likeness import Likeness, likenesses
+from denseface.recon.noise import measure_noise
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import box_window, segment_face
 from denseface.recon.settings import Settings
 from denseface.recon.surface import MIN_SEEDS, mean_spacing
 from denseface.recon.warmup import warm
+from tests.simulator import Truth
 
 __all__: list[str] = []
 
 Doubles = NDArray[np.float64]
 
 _SPARSE = slice(None, None, 4)
+_ASIDE_MM = 70.0
+"""A box whose middle lies farther beside a face's is not that face's."""
 _RIDGE = 0.01
+_SHARE = 0.6
+"""What all faces weigh together, of 1: of things, detection has passed nearly all before."""
 _ROUNDS = 4
 """Of the fit: a face is what its best placement says, a thing must be none by all of its."""
 
@@ -54,7 +61,8 @@ def points_in(frame: RgbdFrame, box: Box) -> Doubles | None:
             return None
         check_face(seeds.points, 1 / (frame.depth_camera.fx * frame.depth_camera.fy), box)
         spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
-        surface = surface_of(seeds.points, spacing, settings,
+        noise = measure_noise(seeds.points, seeds.pixels, spacing)
+        surface = surface_of(seeds.points, spacing, settings, plan_fit(settings, noise, spacing),
                              partial(sample_colors, frame, registered))
     except ReconstructionError:
         return None
@@ -63,21 +71,29 @@ def points_in(frame: RgbdFrame, box: Box) -> Doubles | None:
 
 def _faces(heads: tuple[str, ...], hard: int, folder: Path) -> Iterator[tuple[str, Doubles]]:
     """Give the faces that detection finds, by what is out of the ordinary."""
-    for view in [*face_views(heads), *hard_views(heads, hard)]:
-        kept = folder / f"{view.name}.points.npy"
-        if not kept.exists():
-            frame, _ = taken(view, folder)
-            overview = register(frame, _SPARSE, _SPARSE, colors=False)
-            points = None
-            try:
-                points = points_in(frame, detect_face(frame.rgb, overview,
-                                                      frame.calibration.color.fx).box)
-            except ReconstructionError as error:
-                print(f"{view.name}: {error}", file=sys.stderr)
-            np.save(kept, np.zeros((0, 3)) if points is None else points)
-        points = np.load(kept)
-        if len(points):
+    for view in [*face_views(heads), *hard_views(heads, hard), *turned_views(heads),
+                 *sensor_views(heads)]:
+        frame, truth = taken(view, folder)
+        overview = register(frame, _SPARSE, _SPARSE, colors=False)
+        try:
+            box = detect_face(frame.rgb, overview, frame.calibration.color.fx).box
+        except ReconstructionError as error:
+            print(f"{view.name}: {error}", file=sys.stderr)
+            continue
+        points = points_in(frame, box) if _is_on_face(box, frame, truth) else None
+        if points is None:
+            print(f"{view.name}: the box at {box} is another thing's", file=sys.stderr)
+        else:
             yield view.factor, points
+
+
+def _is_on_face(box: Box, frame: RgbdFrame, truth: Truth) -> bool:
+    """Say whether a box's middle is a face's, nearly."""
+    points = truth.face_points()
+    pixels = frame.calibration.color.project(frame.depth_to_color.apply(points))
+    middle = box[0] + box[2] / 2, box[1] + box[3] / 2
+    off_px = float(np.hypot(*(np.median(pixels, axis=0) - middle)))
+    return off_px * float(np.median(points[:, 2])) < _ASIDE_MM * frame.calibration.color.fx
 
 
 def _things(count: int, first: int, folder: Path) -> Iterator[tuple[str, Doubles]]:
@@ -86,12 +102,13 @@ def _things(count: int, first: int, folder: Path) -> Iterator[tuple[str, Doubles
         kept = folder / f"thing_{number}.npz"
         if not kept.exists():
             composite, = composites(1, number)
-            points = points_in(composite.frame, composite.box)
-            np.savez(kept, kind=composite.thing.kind,
-                     points=np.zeros((0, 3)) if points is None else points)
-        with np.load(kept, allow_pickle=False) as data:
-            if len(data["points"]):
-                yield str(data["kind"]), data["points"]
+            save_frame(composite.frame, kept)
+            kept.with_suffix(".txt").write_text(
+                " ".join(map(str, composite.box)) + f" {composite.thing.kind}")
+        x, y, w, h, kind = kept.with_suffix(".txt").read_text().split(maxsplit=4)
+        points = points_in(load_frame(kept), (int(x), int(y), int(w), int(h)))
+        if points is not None:
+            yield kind, points
 
 
 def _fit(faces: list[list[Likeness]], things: list[list[Likeness]]) -> Doubles:
@@ -107,10 +124,10 @@ def _fit(faces: list[list[Likeness]], things: list[list[Likeness]]) -> Doubles:
 
 
 def _regression(positive: Doubles, negative: Doubles) -> Doubles:
-    """Fit a logistic regression with a ridge on scaled figures; both kinds weigh the same."""
+    """Fit a logistic regression with a ridge on scaled figures."""
     figures = np.concatenate([positive, negative])
     sides = np.concatenate([np.ones(len(positive)), -np.ones(len(negative))])
-    share = np.where(sides > 0, 0.5 / len(positive), 0.5 / len(negative))
+    share = np.where(sides > 0, _SHARE / len(positive), (1 - _SHARE) / len(negative))
     mean, spread = figures.mean(axis=0), figures.std(axis=0) + 1e-9
     scaled = (figures - mean) / spread
 
@@ -140,15 +157,18 @@ def _table(name: str, given: Iterable[tuple[str, list[Likeness]]]) -> None:
 
 
 def main() -> int:
-    """Print the weights that were fitted, then the tables by the weights in the code."""
+    """Print the weights that were fitted, then the tables by those in the code.
+
+    With the defaults they are the same.
+    """
     parser = argparse.ArgumentParser(prog="python -m bench.judgement", description=__doc__)
-    parser.add_argument("--things", type=int, default=600, metavar="COUNT",
-                        help="composites to fit to, and as many others to report (default: 600)")
-    parser.add_argument("--hard", type=int, default=100, metavar="COUNT",
-                        help="faces of other proportions in hard scenes, beside those of recall, "
-                             "to fit to, and others to report (default: 100)")
+    parser.add_argument("--things", type=int, default=120, metavar="COUNT",
+                        help="composites to fit to, and as many others to report (default: 120)")
+    parser.add_argument("--hard", type=int, default=30, metavar="COUNT",
+                        help="faces of other proportions in hard scenes, beside the others, "
+                             "to fit to, and others to report (default: 30)")
     parser.add_argument("--kept", type=Path, required=True, metavar="FOLDER",
-                        help="frames and surfaces are kept there, and taken from there next time")
+                        help="frames are kept there, and taken from there next time")
     args = parser.parse_args()
     args.kept.mkdir(parents=True, exist_ok=True)
     warm()

@@ -24,12 +24,19 @@ _LIPS = 5
 """Samples, along the height, over which what lies between open lips is closed."""
 _BLUR = 1.2
 """Standard deviation of the Gaussian that smooths it, samples."""
+_LAMP, _INTENSITY, _AMBIENT = (0.0, -0.4, -0.9), 0.75, 0.35
+"""The light of the simulator's rooms, from the middle."""
+_DARK = 8.0
+"""Grey levels that are added before the logarithm, as where colours are judged."""
 
 Floats = NDArray[np.float32]
 
 
-def _radius(name: str) -> Floats:
-    """Cast rays at a head from all around toward its axis: (heights, angles), mm."""
+def _cast(name: str) -> tuple[Floats, Floats]:
+    """Cast rays at a head from all around toward its axis.
+
+    Gives the radius, mm, and the logarithm of the brightness there, both (heights, angles).
+    """
     head = load_head(name)
     scene = o3d.t.geometry.RaycastingScene()
     scale = _HALF_HEIGHT_MM / head.landmarks.chin[0]
@@ -42,8 +49,18 @@ def _radius(name: str) -> Floats:
     outward = np.stack([np.sin(angle), 0 * angle, -np.cos(angle)], axis=-1)
     start = _OUTSIDE_MM * outward + np.stack([0 * angle, height, 0 * angle + _AXIS_MM], axis=-1)
     rays = np.concatenate([start, -outward], axis=-1).astype(np.float32)
-    found = scene.cast_rays(o3d.core.Tensor(rays))["t_hit"].numpy()
-    return np.asarray(_OUTSIDE_MM - np.where(np.isfinite(found), found, np.nan), np.float32)
+    found = scene.cast_rays(o3d.core.Tensor(rays))
+    away, normals = found["t_hit"].numpy(), found["primitive_normals"].numpy()
+    seen = np.isfinite(away)
+    triangles = np.where(seen, found["primitive_ids"].numpy(), 0).ravel().astype(np.int64)
+    u, v = found["primitive_uvs"].numpy().reshape(-1, 2).T
+    albedo = head.colors_at(triangles, np.stack([1 - u - v, u, v], axis=1)).mean(axis=1)
+    normals *= np.sign((normals * outward).sum(axis=-1, keepdims=True))
+    light = _AMBIENT + _INTENSITY * np.maximum(normals @ np.array(_LAMP), 0)
+    # A picture's values are roots of light, about.
+    brightness = np.log(albedo.reshape(light.shape) * light**(1 / 2.2) + _DARK)
+    return (np.asarray(_OUTSIDE_MM - np.where(seen, away, np.nan), np.float32),
+            np.asarray(np.where(seen, brightness, np.nan), np.float32))
 
 
 def main() -> int:
@@ -51,12 +68,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m bench.mean_face", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("recon/judgement/mean_face.npz"))
     args = parser.parse_args()
-    mean = np.nanmean([_radius(name) for name in at_hand(CHOOSING)], axis=0)
-    mean = (mean + mean[:, ::-1]) / 2
+    cast = [_cast(name) for name in at_hand(CHOOSING)]
+    mean, brightness = (np.nanmean(one, axis=0) for one in zip(*cast, strict=True))
+    mean, brightness = ((one + one[:, ::-1]) / 2 for one in (mean, brightness))
     mean = cv2.morphologyEx(mean, cv2.MORPH_CLOSE, np.ones((_LIPS, 1), np.uint8))
     mean = cv2.GaussianBlur(mean, (0, 0), _BLUR)
+    brightness = cv2.GaussianBlur(brightness, (0, 0), _BLUR)
     np.savez_compressed(
-        args.out, radius=mean.astype(np.float16),
+        args.out, radius=mean.astype(np.float16), brightness=brightness.astype(np.float16),
         axes=np.array([_ANGLES_DEG[0], _STEP, _HEIGHTS_MM[0], _STEP, _AXIS_MM]))
     return 0
 

@@ -10,7 +10,16 @@ from numpy.typing import NDArray
 from denseface.capture import RgbdFrame
 from denseface.capture.calibration import CameraModel
 from denseface.capture.npz import load_frame, save_frame
-from tests.simulator import KINECT_CALIBRATED, Light, Person, Scene, Truth, head_names, simulate
+from tests.simulator import (
+    KINECT_CALIBRATED,
+    KinectModel,
+    Light,
+    Person,
+    Scene,
+    Truth,
+    head_names,
+    simulate,
+)
 
 __all__ = ["View", "darkened", "empty_views", "face_views", "taken"]
 
@@ -38,6 +47,7 @@ class View:
     """So many balls of a head's size and colour hang in the room."""
     mirrored: bool = False
     """The frame is seen in a mirror, cameras included."""
+    sensor: KinectModel = KINECT_CALIBRATED
 
     @property
     def name(self) -> str:
@@ -128,7 +138,7 @@ def _simulated(view: View, folder: Path | None) -> tuple[RgbdFrame, Truth]:
     truth_path = kept.with_suffix(".truth.npz") if kept else None
     if kept and truth_path and truth_path.exists():
         return load_frame(kept), Truth.load(truth_path)
-    shot, = simulate(view.scene, KINECT_CALIBRATED, seed=view.seed)
+    shot, = simulate(view.scene, view.sensor, seed=view.seed)
     frame = _with_balls(shot.frame, view) if view.balls else shot.frame
     if kept and truth_path:
         save_frame(frame, kept)

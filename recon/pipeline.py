@@ -30,10 +30,12 @@ from denseface.recon.face import Face, FaceCandidate, PointCloud, Report
 from denseface.recon.finding import Found, find_another, find_face
 from denseface.recon.fitting import plan_fit, surface_of
 from denseface.recon.judgement import (
+    LEAST_COLOR_LIKENESS,
     LEAST_SCORE,
     SURE_SCORE,
     check_face,
     check_steps,
+    color_likeness,
     judge_shape,
 )
 from denseface.recon.noise import measure_noise
@@ -177,13 +179,19 @@ def _shape(settings: Settings, clock: "_Stopwatch", found: Found) -> Face:
     plan = plan_fit(settings, noise, spacing)
     surface = surface_of(seeds.points, spacing, settings, plan, sampler)
     clock.lap("rbf")
-    score, like, pose = judge_shape(surface)
+    judgement = judge_shape(surface)
+    score, like, placement = judgement
+    doubts = [coarse]
+    if placement is not None and found.colored and not like:
+        doubts.append(_doubt_colors(color_likeness(placement, seeds.points, seeds.colors)))
+        if doubts[-1] and score < SURE_SCORE:
+            like = "doubtful in its shape, and no darker where eyes, brows and mouth would be"
     clock.lap("judgement")
     if like:
         raise NoFaceError(f"no face found: what the box at {box} shows is {like} "
                           f"(score {score:.2f}, a face has {LEAST_SCORE} or more)")
     if settings.prior:  # after the judgement: what a model adds is like a face
-        surface = beyond_outline(surface, partial(_depths_at, frame), pose)
+        surface = beyond_outline(surface, partial(_depths_at, frame), judgement.pose)
     dense = densify(seeds, surface, spacing, settings.ratio, plan, sampler)
     left_open = openings(dense)
     clock.lap("propagation")
@@ -200,7 +208,7 @@ def _shape(settings: Settings, clock: "_Stopwatch", found: Found) -> Face:
         depth_unit_um=frame.depth_meaning.unit_um,
         depth_rounding=frame.depth_meaning.rounding, **_of_origin(frame.origin),
         version=_version(),
-        warnings=_warnings(found, len(initial), coarse, left_open, score),
+        warnings=_warnings(found, len(initial), doubts, left_open, score),
     )
     return Face(initial, dense, report)
 
@@ -222,6 +230,15 @@ def _check_seeds(points: Floats) -> None:
                                    "across: is the calibration right?")
 
 
+def _doubt_colors(likeness: float | None) -> str:
+    """Warn where eyes, brows and mouth are elsewhere in colour than in depth."""
+    if likeness is None or likeness >= LEAST_COLOR_LIKENESS:
+        return ""
+    return (f"eyes, brows and mouth are not seen where depth has them (likeness {likeness:.2f}, "
+            f"mostly {LEAST_COLOR_LIKENESS} or more): do depth and colour belong together, is an "
+            "image mirrored?")
+
+
 def _depths_at(frame: RgbdFrame, points: Floats) -> Floats:
     """Give what was read where points, (n, 3) mm, are seen: (n,) float32, mm; 0 where nothing."""
     columns, rows = np.rint(frame.depth_camera.project(points)).T
@@ -238,10 +255,10 @@ def _version() -> str:
 
 
 def _warnings(
-    found: Found, seeds: int, coarse: str, left_open: Openings, score: float
+    found: Found, seeds: int, doubts: list[str], left_open: Openings, score: float
 ) -> tuple[str, ...]:
     frame = found.frame
-    warnings = [*frame.origin.notes, *filter(None, [coarse])]
+    warnings = [*frame.origin.notes, *filter(None, doubts)]
     # Who read the frame from somewhere was told; who made it was not.
     in_one_image = frame.registered or not found.colored
     warnings += [doubt for doubt in doubts_of(frame.calibration, in_one_image)

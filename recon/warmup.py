@@ -10,7 +10,7 @@ from denseface.capture.frame import RgbdFrame
 from denseface.recon.detection import detect_by_depth, detect_face, judge_box
 from denseface.recon.errors import NoFaceError
 from denseface.recon.fitting import plan_fit, surface_of
-from denseface.recon.judgement import judge_shape
+from denseface.recon.judgement import color_likeness, judge_shape
 from denseface.recon.noise import measure_noise
 from denseface.recon.numerics.compilation.progress import compiling
 from denseface.recon.numerics.malloc import keep_freed_memory
@@ -58,7 +58,9 @@ def _run_every_stage() -> None:
     sampler = partial(sample_colors, frame, registered)
     plan = plan_fit(settings, measure_noise(seeds.points, seeds.pixels, spacing), spacing)
     surface = surface_of(seeds.points, spacing, settings, plan, sampler)
-    judge_shape(surface)
+    placement = judge_shape(surface).placement
+    if placement is not None:
+        color_likeness(placement, seeds.points, seeds.colors)
     densify(seeds, surface, spacing, settings.ratio, plan, sampler)
     heights, known = mean_face(_NEAREST_MM).heights((-90.0, -90.0), 4.0, (45, 45))
     fit_face(Heights(heights, known.astype(np.float32), (-90.0, -90.0), 4.0))

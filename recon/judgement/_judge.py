@@ -18,11 +18,11 @@ _STEP_MM = 4.0
 _FEWEST_POINTS = 80
 """Fewer show no relief; the least that `check_face` lets pass are three times as many."""
 
-_WEIGHTS = np.array((3.47, 2.61, 2.30, -4.29, -0.67, -1.15, -2.70))
-_BIAS = 1.25
+_WEIGHTS = np.array((3.21, 2.19, 2.50, -3.69, -0.64, -1.69, -4.59))
+_BIAS = 1.16
 """Of `Likeness.figures`, for the logarithm of the odds: a logistic regression, that of
-`bench/judgement.py`, on 311 faces of the choosing heads (the scenes of recall, hard ones, and 35
-turned by 45 to 66 degrees) and on 399 things that are none."""
+`python -m bench.judgement`, on 197 faces of the choosing heads (the scenes of recall, hard ones,
+such as are turned by 45 to 66 degrees, twelve sensors) and on 119 things that are none."""
 LEAST_SCORE = 0.5
 """What has less is no face."""
 SURE_SCORE = 0.9
@@ -36,18 +36,25 @@ _STRAIGHT = 0.25
 
 
 class Judgement(NamedTuple):
-    """How sure it is that a surface is a face's.
+    """What a surface is.
 
     Attributes
     ----------
-    score : 0-1, at least `LEAST_SCORE` for a face
-    like : what the surface is like, in words, empty for a face
-    pose : how the mean face lies on it best; None where it was not laid on
+    score : how sure it is that it is a face's, 0-1, at least `LEAST_SCORE` for a face
+    like : what it is like, in words; empty for a face
+    placement : (13,), of the mean face on it, by `_mould_kernels`; None where that was not laid on
     """
 
     score: float
     like: str
-    pose: HeadPose | None
+    placement: Doubles | None
+
+    @property
+    def pose(self) -> HeadPose | None:
+        """How the mean face lies on it; None where it was not laid on."""
+        if self.placement is None:
+            return None
+        return HeadPose(self.placement[:9].reshape(3, 3).copy(), self.placement[9:12].copy())
 
 
 def judge_shape(surface: SurfaceGrid) -> Judgement:
@@ -67,14 +74,14 @@ def judge_points(points: Doubles) -> Judgement:
     """Judge points of a surface, (n, 3) mm, `_STEP_MM` apart along x and y: see `judge_shape`."""
     if len(points) < _FEWEST_POINTS:
         return Judgement(0.0, "too small", None)
-    score, pose = 0.0, None
+    best, placement = 0.0, None
     for likeness in likenesses(points):
-        of_this = score_of(likeness)
-        if of_this > score:
-            score, pose = of_this, likeness.pose
-        if score >= SURE_SCORE:
+        score = score_of(likeness)
+        if placement is None or score > best:
+            best, placement = score, likeness.placement
+        if best >= SURE_SCORE:
             break
-    return Judgement(score, "" if score >= LEAST_SCORE else _what_it_is(points), pose)
+    return Judgement(best, "" if best >= LEAST_SCORE else _what_it_is(points), placement)
 
 
 def surface_points(surface: SurfaceGrid) -> Doubles:
@@ -86,7 +93,7 @@ def surface_points(surface: SurfaceGrid) -> Doubles:
 
 
 def score_of(likeness: Likeness) -> float:
-    """Give the probability that it is a face's, were faces and other things as common."""
+    """Give the probability that it is a face's, were six faces to four other things."""
     return 1 / (1 + math.exp(-float(_WEIGHTS @ likeness.figures + _BIAS)))
 
 

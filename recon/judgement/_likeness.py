@@ -9,7 +9,6 @@ import numpy as np
 from denseface.recon.arrays import Doubles
 from denseface.recon.judgement._placing import mean_face, placements
 from denseface.recon.judgement._relief_kernels import compare
-from denseface.recon.prior import HeadPose
 
 __all__ = ["FAR_MM", "Likeness", "likenesses"]
 
@@ -36,8 +35,7 @@ class Likeness(NamedTuple):
     gain : regression of its relief, from eyes to mouth, on the mean face's
     distance_mm : root mean square distance from the mean face
     roll_deg, tilt_deg : how far the head is tipped aside, and lifted or lowered
-    scale : the mean face's, as it was laid on
-    pose : the mean face's, too
+    placement : (13,), how it was laid on, by `_mould_kernels`
     """
 
     face: float
@@ -47,8 +45,7 @@ class Likeness(NamedTuple):
     distance_mm: float
     roll_deg: float
     tilt_deg: float
-    scale: float
-    pose: HeadPose
+    placement: Doubles
 
     @property
     def figures(self) -> Doubles:
@@ -68,5 +65,4 @@ def likenesses(points: Doubles) -> Iterator[Likeness]:
         yield Likeness(
             float(face[0]), float(middle[0]), float(nose[0]), float(middle[1]), float(distance),
             math.degrees(math.atan2(placement[3], placement[0])),
-            math.degrees(math.asin(min(max(placement[7], -1.0), 1.0))), float(placement[12]),
-            HeadPose(placement[:9].reshape(3, 3).copy(), placement[9:12].copy()))
+            math.degrees(math.asin(min(max(placement[7], -1.0), 1.0))), placement)

@@ -263,8 +263,9 @@ def test_a_calibration_in_metres_is_warned_of_whoever_made_the_frame(shot):
         update={"depth_to_color": metres}))
     doubt, = doubts_of(frame.calibration)
     assert "metres in place of millimetres?" in doubt
-    assert reconstruct(frame).report.warnings == (doubt,)
-    assert reconstruct(frame.with_note(doubt)).report.warnings == (doubt,)  # once is enough
+    # Beside that colours are another place's; once is enough.
+    assert reconstruct(frame).report.warnings.count(doubt) == 1
+    assert reconstruct(frame.with_note(doubt)).report.warnings.count(doubt) == 1
 
 
 def test_frames_far_apart_in_time_are_warned_of(shot):

@@ -74,7 +74,7 @@ def mean_face_seen(*turn, scale=1.0):
     (waves, "uneven")])
 def test_things_are_no_faces_and_are_named(thing, like):
     score, said, _ = judge_points(thing())
-    assert score < 0.2
+    assert score < 0.3
     assert said.startswith(like)
 
 
@@ -96,7 +96,7 @@ def test_a_face_is_laid_where_it_is():
     found = max(likenesses(points), key=lambda one: one.face)
     assert found.face > 0.95
     assert found.distance_mm < 2
-    assert found.scale == pytest.approx(0.9, abs=0.03)
+    assert found.placement[12] == pytest.approx(0.9, abs=0.03)
     assert found.roll_deg == pytest.approx(10, abs=4)
 
 
