@@ -12,9 +12,11 @@ j, mm : that jitter, told by how much more the seeds are off where it is steep
 e, 0-1 : how near the rim, where seeds lie on one side alone; 1 on it
 
 and never less than what the levels of depth leave, `recon.noise.Noise.level_error_mm`. Were the
-model of face and noise the whole truth, B, W and M would be 1. The coefficients are fitted by
-maximum likelihood to simulated frames of many kinds of sensor with known truth (`python -m
-bench.adaptation --fit`, on the heads that settings are chosen on; docs/decisions/0007-sigma.md).
+model of face and noise the whole truth, B, W and M would be 1. The coefficients are those of
+twelve kinds of simulated sensor together, on the heads that settings are chosen on, that hold
+nearest to 68 % within one sigma and 95 % within two: everywhere, in holes and at the rim
+(docs/decisions/0053-an-engine-for-any-sensor.md; by maximum likelihood alone: `python -m
+bench.calibration --fit`).
 """
 
 from typing import NamedTuple
