@@ -146,10 +146,10 @@ def _boxes(layer: Layer, look: _Look, camera: CameraModel) -> list[Box]:
     wider = _WIDER if look.cascade_pass.cascade == _PASS.cascade else _PROFILE_WIDER
     height, width = view.grey.shape
     boxes = []
-    for x, y, w, h in run_pass(view.grey, (0, 0, width, height), look.cascade_pass,
-                               _TYPICAL_WIDTH_MM / PIXEL_MM,
-                               (wider * small / PIXEL_MM, wider * large / PIXEL_MM),
-                               CenterMask(view.centers, 1.0)):
+    for (x, y, w, h), _ in run_pass(view.grey, (0, 0, width, height), look.cascade_pass,
+                                   _TYPICAL_WIDTH_MM / PIXEL_MM,
+                                   (wider * small / PIXEL_MM, wider * large / PIXEL_MM),
+                                   CenterMask(view.centers, 1.0)):
         place = layer.place(view, x + w / 2, y + h / 2)
         if place is not None:
             u, v, depth = place

@@ -42,10 +42,20 @@ class CenterMask(NamedTuple):
     """The upper left cell's corner, pixels from the image's corner."""
 
 
+class Seen(NamedTuple):
+    """One box that a pass found."""
+
+    box: Box
+    """Pixels of the image, upright whatever the roll: a rolled face's box is turned about its own
+    centre."""
+    windows: int
+    """How many windows that passed it stands for."""
+
+
 def run_pass(
     gray: Bytes, roi: Box, cascade_pass: CascadePass, typical_px: float,
     size_limits: tuple[float, float], centers: CenterMask,
-) -> list[Box]:
+) -> list[Seen]:
     """Find faces in a part of an image.
 
     Parameters
@@ -55,11 +65,6 @@ def run_pass(
     typical_px : width of a typical face in it, pixels of the image
     size_limits : widths of the smallest and the largest box, pixels of the image
     centers : where in the image a box's centre may be
-
-    Returns
-    -------
-    Boxes in pixels of the image, upright whatever the roll: a rolled face's box is turned
-    about its own centre.
     """
     x, y, width, height = roi
     shrink = min(1.0, cascade_pass.face_px / typical_px)
@@ -82,13 +87,14 @@ def run_pass(
     boxes = passing_boxes(small, load_cascade(cascade_pass.cascade),
                           (size_limits[0] * shrink, size_limits[1] * shrink),
                           cascade_pass.scale_step, centers.allowed, to_cells / centers.cell_px)
-    grouped, _ = cv2.groupRectangles(boxes, cascade_pass.min_neighbors, _GROUP_EPS)
+    grouped, counts = cv2.groupRectangles(boxes, cascade_pass.min_neighbors, _GROUP_EPS)
     found = []
-    for left, top, w, h in grouped:
+    for (left, top, w, h), windows in zip(grouped, np.ravel(counts), strict=True):
         u, v = to_image @ (left + (w - 1) / 2, top + (h - 1) / 2, 1)
         box_width, box_height = w / scale_x, h / scale_y
-        found.append((round(u - (box_width - 1) / 2), round(v - (box_height - 1) / 2),
-                      round(box_width), round(box_height)))
+        box = (round(u - (box_width - 1) / 2), round(v - (box_height - 1) / 2),
+               round(box_width), round(box_height))
+        found.append(Seen(box, int(windows)))
     return found
 
 

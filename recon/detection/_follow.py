@@ -11,8 +11,9 @@ import numpy as np
 
 from denseface.recon.arrays import Bytes
 from denseface.recon.detection._cascades import CenterMask, run_pass
-from denseface.recon.detection._detect import FINE, PROFILES, STRAIGHT, TIPPED, Search
+from denseface.recon.detection._detect import Search
 from denseface.recon.detection._head_regions import head_regions
+from denseface.recon.detection._passes import FINE, PROFILES, STRAIGHT, TIPPED
 from denseface.recon.detection._regions import CELLS, Region
 from denseface.recon.face import FaceCandidate
 from denseface.recon.intermediate import Registration
@@ -109,7 +110,7 @@ def turned_by(color: Bytes, registered: Registration, focal_px: float) -> int | 
     search = Search(color, registered, focal_px)
     near = [region for region in search.regions if region.near_mm < _TURNED_MM]
     for degrees in (90, 180, 270):
-        if search.nearest_face(_COARSE._replace(roll=-float(degrees)), near):
+        if search.nearest_face((_COARSE._replace(roll=-float(degrees)),), near, search.as_taken):
             return degrees
     return None
 

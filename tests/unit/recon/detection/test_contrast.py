@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from denseface.recon.detection._contrast import equalize_contrast
+from denseface.recon.detection._contrast import equalize_contrast, lift_shadows
 
 ROI = (60, 40, 200, 180)
 IN_ROI = np.s_[40:220, 60:260]
@@ -52,3 +52,8 @@ def test_one_shade_is_spread_to_no_noise(shade):
 def test_a_part_smaller_than_a_tile_is_equalized(dark_before_bright):
     after = equalize_contrast(dark_before_bright, (100, 80, 30, 25), NOTHING)
     assert after.shape == dark_before_bright.shape
+
+
+def test_shadows_are_lifted_by_the_square_root():
+    levels = np.array([[0, 1, 16, 64, 255]], np.uint8)
+    np.testing.assert_array_equal(lift_shadows(levels), [[0, 16, 64, 128, 255]])

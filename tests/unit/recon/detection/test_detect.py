@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from denseface.capture.calibration import DepthToColor
-from denseface.recon.detection import FACE_WIDTH_MM, detect_face
+from denseface.recon.detection import FACE_WIDTH_MM, _detect, detect_face
+from denseface.recon.detection._cascades import Seen
+from denseface.recon.detection._passes import PROFILES
 from denseface.recon.errors import FaceWithoutDepthError, NoDepthError, NoFaceError
 from denseface.recon.registration import register
 from tests.simulator import Light, Person, Scene, simulate
@@ -226,3 +228,23 @@ def test_a_face_against_the_light_is_found_by_the_contrast_at_its_own_depth():
     shot, = simulate(Scene((Person(roll=-18),), wall_mm=1500, wall_color=(255, 255, 250),
                            light=against), seed=1)
     assert center_off(detected(shot.frame), shot) < 0.2
+
+
+def test_a_face_tipped_far_and_lit_from_the_side_is_found_with_the_shadows_lifted(monkeypatch):
+    beside = Light((-1.0, -0.1, -0.1), 0.75, 0.08)
+    shot, = simulate(Scene((Person(roll=38, distance_mm=700, skin_gain=(0.5,) * 3),),
+                           light=beside), seed=3)
+    assert center_off(detected(shot.frame), shot) < 0.2
+    monkeypatch.setattr(_detect, "LIFTED_RUNGS", ())
+    with pytest.raises(NoFaceError):
+        detected(shot.frame)
+
+
+@pytest.mark.parametrize("more", PROFILES)
+def test_of_two_profiles_that_run_together_the_one_of_most_windows_wins(shot, monkeypatch, more):
+    x, y, w, h = detected(shot.frame).box
+    boxes = {one: (x + shift, y, w, h) for one, shift in zip(PROFILES, (-9, 9), strict=True)}
+    monkeypatch.setattr(_detect, "run_pass", lambda _gray, _roi, one, *_:
+                        [Seen(boxes[one], 8 if one == more else 3)])
+    search = _detect.Search(shot.frame.rgb, register(shot.frame), shot.frame.calibration.color.fx)
+    assert search.nearest_face(PROFILES, search.regions, search.as_taken).cascade_pass == more

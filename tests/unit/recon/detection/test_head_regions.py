@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from denseface.recon.detection._head_regions import depth_cells, head_regions
+from denseface.recon.detection._head_regions import depth_cells, head_regions, largest
 from denseface.recon.detection._regions import CELLS
 from denseface.recon.registration import register
 from tests.unit.frames import calibration, camera, frame
@@ -117,3 +117,10 @@ def test_a_head_beside_another_is_found(wall):
     with_head(wall, 250, 240, 800)
     with_head(wall, 390, 240, 830)
     assert [round(r.near_mm, -1) for r in regions(wall)] == [800, 830]
+
+
+def test_the_largest_places_are_kept_in_their_order_whatever_their_distance(two):
+    near, far = regions(two)
+    less = near._replace(centers=near.centers & (np.arange(CELLS) % 2 == 0))
+    assert largest([less, near], 1) == [near]
+    assert largest([near, far], 2) == [near, far]
