@@ -12,7 +12,7 @@ def test_hair_leaves_hardly_a_tongue_or_island_and_no_pin_holes():
     assert len(hair) > 20_000
     face = reconstruct(shot.frame)
     faults = outline_faults(face.dense)
-    # What a model adds past the outline (0056) leaves slivers; without either step 9 tongues.
+    # What a model adds past the outline (0056) leaves slivers.
     assert faults.tongues <= 3
     assert faults.tongues_mm2 < 30
     assert faults.islands <= 1
