@@ -150,7 +150,7 @@ def test_a_face_without_a_row_gets_its_row(data):
 
 def test_a_damaged_frame_without_a_row_is_a_dead_letter(data):
     _forget(data, "waits")
-    _flip(data / "frames" / "waits.frame")
+    _flip(data / "frames" / "waits.frame", 60)  # in the lengths of its parts
     with FolderStore(data, FakeClock()) as store:
         assert store.find("waits").state is CaptureState.DEAD
         assert "checksum" in store.outcome("waits").message.message
