@@ -4,6 +4,7 @@ They do nothing unless the environment asks for it.
 `DENSEFACE_FAILPOINTS` is a comma-separated list of `NAME=ACTION`, or `NAME=ACTION@N` for the N-th
 pass alone. `DENSEFACE_FAILPOINTS_TOKENS` may name a folder: then a failpoint acts only where a file
 of its name is there, which it removes first: it acts once, even if the process is started again.
+Each byte in the file is for one time more.
 """
 
 import errno
@@ -92,6 +93,15 @@ def arm(environment: Mapping[str, str]) -> None:
         "failpoints are set: this process is to fail", failpoints=text)
 
 
+def _use_up(token: Path) -> None:
+    """Take one of a token's times; FileNotFoundError where there is none."""
+    more = token.stat().st_size
+    if more:
+        os.truncate(token, more - 1)
+    else:
+        token.unlink()
+
+
 def failpoint(name: str) -> None:
     """Do nothing, unless `arm` set this failpoint; OSError where its action is to raise."""
     armed = _armed.get(name)
@@ -103,7 +113,7 @@ def failpoint(name: str) -> None:
             return
         try:
             if armed.token:
-                armed.token.unlink()
+                _use_up(armed.token)
         except FileNotFoundError:
             return
     match armed.action.split(":"):

@@ -57,6 +57,9 @@ def test_with_tokens_each_token_is_good_for_one_failure(tmp_path):
     (tmp_path / "hub.frame.synced").touch()
     assert [outcome("hub.frame.synced") for _ in range(2)] == ["ENOSPC", None]
     assert list(tmp_path.iterdir()) == []
+    (tmp_path / "hub.frame.synced").write_bytes(b".")  # for one time more
+    assert [outcome("hub.frame.synced") for _ in range(3)] == ["ENOSPC", "ENOSPC", None]
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(("text", "named"), [
