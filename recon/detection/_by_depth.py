@@ -13,23 +13,28 @@ from denseface.recon.arrays import Floats
 from denseface.recon.detection._cascades import CascadePass, CenterMask, run_pass
 from denseface.recon.detection._detect import (
     FACE_WIDTH_MM,
+    TYPICAL_WIDTH_MM,
     Detection,
     detection_of,
     judge_new,
     why_none,
 )
-from denseface.recon.detection._kernels import nearest_in_cells
-from denseface.recon.detection._regions import CELLS, Region, regions_by_depth, without_flat
+from denseface.recon.detection._passes import FRONTAL, PROFILE
+from denseface.recon.detection._regions import (
+    CELLS,
+    Region,
+    nearest_by_cell,
+    regions_by_depth,
+    without_flat,
+)
 from denseface.recon.detection._views import PIXEL_MM, Layer, turned
 from denseface.recon.face import Box, FaceCandidate
 from denseface.recon.intermediate import NO_DEPTH_MM, Registration
 
-_TYPICAL_WIDTH_MM = 160.0
-"""Width of an adult's box."""
-_PASS = CascadePass("haarcascade_frontalface_alt2", _TYPICAL_WIDTH_MM / PIXEL_MM, min_neighbors=2)
+_PASS = CascadePass(FRONTAL, TYPICAL_WIDTH_MM / PIXEL_MM, min_neighbors=2)
 """One scale for all distances. Fewer boxes than in colour must agree: nothing in these pictures is
 painted."""
-_PROFILE = CascadePass("haarcascade_profileface", _TYPICAL_WIDTH_MM / PIXEL_MM, 1.05, 2)
+_PROFILE = CascadePass(PROFILE, TYPICAL_WIDTH_MM / PIXEL_MM, 1.05, 2)
 _WIDER, _PROFILE_WIDER = 1.075, 1.17
 """A box by the one around the same head in colour: 175 mm in the mean instead of 163, of a profile
 1.09 as much again."""
@@ -57,6 +62,7 @@ _PIECE_MM = 70.0
 """Side of the square that a connected piece of such places covers at least; the least of 93 faces
 is 118. Both tests leave 20 % of the places that bulge where there is a face, and 5-15 % of those in
 rooms and on tables."""
+
 
 class _Hit(NamedTuple):
     face: FaceCandidate
@@ -87,9 +93,9 @@ def detect_by_depth(
     """
     camera = frame.depth_camera
     shape = camera.height, camera.width
-    regions = _without_small(without_flat(
-        _standing_free(regions_by_depth(registered, shape, camera.fx), registered, camera),
-        registered, shape, camera.fx), camera)
+    nearest = nearest_by_cell(registered, shape)
+    free = _standing_free(regions_by_depth(registered, shape, camera.fx), nearest, camera)
+    regions = _without_small(without_flat(free, nearest, shape, camera.fx), camera)
     search = _Search(_depth_mm(frame), camera, regions, partial(
         judge_new, registered=registered, focal_px=camera.fx, rejected=rejected))
     hit: _Hit | None = None
@@ -142,12 +148,11 @@ def _boxes(layer: Layer, look: _Look, camera: CameraModel) -> list[Box]:
     if view is None:
         return []
     small, large = FACE_WIDTH_MM
-    height, width = view.grey.shape
-    wider = _WIDER if look.cascade_pass.cascade == _PASS.cascade else _PROFILE_WIDER
+    wider = _WIDER if look.cascade_pass.cascade == FRONTAL else _PROFILE_WIDER
     height, width = view.grey.shape
     boxes = []
     for (x, y, w, h), _ in run_pass(view.grey, (0, 0, width, height), look.cascade_pass,
-                                   _TYPICAL_WIDTH_MM / PIXEL_MM,
+                                   TYPICAL_WIDTH_MM / PIXEL_MM,
                                    (wider * small / PIXEL_MM, wider * large / PIXEL_MM),
                                    CenterMask(view.centers, 1.0)):
         place = layer.place(view, x + w / 2, y + h / 2)
@@ -159,14 +164,9 @@ def _boxes(layer: Layer, look: _Look, camera: CameraModel) -> list[Box]:
 
 
 def _standing_free(
-    regions: list[Region], registered: Registration, camera: CameraModel
+    regions: list[Region], nearest: Floats, camera: CameraModel
 ) -> list[Region]:
     """Keep only centres beside and above which nothing is as near."""
-    if not regions:
-        return []
-    cell = camera.width / CELLS
-    nearest = np.full(regions[0].centers.shape, NO_DEPTH_MM)
-    nearest_in_cells(registered.pixels, registered.color_depth, registered.visible, cell, nearest)
     rows, columns = len(nearest), CELLS
     remaining = []
     for region in regions:

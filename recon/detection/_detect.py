@@ -31,7 +31,7 @@ from denseface.recon.numerics.percentile import percentile
 
 FACE_WIDTH_MM = (110.0, 210.0)
 """How wide a cascade's box around a face is, child to large adult, hair included."""
-_TYPICAL_WIDTH_MM = 160.0
+TYPICAL_WIDTH_MM = 160.0
 """Width of an adult's box; passes choose their resolution by it."""
 _MIN_BULGE_MM = 7.5
 """What bulges less, from the centre of its box to the sides, is flat. Of 120 simulated faces the
@@ -220,7 +220,7 @@ class Search:
     ) -> list[tuple[FaceCandidate, int]]:
         """Give each face that a pass sees in a version of the image, and its windows."""
         small, large = FACE_WIDTH_MM
-        typical = self.focal_px * _TYPICAL_WIDTH_MM / np.sqrt(region.near_mm * region.far_mm)
+        typical = self.focal_px * TYPICAL_WIDTH_MM / np.sqrt(region.near_mm * region.far_mm)
         sizes = (self.focal_px * small / region.far_mm, self.focal_px * large / region.near_mm)
         centers = CenterMask(region.centers, self.gray.shape[1] / CELLS)
         found = self._run(gray, region.roi, cascade_pass, typical, sizes, centers)

@@ -7,13 +7,18 @@ import numpy as np
 
 from denseface.recon.arrays import Bools, Floats
 from denseface.recon.detection._heads import head_like
-from denseface.recon.detection._kernels import nearest_in_cells
-from denseface.recon.detection._regions import CELLS, Region, padded
-from denseface.recon.errors import NoDepthError
+from denseface.recon.detection._regions import (
+    CELLS,
+    FARTHEST_MM,
+    HALF_NARROWEST_MM,
+    HALF_WIDEST_MM,
+    NEAREST_MM,
+    Region,
+    nearest_by_cell,
+    padded,
+)
 from denseface.recon.intermediate import NO_DEPTH_MM, Registration
 
-_NEAREST_MM, _FARTHEST_MM = 300.0, 2000.0
-"""Range that is searched. A farther face has under 2,000 depth pixels and noise of over 5 mm."""
 _MIN_RADIUS_MM = 35.0
 """Head-like places that hang together are at least as large as a circle of that radius."""
 _AROUND_MM = 20.0
@@ -22,8 +27,6 @@ _DEEPER_MM = 50.0
 """How far a face's middle may lie behind the nearest reading of its cell."""
 _MOST_CELLS = 1e6
 """Cells to a millimetre at a distance of 1 mm; a Kinect has 72."""
-_HALF_NARROWEST_MM, _HALF_WIDEST_MM = 55.0, 105.0
-"""Half of the narrowest and of the widest face."""
 
 
 class DepthCells(NamedTuple):
@@ -58,24 +61,20 @@ def depth_cells(
     NoDepthError
         Where nothing measured lies before the colour camera.
     """
-    if not (registered.color_depth > 0).any():
-        raise NoDepthError("no depth lies before the colour camera: is the calibration right?")
-    cell = shape[1] / CELLS
-    nearest = np.full((int(np.ceil(shape[0] / cell)), CELLS), NO_DEPTH_MM)
-    nearest_in_cells(registered.pixels, registered.color_depth, registered.visible, cell, nearest)
+    nearest = nearest_by_cell(registered, shape)
     # A cell that no reading fell into is as its neighbours.
     around = cv2.erode(nearest, np.ones((3, 3), np.uint8))
     return DepthCells(np.where(nearest == NO_DEPTH_MM, around, nearest), shape, focal_px)
 
 
-def head_regions(cells: DepthCells, nearer_than_mm: float = _FARTHEST_MM) -> list[Region]:
+def head_regions(cells: DepthCells, nearer_than_mm: float = FARTHEST_MM) -> list[Region]:
     """Give each place that depth allows for a head, the nearest first, up to a depth."""
     nearest, shape, focal_px = cells
     cell = cells.cell_px
-    farthest = min(nearer_than_mm, _FARTHEST_MM)
+    farthest = min(nearer_than_mm, FARTHEST_MM)
     # An absurd calibration leads out of any image, too, but in numbers.
     cells_at_1_mm = min(focal_px / cell, _MOST_CELLS)
-    likely = head_like(nearest, cells_at_1_mm, _NEAREST_MM, farthest)
+    likely = head_like(nearest, cells_at_1_mm, NEAREST_MM, farthest)
     _clear_border(likely, nearest, cells_at_1_mm)
     count, labels, pieces, _ = cv2.connectedComponentsWithStats(
         likely.view(np.uint8), connectivity=8)
@@ -89,7 +88,7 @@ def head_regions(cells: DepthCells, nearer_than_mm: float = _FARTHEST_MM) -> lis
             continue
         grown = 2 * round(_AROUND_MM * cells_to_mm) + 1
         centers = cv2.dilate(middles.view(np.uint8), np.ones((grown, grown), np.uint8))
-        margin = int(np.ceil(_HALF_WIDEST_MM * focal_px / near / cell))
+        margin = int(np.ceil(HALF_WIDEST_MM * focal_px / near / cell))
         roi = padded(cv2.boundingRect(centers), margin, cell, shape)
         regions.append(Region(roi, near, far + _DEEPER_MM, centers.view(np.bool_)))
     return sorted(regions, key=lambda region: region.near_mm)
@@ -104,7 +103,7 @@ def largest(regions: list[Region], count: int) -> list[Region]:
 
 def _clear_border(likely: Bools, nearest: Floats, cells_at_1_mm: float) -> None:
     """Clear where the narrowest face would not be whole within the image."""
-    half = _HALF_NARROWEST_MM * cells_at_1_mm / nearest
+    half = HALF_NARROWEST_MM * cells_at_1_mm / nearest
     rows, columns = np.ogrid[:likely.shape[0], :likely.shape[1]]
     likely &= ((rows + 0.5 >= half) & (likely.shape[0] - rows - 0.5 >= half)
                & (columns + 0.5 >= half) & (likely.shape[1] - columns - 0.5 >= half))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from denseface.recon.arrays import Bools
+from denseface.recon.arrays import Bools, Floats
 from denseface.recon.detection._kernels import fill_layers, nearest_in_cells
 from denseface.recon.detection._relief import bulging_cells
 from denseface.recon.errors import NoDepthError
@@ -15,10 +15,10 @@ from denseface.recon.intermediate import NO_DEPTH_MM, Registration
 
 CELLS = 80
 """Cells across the colour image, in which depth is judged."""
-_NEAREST_MM, _FARTHEST_MM = 300.0, 2000.0
+NEAREST_MM, FARTHEST_MM = 300.0, 2000.0
 """Range that is searched. A farther face has under 2,000 depth pixels and noise of over 5 mm."""
 _LAYERS = 7
-_EDGES = np.geomspace(_NEAREST_MM, _FARTHEST_MM, _LAYERS + 1)
+_EDGES = np.geomspace(NEAREST_MM, FARTHEST_MM, _LAYERS + 1)
 """Where layers of depth begin and end, mm."""
 _MIN_SIDE_MM = 90.0
 """A connected piece of a layer that is narrower or lower cannot hold a face."""
@@ -32,7 +32,7 @@ _MIN_BULGE_MM = 4.0
 """What bulges less is flat: the least of a face's own box, less what a cell's shift makes of it."""
 _HALF_BOX_MM = 80.0
 """From a cell to the sides of the box in which a bulge is fitted."""
-_HALF_NARROWEST_MM, _HALF_WIDEST_MM = 55.0, 105.0
+HALF_NARROWEST_MM, HALF_WIDEST_MM = 55.0, 105.0
 """Half of the narrowest and of the widest face."""
 
 
@@ -48,7 +48,7 @@ class Region(NamedTuple):
 
 def regions_by_depth(
     registered: Registration, shape: tuple[int, int], focal_px: float,
-    nearer_than_mm: float = _FARTHEST_MM,
+    nearer_than_mm: float = FARTHEST_MM,
 ) -> list[Region]:
     """Cut the scene into layers of depth, and each layer into connected pieces of the image.
 
@@ -64,9 +64,8 @@ def regions_by_depth(
     NoDepthError
         Where nothing measured lies before the colour camera.
     """
-    if not (registered.color_depth > 0).any():
-        raise NoDepthError("no depth lies before the colour camera: is the calibration right?")
-    edges = np.append(_EDGES[nearer_than_mm > _EDGES], min(nearer_than_mm, _FARTHEST_MM))
+    _check_measured(registered)
+    edges = np.append(_EDGES[nearer_than_mm > _EDGES], min(nearer_than_mm, FARTHEST_MM))
     cell = shape[1] / CELLS
     filled = np.zeros((len(edges) - 1, int(np.ceil(shape[0] / cell)), CELLS), np.uint8)
     fill_layers(registered.pixels, registered.color_depth, registered.visible, edges, cell, filled)
@@ -88,30 +87,47 @@ def regions_by_depth(
     return regions
 
 
+def nearest_by_cell(registered: Registration, shape: tuple[int, int]) -> Floats:
+    """Give the nearest depth in each cell of the colour image, (rows, CELLS) float32, mm.
+
+    `NO_DEPTH_MM` where there is none. Parameters and errors are those of `regions_by_depth`.
+    """
+    _check_measured(registered)
+    cell = shape[1] / CELLS
+    nearest = np.full((int(np.ceil(shape[0] / cell)), CELLS), NO_DEPTH_MM)
+    nearest_in_cells(registered.pixels, registered.color_depth, registered.visible, cell, nearest)
+    return nearest
+
+
+def _check_measured(registered: Registration) -> None:
+    if not (registered.color_depth > 0).any():
+        raise NoDepthError("no depth lies before the colour camera: is the calibration right?")
+
+
 def without_flat(
-    regions: list[Region], registered: Registration, shape: tuple[int, int], focal_px: float
+    regions: list[Region], nearest: Floats, shape: tuple[int, int], focal_px: float
 ) -> list[Region]:
     """Keep only centres about which depth bulges, in regions as small as those allow.
 
-    Parameters are those of `regions_by_depth`.
+    Parameters
+    ----------
+    regions : of `regions_by_depth`
+    nearest : (rows, CELLS), of `nearest_by_cell`
+    shape, focal_px : as of `regions_by_depth`
     """
-    if not regions:
-        return []
     cell = shape[1] / CELLS
-    nearest = np.full(regions[0].centers.shape, NO_DEPTH_MM)
-    nearest_in_cells(registered.pixels, registered.color_depth, registered.visible, cell, nearest)
     remaining = []
     for region in regions:
         x, y, w, h = (round(side / cell) for side in region.roi)
         # Nearer to the image's border, the narrowest face is not whole.
-        border = int(_HALF_NARROWEST_MM * focal_px / region.far_mm / cell)
+        border = int(HALF_NARROWEST_MM * focal_px / region.far_mm / cell)
         inside = np.s_[max(y, border):min(y + h, len(nearest) - border),
                        max(x, border):min(x + w, CELLS - border)]
         allowed = np.zeros_like(region.centers)
         allowed[inside] = region.centers[inside]
         bulging = bulging_cells(nearest, allowed, _HALF_BOX_MM * focal_px / cell, _MIN_BULGE_MM)
         if bulging.any():
-            margin = round(_HALF_WIDEST_MM * focal_px / region.near_mm / cell)
+            margin = round(HALF_WIDEST_MM * focal_px / region.near_mm / cell)
             left, top, width, height = cv2.boundingRect(bulging.view(np.uint8))
             roi = padded((left, top, width, height), margin, cell, shape)
             remaining.append(region._replace(roi=roi, centers=bulging))

@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from denseface.recon.detection._regions import CELLS, regions_by_depth, without_flat
+from denseface.recon.detection._regions import (
+    CELLS,
+    nearest_by_cell,
+    regions_by_depth,
+    without_flat,
+)
 from denseface.recon.registration import register
 from tests.unit.frames import calibration, camera, frame
 
@@ -25,7 +30,8 @@ def regions(depth, every=1, **limit):
 
 def bulging(depth, every=4):
     one = registration(depth, every)
-    return without_flat(regions_by_depth(one, SIZE, FOCAL_PX), one, SIZE, FOCAL_PX)
+    return without_flat(
+        regions_by_depth(one, SIZE, FOCAL_PX), nearest_by_cell(one, SIZE), SIZE, FOCAL_PX)
 
 
 def with_ball(depth, column, row, distance, radius_mm=80):
@@ -140,4 +146,5 @@ def test_a_ball_where_little_is_measured_is_not_left_out():
 
 
 def test_nothing_is_left_of_nothing():
-    assert without_flat([], registration(np.full(SIZE, 900.0)), SIZE, FOCAL_PX) == []
+    assert without_flat(
+        [], nearest_by_cell(registration(np.full(SIZE, 900.0)), SIZE), SIZE, FOCAL_PX) == []
