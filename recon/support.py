@@ -98,8 +98,9 @@ class Support:
         wide = np.pad(above, radius)
         # Closed, then opened.
         broad = dilated(eroded(dilated(wide, radius), 2 * radius), radius)
-        whole = binary_fill_holes(broad)[radius:, radius:]
-        return replace(self, margin=_reshaped(self.margin, whole, self.level))
+        rows, columns = above.shape
+        whole = binary_fill_holes(broad)[radius:radius + rows, radius:radius + columns]
+        return self.including(whole > above).without(above > whole)
 
     def without_holes(self) -> Self:
         """Give the support with what it encloses."""
@@ -207,20 +208,4 @@ def _without(margin: Floats, removed: Bools, level: float) -> Floats:
         value = flat[i]
         less = min(middle - abs(value - middle), np.float32(0))
         given[i] = less if mask[i] else value
-    return out
-
-
-@compiled
-def _reshaped(margin: Floats, whole: Bytes, level: float) -> Floats:
-    """Give a support's margin above its level where `whole` is not 0, and nowhere else."""
-    out = margin.copy()
-    middle = np.float32(level)
-    for row in range(margin.shape[0]):
-        for column in range(margin.shape[1]):
-            value = margin[row, column]
-            if whole[row, column] and value <= middle:
-                # Twice the level: what lies between two points that are above it is so, too.
-                out[row, column] = 2 * middle
-            elif value > middle and not whole[row, column]:
-                out[row, column] = min(2 * middle - value, np.float32(0))
     return out
