@@ -6,17 +6,16 @@ fit that a search over all frames of that sensor finds, and how often `sigma` ho
 """
 
 import argparse
-import math
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from bench.calibration_samples import near_rim
 from bench.cases import HOLE_SPACINGS
 from bench.heads import CHOOSING, REPORTING, at_hand
 from bench.machine import describe
@@ -26,7 +25,7 @@ from denseface.recon.face import DenseCloud, Seeds
 from denseface.recon.finding import find_face
 from denseface.recon.fitting import plan_fit, surface_of
 from denseface.recon.intermediate import ColorSampler
-from denseface.recon.noise import Noise, measure_noise
+from denseface.recon.noise import SHARPNESS, Noise, fit_of_cutoff, measure_noise
 from denseface.recon.propagation import densify
 from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import box_window, segment_face
@@ -34,30 +33,29 @@ from denseface.recon.surface import mean_spacing
 from tests.simulator import Label, Truth, simulate
 from tests.simulator.sensors import SENSORS
 
-__all__ = ["FIXED", "PLAIN", "Prepared", "Row", "compare", "prepared"]
+__all__ = ["CUTOFFS", "FIXED", "PLAIN", "Prepared", "Row", "compare", "prepared", "with_cutoff"]
 
 _POINTS = 4000
 """Points drawn from a frame."""
 _MOST_MM = 20.0
 """An error counts as no more than this."""
-_RIM_SPACINGS = 3.0
-"""Points nearer to the outline are the rim, mean spacings."""
 
 Floats = NDArray[np.float64]
 
 
-def _fit(cutoff: float, sharpness: float) -> dict[str, float]:
-    """Give R0 and lambda of a fit that passes waves longer than `cutoff` spacings."""
-    r0 = sharpness * cutoff
-    return {"r0_factor": r0,
-            "smoothing": math.pi * r0 * r0 * math.exp(-(math.pi * sharpness) ** 2)}
+CUTOFFS = (8.0, 9.5, 11.0, 13.0, 15.0, 18.0, 22.0, 26.0, 31.0)
+"""Waves longer than this pass a fit, mean spacings."""
 
 
-FIXED = tuple(
-    Settings.of("best", **fit, detail_factor=detail)  # type: ignore[misc]
-    for cutoff in (8.0, 9.5, 11.0, 13.0, 15.0, 18.0, 22.0, 26.0, 31.0)
-    for fit in (_fit(cutoff, 0.66), _fit(cutoff, 0.8)) if fit["smoothing"] >= 0.05
-    for detail in (0.8, 1.0, 1.5))
+def with_cutoff(cutoff: float, sharpness: float, detail_factor: float = 1.0) -> Settings:
+    """Give `best` with a fixed fit: parameters are those of `fit_of_cutoff`."""
+    r0_factor, smoothing = fit_of_cutoff(cutoff, sharpness)
+    return Settings.of("best", r0_factor=r0_factor, smoothing=smoothing,
+                       detail_factor=detail_factor)
+
+
+FIXED = tuple(with_cutoff(cutoff, sharpness, detail)
+              for cutoff in CUTOFFS for sharpness in SHARPNESS for detail in (0.8, 1.0, 1.5))
 """What `best` could be set to."""
 PLAIN = tuple(Settings.of("faithful", r0_factor=r0, smoothing=smoothing)
               for r0 in (5.0, 6.0, 8.0, 10.0, 12.0, 14.0) for smoothing in (0.1, 0.3, 1.0, 3.0))
@@ -153,14 +151,10 @@ def _errors_in_sigma(one: Prepared, dense: DenseCloud) -> tuple[Floats, Floats, 
     drawn = np.random.default_rng(1).permutation(len(dense))[:_POINTS]
     points = dense.points[drawn]
     away, _ = cKDTree(one.seeds.points[:, :2]).query(points[:, :2])
-    shown = np.zeros((dense.grid_shape[0] + 2, dense.grid_shape[1] + 2), np.uint8)
-    row, column = dense.cells[:, 0] + 1, dense.cells[:, 1] + 1
-    shown[row, column] = 1
-    inside = cv2.distanceTransform(shown, cv2.DIST_L2, 5)[row, column] * dense.grid_step_mm
     errors = np.abs(one.truth.depth_error(points)) / dense.sigma[drawn]
     known = np.isfinite(errors)
     return (errors[known], errors[known & (away > HOLE_SPACINGS * one.spacing)],
-            errors[known & (inside[drawn] < _RIM_SPACINGS * one.spacing)])
+            errors[known & near_rim(dense, one.spacing)[drawn]])
 
 
 def _of(settings: Settings) -> str:

@@ -12,19 +12,20 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from bench.cases import Case, with_preset
+from bench.heads import at_hand
 from denseface.capture import RgbdFrame
 from denseface.recon import Preset, ReconstructionError, reconstruct
-from denseface.recon.face import Face
+from denseface.recon.face import DenseCloud
 from denseface.recon.noise import Risk
 from denseface.recon.propagation.uncertainty import (
     VarianceComponents,
     standard_error,
     variance_components,
 )
-from tests.simulator import Person, Scene, Truth, head_names, simulate
+from tests.simulator import Person, Scene, Truth, simulate
 from tests.simulator.sensors import SENSORS
 
-__all__ = ["Samples", "frames", "sample"]
+__all__ = ["Samples", "frames", "near_rim", "sample"]
 
 
 _DISTANCES_MM = (600.0, 1100.0)
@@ -78,7 +79,7 @@ def frames(heads: tuple[str, ...], count: int, seed: int) -> Iterator[tuple[Rgbd
 
     The procedural head stands in for those that are not at hand.
     """
-    known = [name for name in heads if name in head_names()] or ["procedural"]
+    known = at_hand(heads)
     for index in range(count):
         rng = np.random.default_rng([seed, index])
         distance, yaw = rng.uniform(*_DISTANCES_MM), rng.uniform(-_YAW, _YAW)
@@ -131,7 +132,7 @@ def sample(frame: RgbdFrame, truth: Truth, preset: Preset, *, distance: bool) ->
         z=points[:, 2].astype(np.float64),
         components=recorded[-1].at(points, plans[-1]),  # any before are the warm-up's
         hole=case.hole[chosen],
-        rim=_rim(case.face)[chosen],
+        rim=near_rim(dense, case.spacing)[chosen],
         everywhere=everywhere[chosen],
     )
 
@@ -158,11 +159,10 @@ def _recorded() -> Iterator[tuple[list[_PlacedComponents], list[Risk]]]:
         yield recorded, plans
 
 
-def _rim(face: Face) -> NDArray[np.bool_]:
-    """Say which points are near the border of the face."""
-    dense = face.dense
+def near_rim(dense: DenseCloud, spacing: float) -> NDArray[np.bool_]:
+    """Say which points are near the border of the face; spacing : of its seeds, mm."""
     inside = np.zeros((dense.grid_shape[0] + 2, dense.grid_shape[1] + 2), np.uint8)
     row, column = dense.cells[:, 0] + 1, dense.cells[:, 1] + 1
     inside[row, column] = 1
     away = cv2.distanceTransform(inside, cv2.DIST_L2, 5)[row, column] * dense.grid_step_mm
-    return np.asarray(away < _RIM_SPACINGS * face.report.mean_spacing_mm)
+    return np.asarray(away < _RIM_SPACINGS * spacing)

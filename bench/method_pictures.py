@@ -1,7 +1,6 @@
 """The pictures of docs/method.md."""
 
 import argparse
-import math
 import sys
 from pathlib import Path
 
@@ -11,15 +10,19 @@ import numpy as np
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-from bench.adaptation import FIXED, Prepared, prepared
+from bench.adaptation import CUTOFFS, Prepared, prepared, with_cutoff
 from bench.heads import REPORTING
+from denseface.recon import Settings
 from denseface.recon.fitting import plan_fit
+from denseface.recon.noise import SHARPNESS
 from denseface.recon.noise import _kernels as kernels
 from denseface.recon.noise._measure import gentle_places
 
 __all__: list[str] = []
 
 _SHOWN = ("kinect v1", "structured light, alike over 1 px", "time of flight", "active stereo")
+_SHARPNESS, *_ = SHARPNESS
+"""Of the fits that are drawn."""
 _DPI = 90
 _HEAD = 1
 """Which of the reporting heads' frames: at 800 mm."""
@@ -53,28 +56,21 @@ def _variogram(frames: dict[str, Prepared], path: Path) -> None:
 def _risk(frames: dict[str, Prepared], path: Path) -> None:
     """Expected and measured error over the cut-off."""
     figure, (expected, measured) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
-    tried = [one for one in FIXED if one.detail_factor == 1.0 and one.r0_factor and one.smoothing
-             and abs(one.smoothing / one.r0_factor**2 - _ratio(0.66)) < 1e-6]
+    tried = [with_cutoff(cutoff, _SHARPNESS) for cutoff in CUTOFFS]
     for name, one in frames.items():
         plans = [plan_fit(settings, one.noise, one.spacing) for settings in tried]
-        cutoffs = [plan.r0_factor / 0.66 for plan in plans]
-        line, = expected.plot(cutoffs, [plan.error_mm for plan in plans], label=name)
-        measured.plot(cutoffs, [one.error(one.dense(settings).points) for settings in tried], "o-",
+        line, = expected.plot(CUTOFFS, [plan.error_mm for plan in plans], label=name)
+        measured.plot(CUTOFFS, [one.error(one.dense(settings).points) for settings in tried], "o-",
                       color=line.get_color(), markersize=3)
-        chosen = plan_fit(FIXED[0].of("best"), one.noise, one.spacing)
+        chosen = plan_fit(Settings(), one.noise, one.spacing)
         for axis in (expected, measured):
-            axis.axvline(chosen.r0_factor / 0.66, color=line.get_color(), linewidth=0.6,
+            axis.axvline(chosen.r0_factor / _SHARPNESS, color=line.get_color(), linewidth=0.6,
                          linestyle=":")
     expected.set(xlabel="cut-off, spacings", ylabel="expected error, root mean square, mm",
                  yscale="log")
     measured.set(xlabel="cut-off, spacings", ylabel="true mean error, mm", yscale="log")
     expected.legend(fontsize=7)
     figure.savefig(path, dpi=_DPI)
-
-
-def _ratio(sharpness: float) -> float:
-    """Lambda over the squared R0 of a fit whose R0 is so much of its cut-off."""
-    return math.pi * math.exp(-(math.pi * sharpness) ** 2)
 
 
 def main() -> int:

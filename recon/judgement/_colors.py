@@ -1,12 +1,11 @@
 """Whether colour lies where the relief has eyes, brows, nose and mouth."""
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
 from denseface.recon.arrays import Bytes, Doubles, Floats
-from denseface.recon.judgement._placing import mean_face
+from denseface.recon.judgement._placing import mean_face, mean_face_data
 
 __all__ = ["LEAST_COLOR_LIKENESS", "color_likeness"]
 
@@ -68,8 +67,8 @@ def color_likeness(placement: Doubles, points: Floats, colors: Bytes) -> float |
 @cache
 def _mean_brightness() -> Doubles:
     """Give the logarithm of the mean face's brightness in its cells, (heights, widths)."""
-    with np.load(Path(__file__).with_name("mean_face.npz"), allow_pickle=False) as data:
-        brightness, (angle, step, height, down, _) = data["brightness"], data["axes"]
+    data = mean_face_data()
+    brightness, (angle, step, height, down, _) = data["brightness"], data["axes"]
     around = np.arange(-_HALF_WIDTH_MM, _HALF_WIDTH_MM + 1, _CELL_MM) / _RADIUS_MM
     columns = np.rint((np.degrees(around) - angle) / step).astype(np.intp)
     rows = np.arange(_HIGHEST_MM, _LOWEST_MM + 1, _CELL_MM)

@@ -12,7 +12,7 @@ from denseface.recon.judgement._mould_kernels import Mould
 from denseface.recon.judgement._placing_kernels import refine
 from denseface.recon.numerics.percentile import percentile
 
-__all__ = ["mean_face", "placements"]
+__all__ = ["mean_face", "mean_face_data", "placements"]
 
 _YAWS, _ROLLS = np.radians(np.arange(-60.0, 61.0, 20.0)), np.radians((-28.0, 0.0, 28.0))
 """Turns to start from, rad."""
@@ -44,15 +44,22 @@ _CORE_RAD, _CORE_MM = 1.3, 90.0
 
 
 @cache
-def mean_face() -> Mould:
-    """Give the mean face.
+def mean_face_data() -> dict[str, Doubles]:
+    """Read the mean face that is shipped: `radius`, `brightness` and `axes` of both.
 
     `python -m bench.mean_face` makes it of three heads: two of ICT-FaceKit (MIT,
     `LICENSE-ICT-FaceKit.txt`), one of MakeHuman (CC0).
     """
     with np.load(Path(__file__).with_name("mean_face.npz"), allow_pickle=False) as data:
-        radius = data["radius"].astype(np.float32)
-        angle, angle_step, height, height_step, axis = data["axes"].tolist()
+        return dict(data)
+
+
+@cache
+def mean_face() -> Mould:
+    """Give the mean face's surface."""
+    data = mean_face_data()
+    radius = data["radius"].astype(np.float32)
+    angle, angle_step, height, height_step, axis = data["axes"].tolist()
     return Mould(radius, math.radians(angle), math.radians(angle_step), height, height_step, axis)
 
 

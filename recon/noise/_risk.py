@@ -29,10 +29,8 @@ _WAVES = 48
 """Number of wave lengths of the integrals."""
 _CUTOFFS = np.geomspace(8.0, 36.0, 17)
 """Waves longer than this pass a fit, mean spacings: those that are tried."""
-_SHARPNESS = (0.66, 0.8)
+SHARPNESS = (0.66, 0.8)
 """R0 over the cut-off: broader Gaussians cut more sharply. Those that are tried."""
-_LEAST_SMOOTHING = 0.05
-"""As of the setting."""
 
 
 class Risk(NamedTuple):
@@ -63,6 +61,15 @@ class Risk(NamedTuple):
     least_mm: float
 
 
+def fit_of_cutoff(cutoff: float, sharpness: float) -> tuple[float, float]:
+    """Give R0, mean spacings, and lambda of the fit of which half of a wave is left.
+
+    cutoff : that wave's length, mean spacings; sharpness : R0 over it
+    """
+    r0 = sharpness * cutoff
+    return r0, math.pi * r0 ** 2 * math.exp(-(math.pi * sharpness) ** 2)
+
+
 def least_risk(
     noise: Noise, spacing: float, detail_factor: float | None, r0_factor: float | None = None,
     smoothing: float | None = None,
@@ -85,11 +92,8 @@ def least_risk(
 @lru_cache(maxsize=16)
 def _candidates(r0_factor: float | None, smoothing: float | None) -> Doubles:
     """R0 in mean spacings and lambda of the fits that are tried, (n, 2)."""
-    pairs = [(sharp * cutoff, math.pi * (sharp * cutoff) ** 2 * math.exp(-(math.pi * sharp) ** 2))
-             for sharp in _SHARPNESS for cutoff in _CUTOFFS.tolist()]
-    given = {(r0_factor or r0, smoothing or weight)
-             for r0, weight in pairs if weight >= _LEAST_SMOOTHING}
-    return np.array(sorted(given))
+    pairs = (fit_of_cutoff(cutoff, sharp) for sharp in SHARPNESS for cutoff in _CUTOFFS.tolist())
+    return np.array(sorted({(r0_factor or r0, smoothing or weight) for r0, weight in pairs}))
 
 
 @compiled

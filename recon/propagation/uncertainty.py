@@ -32,7 +32,6 @@ from denseface.recon.numerics.jit import compiled
 __all__ = ["VarianceComponents", "standard_error", "variance_components"]
 
 
-
 class _Coefficients(NamedTuple):
     """Of `sigma`'s square: B, W, M, H, S, E, J."""
 
