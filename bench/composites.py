@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from bench.heads import CHOOSING, REPORTING, at_hand
 from bench.objects import KINDS, Seen, Thing, make_thing, seen_by
+from bench.recall_scenes import real_without_face
 from denseface.capture import RgbdFrame, open_source
 from denseface.capture.npz import load_frame
 from denseface.recon import reconstruct
@@ -203,14 +204,13 @@ def _kept_outcomes(count: int, first: int, kept: Path | None) -> Iterator[tuple[
 
 def _real_frames() -> Iterator[tuple[str, RgbdFrame]]:
     """Give the real frames at hand that show no face."""
-    shared = shared_folder()
-    if shared:
-        for path in sorted((shared / "reports").glob("*.npz")):
+    for path in real_without_face():
+        if path.suffix == ".npz":
             yield "tables" if path.stem.startswith("table") else path.stem, load_frame(path)
-        for path in sorted((shared / "recordings").glob("*no_face*.oni")):
-            with open_source(str(path)) as source:
-                for frame in source:
-                    yield path.stem, frame
+            continue
+        with open_source(str(path)) as source:
+            for frame in source:
+                yield path.stem, frame
 
 
 def main() -> int:

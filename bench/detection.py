@@ -4,7 +4,7 @@ import argparse
 import sys
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ import numpy as np
 from bench.detection_scenes import Seen, seen_frames
 from bench.heads import CHOOSING, REPORTING
 from bench.machine import describe
-from bench.own import milliseconds
+from bench.own import default_haar, milliseconds
 from denseface.capture import RgbdFrame
 from denseface.recon import warm
 from denseface.recon.detection import _detect as stage
@@ -49,14 +49,14 @@ def _passes_counted() -> Iterator[Counter[str]]:
         yield counts
 
 
-def _measured(seen: Seen, haar: Callable[[Any], object]) -> tuple[float, float, bool]:
+def _measured(seen: Seen) -> tuple[float, float, bool]:
     """Give the least processor's time of detection and of the peer, by turns, ms; and if found."""
     gray = cv2.cvtColor(seen.frame.rgb, cv2.COLOR_RGB2GRAY)
     ours, peers, found = [], [], False
     for _ in range(_RUNS):
         ms, found = _detected(seen.frame)
         ours.append(ms)
-        peers.append(milliseconds(lambda: haar(gray)))
+        peers.append(milliseconds(lambda: default_haar()(gray)))
     return min(ours), min(peers), found
 
 
@@ -93,15 +93,13 @@ def main() -> int:
     cv2.setNumThreads(1)
     print(describe("script/bench detection " + " ".join(sys.argv[1:])))
     warm()
-    peer = cv2.CascadeClassifier(
-        str(Path(cv2.__file__).parent / "data" / "haarcascade_frontalface_default.xml"))
     rows: dict[str, list[tuple[float, float, bool]]] = defaultdict(list)
     ran: dict[str, Counter[str]] = defaultdict(Counter)
     false = 0
     for seen in seen_frames(REPORTING if args.heads == "reporting" else CHOOSING,
                             args.count, args.frames):
         with _passes_counted() as counts:
-            taken = _measured(seen, peer.detectMultiScale)
+            taken = _measured(seen)
         rows[seen.kind].append(taken)
         ran[seen.kind] += counts
         false += taken[2] and not seen.face

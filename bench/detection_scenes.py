@@ -10,10 +10,10 @@ import numpy as np
 
 from bench.accuracy import RECORDINGS
 from bench.heads import at_hand
-from bench.recall_scenes import View, empty_views, taken
+from bench.recall_scenes import View, empty_views, real_without_face, taken
 from denseface.capture import RgbdFrame, open_source
 from denseface.capture.npz import load_frame
-from tests.simulator import Light, Person, Scene, shared_folder
+from tests.simulator import Light, Person, Scene
 
 __all__ = ["Seen", "seen_frames"]
 
@@ -119,11 +119,11 @@ def seen_frames(heads: tuple[str, ...], count: int, folder: Path | None) -> Iter
     for view in empty_views(heads, 10 * count):
         yield Seen(f"no face: {view.value}", taken(view, folder)[0], face=False)
     yield from _recorded(RECORDINGS / "empty_room.oni", "no face: recorded rooms", face=False)
-    shared = shared_folder()
-    for path in sorted((shared / "recordings").glob("*no_face*.oni")) if shared else ():
-        yield from _recorded(path, "no face: recorded rooms", face=False)
-    for path in sorted((shared / "reports").glob("*.npz")) if shared else ():
-        yield Seen("no face: recorded tables", load_frame(path), face=False)
+    for path in real_without_face():
+        if path.suffix == ".npz":
+            yield Seen("no face: recorded tables", load_frame(path), face=False)
+        else:
+            yield from _recorded(path, "no face: recorded rooms", face=False)
 
 
 def _recorded(path: Path, kind: str, *, face: bool) -> Iterator[Seen]:

@@ -1,8 +1,13 @@
-"""Our own stages one by one, and what a call costs."""
+"""Our own stages one by one, OpenCV's detection beside them, and what a call costs."""
 
 import time
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
 
 from bench.cases import Case
 from denseface.recon import Settings
@@ -13,7 +18,7 @@ from denseface.recon.registration import register, sample_colors
 from denseface.recon.segmentation import segment_face
 from denseface.recon.surface import mean_spacing
 
-__all__ = ["after_segmentation", "milliseconds"]
+__all__ = ["after_segmentation", "default_haar", "milliseconds"]
 
 
 def milliseconds(call: Callable[[], object]) -> float:
@@ -21,6 +26,14 @@ def milliseconds(call: Callable[[], object]) -> float:
     start = time.process_time()
     call()
     return (time.process_time() - start) * 1e3
+
+
+@cache
+def default_haar() -> Callable[[NDArray[np.uint8]], object]:
+    """Give OpenCV's frontal cascade with its defaults, the peer of whole frames: of (H, W) grey."""
+    folder = Path(cv2.__file__).parent / "data"
+    return cv2.CascadeClassifier(
+        str(folder / "haarcascade_frontalface_default.xml")).detectMultiScale
 
 
 def after_segmentation(case: Case, known: Settings) -> Callable[[], object]:

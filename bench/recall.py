@@ -12,14 +12,22 @@ import numpy as np
 
 from bench.accuracy import RECORDINGS
 from bench.heads import CHOOSING, REPORTING
-from bench.recall_scenes import View, darkened, empty_views, face_views, taken
+from bench.own import default_haar, milliseconds
+from bench.recall_scenes import (
+    View,
+    darkened,
+    empty_views,
+    face_views,
+    real_without_face,
+    taken,
+)
 from denseface.capture import RgbdFrame, open_source
 from denseface.recon import reconstruct
 from denseface.recon.detection import Detection, detect_by_depth, detect_face
 from denseface.recon.errors import ReconstructionError
 from denseface.recon.finding import find_face
 from denseface.recon.registration import register, without_color
-from tests.simulator import Truth, shared_folder
+from tests.simulator import Truth
 
 __all__: list[str] = []
 
@@ -49,12 +57,8 @@ def _detected(frame: RgbdFrame) -> tuple[Detection | None, float]:
 
 def _haar_ms(frame: RgbdFrame) -> float:
     """OpenCV's default pass over a frame's picture, the processor's time."""
-    cascade = cv2.CascadeClassifier(
-        str(Path(cv2.__file__).parent / "data" / "haarcascade_frontalface_default.xml"))
     gray = cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2GRAY)
-    start = time.process_time()
-    cascade.detectMultiScale(gray)
-    return (time.process_time() - start) * 1e3
+    return milliseconds(lambda: default_haar()(gray))
 
 
 def _off_mm(found: Detection, frame: RgbdFrame, truth: Truth) -> tuple[float, float]:
@@ -136,12 +140,7 @@ def _found(frame: RgbdFrame) -> str:
 def _empty(views: list[View], folder: Path | None) -> Iterator[tuple[str, RgbdFrame]]:
     for view in views:
         yield f"simulated: {view.value}", taken(view, folder)[0]
-    given = [RECORDINGS / "empty_room.oni"]
-    shared = shared_folder()
-    if shared:
-        given += sorted((shared / "recordings").glob("*no_face*.oni"))
-        given += sorted((shared / "reports").glob("*.npz"))
-    for path in given:
+    for path in [RECORDINGS / "empty_room.oni", *real_without_face()]:
         kind = "tables" if path.suffix == ".npz" else path.stem
         with open_source(str(path)) as source:
             for frame in source:

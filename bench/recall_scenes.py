@@ -18,10 +18,11 @@ from tests.simulator import (
     Scene,
     Truth,
     head_names,
+    shared_folder,
     simulate,
 )
 
-__all__ = ["View", "darkened", "empty_views", "face_views", "taken"]
+__all__ = ["View", "darkened", "empty_views", "face_views", "real_without_face", "taken"]
 
 
 _PLAIN = Person(distance_mm=750.0)
@@ -198,3 +199,12 @@ def _ball(
     inside = along**2 - (middle @ middle - radius**2) / squared
     z = np.where(inside > 0, along - np.sqrt(np.maximum(inside, 0)), 0.0)
     return z, (middle[1] - z * rays[..., 1]) / radius
+
+
+def real_without_face() -> list[Path]:
+    """List the real recordings (`.oni`) and frames (`.npz`) without a face that are at hand."""
+    shared = shared_folder()
+    if shared is None:
+        return []
+    return [*sorted((shared / "recordings").glob("*no_face*.oni")),
+            *sorted((shared / "reports").glob("*.npz"))]

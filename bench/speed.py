@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 from unittest.mock import patch
@@ -21,7 +20,7 @@ from bench.flags import add_flags, check_flags, open_pcl
 from bench.growth import growth
 from bench.machine import describe
 from bench.memory import extra_memory, resident_mb
-from bench.own import after_segmentation, milliseconds
+from bench.own import after_segmentation, default_haar, milliseconds
 from bench.pcl_peer import Pcl
 from bench.peer_methods import inpaint_points, rbf_points
 from denseface.recon import Preset, Settings, pipeline, reconstruct, warm
@@ -46,8 +45,7 @@ _FAST_RUNS = 15
 def _frame_times(case: Case, runs: int) -> None:
     """Whole frames and OpenCV's default detection by turns."""
     gray = cv2.cvtColor(case.frame.rgb, cv2.COLOR_RGB2GRAY)
-    folder = Path(cv2.__file__).parent / "data"
-    cascade = cv2.CascadeClassifier(str(folder / "haarcascade_frontalface_default.xml"))
+    detect = default_haar()
     laps: dict[str, list[float]] = {}
     haar: list[float] = []
     for _ in range(5):
@@ -58,7 +56,7 @@ def _frame_times(case: Case, runs: int) -> None:
             timings = reconstruct(case.frame).report.timings_ms
         for name, ms in timings.items():
             laps.setdefault(name, []).append(ms)
-        haar.append(milliseconds(lambda: cascade.detectMultiScale(gray)))
+        haar.append(milliseconds(lambda: detect(gray)))
     print(f"\nWhole frame ({case.name}, preset `best`, {len(case.seeds):,} seeds, "
           f"{len(case.queries):,} coloured points with normals), {runs} runs by turns with "
           "OpenCV's default Haar pass on the same image, processor's time:\n")
