@@ -1,8 +1,8 @@
 """The operator for asyncio: the calls of `service.client.operator`, awaited."""
 
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from datetime import datetime
-from pathlib import Path
+from functools import cached_property
 
 from denseface.service.client._operator_exchanges import OperatorExchanges
 from denseface.service.client.aio import AsyncClient
@@ -12,14 +12,9 @@ from denseface.service.protocol.message_base import CaptureSummary, DeadLetter
 class AsyncOperator(AsyncClient):
     """The calls of `Operator` for asyncio."""
 
-    def __init__(
-        self, address: str | None = None, *, key: str | Path | None = None,
-        hub_key: str | Path | None = None,
-        connect_timeout: float | None = None, on_waiting: Callable[[str], None] | None = None,
-    ) -> None:
-        super().__init__(address, key=key, hub_key=hub_key, connect_timeout=connect_timeout,
-                         on_waiting=on_waiting)
-        self._asks = OperatorExchanges(self._exchanges)
+    @cached_property
+    def _asks(self) -> OperatorExchanges:
+        return OperatorExchanges(self._exchanges)
 
     async def captures(
         self, last: int = 20, *, timeout: float = 5.0

@@ -1,8 +1,8 @@
 """What an operator asks of the hub: captures, dead letters, removal. Needs the role `operator`."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from datetime import datetime
-from pathlib import Path
+from functools import cached_property
 
 from denseface.service.client._operator_exchanges import OperatorExchanges
 from denseface.service.client.blocking import Client
@@ -12,14 +12,9 @@ from denseface.service.protocol.message_base import CaptureSummary, DeadLetter
 class Operator(Client):
     """A `Client` that may also list, remove and restart."""
 
-    def __init__(
-        self, address: str | None = None, *, key: str | Path | None = None,
-        hub_key: str | Path | None = None,
-        connect_timeout: float | None = None, on_waiting: Callable[[str], None] | None = None,
-    ) -> None:
-        super().__init__(address, key=key, hub_key=hub_key, connect_timeout=connect_timeout,
-                         on_waiting=on_waiting)
-        self._asks = OperatorExchanges(self._exchanges)
+    @cached_property
+    def _asks(self) -> OperatorExchanges:
+        return OperatorExchanges(self._exchanges)
 
     def captures(self, last: int = 20, *, timeout: float = 5.0) -> tuple[CaptureSummary, ...]:
         """List the captures that were accepted last, the newest first; at most 50."""
