@@ -69,7 +69,7 @@ def test_a_failure_whose_cause_is_known_is_one_line(bootstrap, said, line):
     process = bootstrap(said, "exit 1")
     out, error = process.communicate(timeout=LIMIT_S)
     assert process.returncode == 1
-    assert "up to 470 MB to download" in out
+    assert "up to 380 MB to download" in out
     assert error.count("\n") == 1
     assert error.startswith(f"bootstrap: {line}")
 
