@@ -31,6 +31,8 @@ class Length:
 class Measurements:
     """What is measured on a face; None where an end of it was not found.
 
+    Attributes
+    ----------
     face_width : breadth of the face 50 mm behind the sellion, between the levels of sellion and
         subnasale; near the bizygomatic breadth (zy-zy)
     face_length : sellion to gnathion, the morphological height of the face (n-gn)
