@@ -67,7 +67,7 @@ def test_the_package_is_for_the_pythons_that_were_tried():
 
 _EXTRAS = _PROJECT["project"]["optional-dependencies"]
 _RUN = _PROJECT["project"]["dependencies"] + _EXTRAS["kiosk"]
-_DEV = sum((_EXTRAS[one] for one in ("dev", "notebook", "rerun", "docs")), [])
+_DEV = [name for one in ("dev", "notebook", "rerun", "docs") for name in _EXTRAS[one]]
 _BUILD = [*_PROJECT["build-system"]["requires"], *_lines("build.in")]
 
 
