@@ -1,0 +1,168 @@
+"""The programs in other languages read the test vectors, and end in one line where they must."""
+
+import json
+import subprocess
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import zmq
+
+from tests.system.programs import LANGUAGES, Program, program
+from tests.system.running import REPOSITORY
+from tests.waiting import LIMIT_MS
+
+_VECTORS = REPOSITORY / "docs" / "vectors"
+_DONE = json.loads((_VECTORS / "face_done.json").read_text())
+_ARRAYS = [one["name"] for one in _DONE["header"]["face"]["arrays"]]
+
+
+def vector(name: str) -> list[bytes]:
+    """Give the parts of a vector, cut out of its file as docs/wire.md says."""
+    sizes = json.loads((_VECTORS / f"{name}.json").read_text())["parts"]
+    data, ends = (_VECTORS / f"{name}.bin").read_bytes(), np.cumsum(sizes)
+    assert ends[-1] == len(data)
+    return [data[end - size:end] for size, end in zip(sizes, ends, strict=True)]
+
+
+def changed(header: bytes, **fields: Any) -> bytes:
+    """Give a header with other values in fields that it has."""
+    tree = json.loads(header)
+    return json.dumps(tree | {name: value for name, value in fields.items() if name in tree}
+                      ).encode()
+
+
+@dataclass
+class Ended:
+    """How a program ended."""
+
+    status: int
+    out: str
+    err: str
+    points: np.ndarray | None
+    """What it wrote, if it did."""
+    heard: list[str]
+    """Kinds of what it said."""
+
+
+def served(
+    command: Program, folder: Path, answers: Mapping[str, list[list[bytes]]],
+    published: list[bytes] | None = None,
+) -> Ended:
+    """Be the hub of a program until it ends.
+
+    Parameters
+    ----------
+    answers : for each kind of request the answers, one after another, the last one repeated; ids
+        and numbers become those of the request
+    published : what is published where `get_next` found nothing newer
+    """
+    heard: list[str] = []
+    pressed = ""
+    with tempfile.TemporaryDirectory(prefix="df-") as short, zmq.Context() as context, \
+            context.socket(zmq.ROUTER) as router, context.socket(zmq.XPUB) as publisher:
+        router.linger = publisher.linger = 0
+        router.bind(f"ipc://{short}/hub")
+        publisher.bind(f"ipc://{short}/hub.publications")
+        with subprocess.Popen([*command, f"ipc://{short}/hub"], cwd=folder, text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            while process.poll() is None:
+                if not router.poll(20):
+                    continue
+                peer, said = router.recv_multipart()
+                request = json.loads(said)
+                heard.append(request["kind"])
+                pressed = request.get("capture_id", pressed)
+                given = answers[request["kind"]]
+                header, *arrays = given[min(heard.count(request["kind"]), len(given)) - 1]
+                router.send_multipart([peer, changed(
+                    header, request=request["request"], capture_id=pressed), *arrays])
+                if published and json.loads(header)["kind"] == "nothing_newer":
+                    assert publisher.poll(LIMIT_MS)
+                    assert publisher.recv() == b"\x01faces"
+                    topic, header, *arrays = published
+                    publisher.send_multipart(
+                        [topic, changed(header, capture_id=pressed, sequence=43), *arrays])
+            out, err = process.communicate()
+    written = [np.loadtxt(path, ndmin=2) for path in folder.glob("*.xyz")]
+    return Ended(process.returncode, out, err, written[0] if written else None, heard)
+
+
+@pytest.fixture(scope="module", params=LANGUAGES)
+def command(request, tmp_path_factory):
+    return program(request.param, tmp_path_factory.mktemp("program"))
+
+
+USUAL = {"find_start": [vector("start_at")], "press": [vector("press_accepted")],
+         "get_next": [vector("nothing_newer"), vector("face_done.answer")]}
+
+
+def check_vector(points: np.ndarray | None) -> None:
+    """Check that it is the face of the vector."""
+    dense = _DONE["decoded"]["dense"]
+    assert points is not None
+    assert np.array_equal(points[:, :3].astype(np.float32), np.float32(dense["points"]))
+    assert np.array_equal(points[:, 3:6], dense["colors"])
+    assert np.array_equal(points[:, 6].astype(np.float32), np.float32(dense["sigma"]))
+
+
+def test_a_face_that_is_published_is_that_of_the_vector(command, tmp_path):
+    ended = served(command, tmp_path, USUAL, vector("face_done"))
+    assert (ended.status, ended.err) == (0, "")
+    assert ended.heard == ["find_start", "press", "get_next"]
+    check_vector(ended.points)
+
+
+def test_a_face_that_was_missed_is_asked_for(command, tmp_path):
+    """Also where another store took the place of the first."""
+    header, *arrays = vector("face_done.answer")
+    other = [changed(header, epoch="0f"), *arrays]
+    ended = served(command, tmp_path, USUAL | {"get_next": [other]})
+    assert (ended.status, ended.err) == (0, "")
+    assert ended.heard == ["find_start", "press", "get_next", "get_next"]
+    check_vector(ended.points)
+
+
+@pytest.mark.parametrize(("kind", "answer", "why"), [
+    ("press", "press_refused", "no sensor is connected"),
+    ("get_next", "capture_failed.answer", "no face in the picture"),
+    ("find_start", "request_failed", "refused: get_next.after: expected at least 0"),
+])
+def test_what_the_hub_refuses_is_said_with_status_1(command, tmp_path, kind, answer, why):
+    ended = served(command, tmp_path, USUAL | {kind: [vector(answer)]})
+    assert ended.status == 1
+    assert why in ended.out + ended.err
+    assert not list(tmp_path.iterdir())
+
+
+def with_fewer_points(parts: list[bytes]) -> list[bytes]:
+    parts[1 + _ARRAYS.index("dense_support")] = bytes(7) + b"\x20"
+    return parts
+
+
+def with_more_points(parts: list[bytes]) -> list[bytes]:
+    parts[1 + _ARRAYS.index("dense_support")] = b"\xff" * 8
+    return parts
+
+
+def cut_off(parts: list[bytes]) -> list[bytes]:
+    parts[1 + _ARRAYS.index("dense_z")] = parts[1 + _ARRAYS.index("dense_z")][:-4]
+    return parts
+
+
+def without_sigma(parts: list[bytes]) -> list[bytes]:
+    return parts[:-1]
+
+
+@pytest.mark.parametrize("spoil", [
+    with_fewer_points, with_more_points, cut_off, without_sigma])
+def test_a_face_that_is_not_as_its_header_says_is_none(command, tmp_path, spoil):
+    spoilt = spoil(vector("face_done.answer"))
+    ended = served(command, tmp_path, USUAL | {"get_next": [spoilt]})
+    assert ended.status == 1
+    assert ended.err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
