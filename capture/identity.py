@@ -11,10 +11,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import platformdirs
-
 from denseface.capture.calibration import ChosenCalibration
 from denseface.capture.calibration_files import read_calibration
+from denseface.folders import user_folder
 
 __all__ = [
     "Identity",
@@ -200,7 +199,7 @@ def calibration_folder() -> Path:
     """Give the folder of the sensors' calibrations: `DENSEFACE_CALIBRATIONS`, else the user's."""
     if folder := os.environ.get(_CALIBRATIONS):
         return Path(folder)
-    return platformdirs.user_config_path("denseface") / "calibrations"
+    return user_folder("config") / "calibrations"
 
 
 def file_name(name: str) -> str:

@@ -28,6 +28,7 @@ from denseface.capture.calibration_files import choose_calibration
 from denseface.capture.errors import DriverError, MismatchedFrameError, UnreadableSourceError
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.rotation import ROTATIONS
+from denseface.missing import missing
 
 if TYPE_CHECKING:
     from denseface.capture.preparation import FramePreparation
@@ -242,7 +243,7 @@ def class_named(name: str) -> Any:
     try:
         return getattr(import_module(f"denseface.capture.{module}"), name)
     except ImportError as error:
-        raise DriverError(str(error)) from error
+        raise DriverError(str(missing(error, "capture") or error)) from error
 
 
 def _accepted() -> str:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from denseface.capture.frame import DepthMeaning, DepthRounding, FrameOrigin, RgbdFrame
     from denseface.capture.npz import load_frame, save_frame
     from denseface.capture.source import Source, open_source
-    from denseface.errors import DensefaceError
+    from denseface.errors import DensefaceError, MissingPackageError
     from denseface.recon.errors import (
         CoarseDepthError,
         FaceWithoutDepthError,
@@ -85,14 +85,14 @@ __all__ = [
     "DriverError", "Face", "FaceCandidate", "FaceWithoutDepthError", "FormatError", "FrameError",
     "FrameOrigin", "ImpossibleFrameError", "ImpossibleSettingsError", "KeyFileError",
     "KeyRefusedError", "Length", "LocalProtocolError", "Measurements", "MismatchedFrameError",
-    "Neighbors", "NoDepthError", "NoFaceError", "Operator", "PointCloud", "Preset",
-    "PressRefusedError", "ProtocolError", "Published", "PublishedFace", "PublishedFailure",
-    "PublishedHint", "PublishedPreview", "ReconstructionError", "RemoteProtocolError", "Report",
-    "RequestFailedError", "RgbdFrame", "SensorError", "SensorTimeoutError", "ServiceError",
-    "Settings", "SettingsError", "Source", "Status", "TooLittleDepthError", "UnknownCaptureError",
-    "UnreadableSourceError", "WrongSizeError", "__version__", "draw_refusal", "fuse",
-    "load_calibration", "load_face", "load_frame", "measure", "open_source", "reconstruct",
-    "render", "save_face", "save_frame", "warm",
+    "MissingPackageError", "Neighbors", "NoDepthError", "NoFaceError", "Operator", "PointCloud",
+    "Preset", "PressRefusedError", "ProtocolError", "Published", "PublishedFace",
+    "PublishedFailure", "PublishedHint", "PublishedPreview", "ReconstructionError",
+    "RemoteProtocolError", "Report", "RequestFailedError", "RgbdFrame", "SensorError",
+    "SensorTimeoutError", "ServiceError", "Settings", "SettingsError", "Source", "Status",
+    "TooLittleDepthError", "UnknownCaptureError", "UnreadableSourceError", "WrongSizeError",
+    "__version__", "draw_refusal", "fuse", "load_calibration", "load_face", "load_frame", "measure",
+    "open_source", "reconstruct", "render", "save_face", "save_frame", "warm",
 ]
 
 _NAMES = {
@@ -104,7 +104,7 @@ _NAMES = {
     "capture.frame": "DepthMeaning DepthRounding FrameOrigin RgbdFrame",
     "capture.npz": "load_frame save_frame",
     "capture.source": "Source open_source",
-    "errors": "DensefaceError",
+    "errors": "DensefaceError MissingPackageError",
     "recon.errors": "CoarseDepthError FaceWithoutDepthError ImpossibleFrameError "
                     "ImpossibleSettingsError NoDepthError NoFaceError ReconstructionError "
                     "TooLittleDepthError",
@@ -132,13 +132,16 @@ _MODULES = {name: module for module, names in _NAMES.items() for name in names.s
 
 def __getattr__(name: str) -> object:
     if name == "__version__":
-        from importlib.metadata import version
+        from denseface.version import VERSION
 
-        value: object = version("denseface")
+        value: object = VERSION
     elif name in _MODULES:
         from importlib import import_module
 
-        value = getattr(import_module(f"denseface.{_MODULES[name]}"), name)
+        from denseface.missing import explained
+
+        with explained():
+            value = getattr(import_module(f"denseface.{_MODULES[name]}"), name)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value

@@ -4,6 +4,7 @@
 `CaptureError`              between a sensor or file and a frame
 `ReconstructionError`       a frame that does not become a face: the same for the same frame
 `ServiceError`              between a press and a published face, and files of faces
+`MissingPackageError`       an installation without what a call needs
 =========================== =======================================================================
 
 Each is also the builtin kind that a caller would expect to catch: `CalibrationError` is a
@@ -13,7 +14,7 @@ Each is also the builtin kind that a caller would expect to catch: `CalibrationE
 
 from typing import Any
 
-__all__ = ["DensefaceError"]
+__all__ = ["DensefaceError", "MissingPackageError"]
 
 
 class DensefaceError(Exception):
@@ -24,11 +25,15 @@ class DensefaceError(Exception):
         return _again, (type(self), self.args, self.__dict__)
 
 
+class MissingPackageError(DensefaceError, ModuleNotFoundError):
+    """A package is not installed that a call needs; the message names the extra that brings it."""
+
+
 def _again(kind: type[DensefaceError], args: tuple[Any, ...], state: dict[str, Any]
            ) -> DensefaceError:
     # Of a kind with two builtin bases, Python finds the wrong one's `__new__` by itself.
-    new = OSError.__new__ if issubclass(kind, OSError) else Exception.__new__
-    error = new(kind, *args)
+    base = next((one for one in (OSError, ImportError) if issubclass(kind, one)), Exception)
+    error = base.__new__(kind, *args)
     error.args = args
     error.__dict__.update(state)
     return error

@@ -1,16 +1,17 @@
 """How script/docs makes the site of these pages."""
 
 import sys
-from importlib.metadata import version as version_of
 from pathlib import Path
 
 _DOCS = Path(__file__).resolve().parent
 # The code beside these pages, whatever is installed.
 sys.path[:0] = [str(_DOCS.parent), str(_DOCS / "extensions")]
 
+from denseface.version import VERSION  # noqa: E402
+
 project = "denseface"
 author = copyright = "The denseface authors"  # noqa: A001
-release = version = version_of("denseface")
+release = version = VERSION
 
 extensions = [
     "myst_parser",

@@ -7,8 +7,7 @@ Unconstrained Environment".
 import time
 from collections.abc import Callable
 from dataclasses import fields
-from functools import cache, partial
-from importlib.metadata import version
+from functools import partial
 from typing import Any
 
 import cv2
@@ -47,6 +46,7 @@ from denseface.recon.segmentation import box_window, segment_face
 from denseface.recon.settings import Settings
 from denseface.recon.surface import MIN_SEEDS, mean_spacing
 from denseface.recon.warmup import warm
+from denseface.version import VERSION
 
 __all__ = ["ends_the_same", "reconstruct"]
 
@@ -207,7 +207,7 @@ def _shape(settings: Settings, clock: "_Stopwatch", found: Found) -> Face:
         colored=found.colored, registered=frame.registered and found.colored,
         depth_unit_um=frame.depth_meaning.unit_um,
         depth_rounding=frame.depth_meaning.rounding, **_of_origin(frame.origin),
-        version=_version(),
+        version=VERSION,
         warnings=_warnings(found, len(initial), doubts, left_open, score),
     )
     return Face(initial, dense, report)
@@ -247,11 +247,6 @@ def _depths_at(frame: RgbdFrame, points: Floats) -> Floats:
     found = np.zeros(len(points), np.float32)
     found[inside] = frame.depth[rows[inside].astype(np.intp), columns[inside].astype(np.intp)]
     return found * np.float32(frame.depth_meaning.unit_um / 1000)
-
-
-@cache
-def _version() -> str:
-    return version("denseface")
 
 
 def _warnings(

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-import platformdirs
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
+from denseface.folders import user_folder
 from denseface.service.errors import FrameTooLargeError, SettingsError, first_error
 from denseface.service.runtime.parsing import parse_loopback_address, parse_retention
 
@@ -66,7 +66,7 @@ class ServiceSettings(BaseModel):
     """The hub's address: `ipc://PATH` or `tcp://HOST:PORT`."""
     listen: Annotated[tuple[str, ...], Field(max_length=16), BeforeValidator(_split)] = ()
     """More addresses of the hub, for peers with a key: `tcp://HOST:PORT`, several with commas."""
-    keys: Path = Field(default_factory=lambda: platformdirs.user_config_path("denseface") / "keys")
+    keys: Path = Field(default_factory=lambda: user_folder("config") / "keys")
     """Folder of the keys and of the hub's allow-list."""
     key: Path | None = None
     """File of this process's own secret key."""
@@ -75,7 +75,7 @@ class ServiceSettings(BaseModel):
     """The hub's public key: its file, or its 40 characters."""
     memory_mb: Annotated[int, Field(ge=64, le=2**20)] = 2048
     """Memory of the hub, MiB, beyond which it disconnects all other machines."""
-    data: Path = Field(default_factory=lambda: platformdirs.user_data_path("denseface"))
+    data: Path = Field(default_factory=lambda: user_folder("data"))
     """Folder of frames, faces and their database, with mode 700."""
     heartbeat_s: _Seconds = 1.0
     """Time between two heartbeats, seconds."""

@@ -47,4 +47,5 @@ try:
 except Exception as error:  # whatever a Python that came later makes of it
     raise ImportError(
         "the binding of OpenNI2, primesense, cannot be imported by Python "
-        f"{platform.python_version()}: {error}") from error
+        f"{platform.python_version()}: {error}",
+        name=error.name if isinstance(error, ModuleNotFoundError) else None) from error

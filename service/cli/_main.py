@@ -11,6 +11,8 @@ import re
 import sys
 from collections.abc import Sequence
 
+from denseface.errors import MissingPackageError
+from denseface.missing import missing
 from denseface.service.cli._parser import USAGE, parse
 from denseface.service.commands import load
 from denseface.service.log.kernels import KernelLines, tell_of_kernels
@@ -31,6 +33,10 @@ _FAILED, _CTRL_C, _BROKEN_PIPE = 1, 130, 141
 """Exit statuses; above 128, 128 and the number of the signal, as a shell has it."""
 _BRIEF = {"reconstruct", "press", "get", "list", "status", "worker"}
 """Commands that end soon, or say themselves when they have started."""
+_EXTRAS = {"capture": "capture", "hub": "hub", "kiosk": "kiosk", "worker": "worker",
+           "warm": "worker", "up": "all", "calibrate": "capture", "doctor": "capture",
+           "live": "capture", "record": "capture"}
+"""Command -> the extra with all that it needs; of the others, that of the module."""
 _LONGEST = 400
 """Characters of a word that are shown: a path of a system's longest is no line."""
 
@@ -75,7 +81,7 @@ def _main(arguments: Sequence[str] | None) -> int:
             if sys.excepthook is sys.__excepthook__:
                 sys.excepthook = complain_of
             raise
-        line = _line(error)
+        line = _line(error, args.command)
         if getattr(args, "log", "text") == "json":
             import structlog
 
@@ -88,15 +94,17 @@ def _main(arguments: Sequence[str] | None) -> int:
     return status
 
 
-def _line(error: Exception) -> str:
+def _line(error: Exception, command: str = "") -> str:
     from denseface.service.errors import reason_of
 
+    if isinstance(error, ImportError) and (told := missing(error, _EXTRAS.get(command, ""))):
+        error = told
     said = str(error)
     if isinstance(error, OSError) and error.strerror and said.startswith("[Errno "):
         names = [str(one) for one in (error.filename, error.filename2) if one is not None]
         said = ": ".join([*names, reason_of(error)])
     said = " ".join(said.split()) or type(error).__name__
-    if isinstance(error, ImportError):
+    if isinstance(error, ImportError) and not isinstance(error, MissingPackageError):
         said += f"; the installation in {sys.prefix} is incomplete: install denseface again"
     return re.sub(rf"\S{{{_LONGEST}}}\S+", lambda long: f"{long[0][:_LONGEST]}...", said)
 

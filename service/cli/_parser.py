@@ -142,9 +142,9 @@ class _Version(argparse.Action):
         super().__init__(option_strings, dest, nargs=0, help="show the version and exit")
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
-        from importlib.metadata import version
+        from denseface.version import VERSION
 
-        say(version("denseface"), flush=True)
+        say(VERSION, flush=True)
         parser.exit()
 
 

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.missing import explained
 from denseface.recon.face import Face
 from denseface.service.errors import CaptureFailedError, RemoteProtocolError
 from denseface.service.protocol.messages import CaptureFailed, FaceDone, Hint, Hints, Preview
@@ -126,10 +127,13 @@ class PublishedPreview:
         ------
         RemoteProtocolError
             Where the JPEG is damaged.
+        MissingPackageError
+            It takes OpenCV to decode one, which a client alone need not have; `jpeg` is the file.
         """
         if self._pixels is not None:
             return self._pixels
-        import cv2
+        with explained():
+            import cv2
 
         flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
         image = cv2.imdecode(np.frombuffer(self.jpeg or b"", np.uint8), flags)

@@ -1,7 +1,6 @@
 """What the hub's process says before its data folder is open: how far it is, and nothing else."""
 
 import time
-from importlib.metadata import version
 
 import structlog
 
@@ -17,6 +16,7 @@ from denseface.service.security.refusals import Refusals
 from denseface.service.storage import FolderStore, OpeningStore
 from denseface.service.transport.listener import Incoming
 from denseface.service.transport.listeners import Listeners
+from denseface.version import VERSION
 
 __all__ = ["Opening"]
 
@@ -100,7 +100,7 @@ class Opening:
     def _status(self, request: int) -> messages.Status:
         files = self._progress.files
         return messages.Status(
-            request=request, epoch=_NO_EPOCH, sequence=0, hub_version=version("denseface"),
+            request=request, epoch=_NO_EPOCH, sequence=0, hub_version=VERSION,
             sensors=(), workers=(), pressed=0, queued=0, working=0, done=0, failed=0, dead=0,
             refused=self._rejections.counts(), presses_refused={}, since_start={}, latencies={},
             restarts={}, state="rebuilding" if files else "opening",

@@ -1,9 +1,8 @@
 """Where a face comes from, as its files say it: short texts, in each format as it can have them."""
 
-from importlib.metadata import version
-
 from denseface.capture.frame import RgbdFrame
 from denseface.recon.face import Report
+from denseface.version import VERSION
 
 __all__ = ["comments", "frame_provenance", "provenance", "stl_header"]
 
@@ -29,7 +28,7 @@ def frame_provenance(frame: RgbdFrame) -> dict[str, str]:
     """Give what is known of a frame that became no face, or not yet one, in the same words."""
     origin = frame.origin
     return _known(
-        generator=f"denseface {version('denseface')}", captured_at=origin.captured_at,
+        generator=f"denseface {VERSION}", captured_at=origin.captured_at,
         sensor=origin.sensor, source=origin.source, calibration=frame.calibration_origin)
 
 

@@ -6,7 +6,6 @@ refused whatever the sensor.
 
 import math
 from collections.abc import Iterator
-from importlib.metadata import version
 from itertools import islice
 
 from pydantic import ValidationError
@@ -23,8 +22,8 @@ from denseface.service.protocol.states import CaptureState
 from denseface.service.protocol.status import MAX_COMPILING, MAX_SENSOR_STATES
 from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Packet
+from denseface.version import VERSION
 
-_VERSION = version("denseface")
 """Of this package, as the status says it."""
 _APART_S = 0.1
 """Shortest time between two statuses, seconds: changes that come closer are told together."""
@@ -99,7 +98,7 @@ class StatusReport:
         known = sensors.best_first(self._peers.sensors.values())
         return messages.Status(
             request=request, epoch=self._store.epoch, sequence=self._store.last_sequence(),
-            hub_version=_VERSION,
+            hub_version=VERSION,
             sensors=tuple(one.name for one in known if one.can_be_asked),
             sensor_states=tuple(one.status() for one in known[:MAX_SENSOR_STATES]),
             workers=tuple(worker.name for worker in self._peers.workers.values()

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime
-from importlib.metadata import version
 from typing import Any
 
 import structlog
@@ -34,6 +33,7 @@ from denseface.service.kiosk.web.guard import origins_of
 from denseface.service.kiosk.web.server import bind, serve, url_of
 from denseface.service.runtime.supervisor_link import SupervisorLink
 from denseface.service.settings import ServiceSettings
+from denseface.version import VERSION
 
 __all__ = ["run", "visit_options"]
 
@@ -80,7 +80,7 @@ async def _run(service: ServiceSettings, settings: KioskSettings, options: Visit
     stopped = _stop_signal()
     files = kiosk_files()
     hello = Hello(languages=settings.languages, sound=settings.sound, speech=settings.speech,
-                  version=f"{version('denseface')}-{files.digest[:12]}")
+                  version=f"{VERSION}-{files.digest[:12]}")
     with closing(AsyncOperator(service.address, key=service.key, hub_key=service.hub_key)) as hub:
         kiosk = Kiosk(options, new_id=lambda: secrets.token_hex(16), utc=_utc)
         links = links_of(settings, hub.get)

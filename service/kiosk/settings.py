@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 from urllib.parse import urlsplit
 
-import platformdirs
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
+from denseface.folders import user_folder
 from denseface.service.errors import SettingsError, first_error
 from denseface.service.kiosk.certificates import tls_context
 from denseface.service.kiosk.page_messages import Language
@@ -84,7 +84,7 @@ class KioskSettings(BaseModel):
     """Origins by which browsers reach the page if not by its address, as through a reverse proxy:
     `https://face.example`, several with commas."""
     folder: Path = Field(
-        default_factory=lambda: platformdirs.user_state_path("denseface") / "kiosk")
+        default_factory=lambda: user_folder("state") / "kiosk")
     """Folder of what the kiosk keeps, mode 700: the operator's token, withdrawals under way."""
     lan: Annotated[Address | None, BeforeValidator(_address)] = None
     """Where faces are fetched by link: IP address and port; None for no links."""

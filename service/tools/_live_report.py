@@ -1,10 +1,10 @@
 """What is shown of a live run: a status line meanwhile, a summary at the end."""
 
 import json
-from importlib.metadata import version
 
 from denseface.recon import Face, Settings
 from denseface.service.tools._live_statistics import LiveFrame, LiveStatistics
+from denseface.version import VERSION
 
 
 def status(done: LiveFrame, statistics: LiveStatistics) -> str:
@@ -47,5 +47,5 @@ def json_summary(uri: str, settings: Settings, warm_ms: float, statistics: LiveS
         "timings_ms": {stage: {"median": round(median, 2), "p99": round(p99, 2)}
                        for stage, (median, p99) in statistics.stages_ms().items()},
         "settings": settings.model_dump(mode="json"),
-        "version": version("denseface"),
+        "version": VERSION,
     })

@@ -40,7 +40,8 @@ def bootstrap(tmp_path):
     checkout = tmp_path / "checkout"
     shutil.copytree(REPOSITORY / "requirements", checkout / "requirements")
     (checkout / "script").mkdir()
-    for name in ("script/bootstrap", "pyproject.toml"):
+    (checkout / "whole").mkdir()
+    for name in ("script/bootstrap", "pyproject.toml", "whole/pyproject.toml"):
         shutil.copy(REPOSITORY / name, checkout / name)
     tools = tmp_path / "tools"
     tools.mkdir()

@@ -17,6 +17,8 @@ from pathlib import Path, PurePosixPath
 import psutil
 import pytest
 
+import denseface
+from tests.distributions import required, run_with
 from tests.system.running import RECORDINGS, REPOSITORY
 from tests.waiting import LIMIT_S
 
@@ -104,7 +106,7 @@ def test_the_front_end_is_in_the_wheel_as_built_and_in_the_sdist_with_its_source
 
 def test_the_wheel_holds_the_package_alone_and_all_of_it(wheel):
     names = _contents(wheel).keys()
-    about = "denseface-{}.dist-info".format(importlib.metadata.version("denseface"))
+    about = f"denseface_core-{denseface.__version__}.dist-info"
     assert {PurePosixPath(name).parts[0] for name in names} == {"denseface", about}
     assert f"{about}/licenses/LICENSE" in names
     assert [name for name in names if name.endswith("py.typed")] == ["denseface/py.typed"]
@@ -166,9 +168,9 @@ def installed(wheel, tmp_path_factory):
 
 
 def test_it_runs_under_both_names(installed):
-    version = importlib.metadata.version("denseface")
     assert installed.run(installed.command, "--help").startswith("usage: denseface")
-    assert installed.run(installed.python, "-m", "denseface", "--version") == f"{version}\n"
+    said = installed.run(installed.python, "-m", "denseface", "--version")
+    assert said == f"{denseface.__version__}\n"
 
 
 def test_its_python_face_makes_a_face_and_kernels_are_kept_beside_it(installed):
@@ -185,6 +187,18 @@ def test_its_python_face_makes_a_face_and_kernels_are_kept_beside_it(installed):
     assert list(installed.packages.glob("denseface/recon/surface/__pycache__/_trend.*.nbi"))
 
 
+_CLIENT = """
+address, packages = sys.argv[1:]
+import denseface
+assert denseface.__file__.startswith(packages)
+with denseface.Client(address) as client:
+    published = client.published(after=1, timeout=60)
+    client.press("a1")
+    print(next(published).capture_id, len(client.get("a1").dense) > 1000)
+"""
+"""Of a machine with numpy, pydantic and pyzmq alone."""
+
+
 def test_the_service_runs_and_its_processes_bear_its_name(installed, tmp_path):
     with tempfile.TemporaryDirectory(prefix="df-") as short, (tmp_path / "log").open("w") as log:
         address = f"ipc://{short}/hub"
@@ -199,6 +213,9 @@ def test_the_service_runs_and_its_processes_bear_its_name(installed, tmp_path):
             family += up.children(recursive=True)
             installed.run(installed.command, "press", "--address", address, "--save",
                           tmp_path / "face.ply", said=r".*face\.ply: [\d,]+ points, .*\n")
+            client = run_with(required("client"), _CLIENT, address, installed.packages,
+                              folder=installed.packages)
+            assert client.communicate(timeout=LIMIT_S) == ("a1 True\n", "")
             assert all("denseface" in " ".join(one.cmdline()[1:]) for one in family)
             assert {"hub", "capture", "worker"} <= {
                 argument for one in family for argument in one.cmdline()}

@@ -65,9 +65,21 @@ def test_the_package_is_for_the_pythons_that_were_tried():
             if one.startswith(start)] == _PYTHONS
 
 
+_NAME = _PROJECT["project"]["name"]
 _EXTRAS = _PROJECT["project"]["optional-dependencies"]
-_RUN = _PROJECT["project"]["dependencies"] + _EXTRAS["kiosk"]
-_DEV = [name for one in ("dev", "notebook", "rerun", "docs") for name in _EXTRAS[one]]
+
+
+def _of(*extras: str) -> list[str]:
+    """Give what extras require, also by extras that they name."""
+    found = []
+    for one in itertools.chain.from_iterable(_EXTRAS[extra] for extra in extras):
+        named = Requirement(one)
+        found += _of(*sorted(named.extras)) if named.name == _NAME else [one]
+    return found
+
+
+_RUN = _PROJECT["project"]["dependencies"] + _of("all", "kiosk")
+_DEV = _of("dev", "notebook", "rerun", "docs")
 _BUILD = [*_PROJECT["build-system"]["requires"], *_lines("build.in")]
 
 
@@ -81,7 +93,7 @@ def test_every_requirement_is_met(lock, requirements, platform):
 
 
 def test_every_extra_is_locked():
-    assert _EXTRAS.keys() == {"dev", "docs", "kiosk", "notebook", "rerun"}
+    assert {*_RUN, *_DEV} == {*_PROJECT["project"]["dependencies"], *_of(*_EXTRAS)}
 
 
 @pytest.mark.parametrize("platform", _PLATFORMS, ids=str)

@@ -3,7 +3,6 @@
 import os
 import time
 from collections.abc import Awaitable, Callable, Mapping
-from importlib.metadata import version
 from typing import Any
 
 import structlog
@@ -16,6 +15,7 @@ from denseface.service.kiosk.operator.token import OperatorToken
 from denseface.service.kiosk.settings import KioskSettings
 from denseface.service.kiosk.web.files import Files
 from denseface.service.settings import ServiceSettings
+from denseface.version import VERSION
 
 __all__ = ["operator_routes"]
 
@@ -45,7 +45,7 @@ def operator_routes(
     lan = settings.lan
     desk = Desk(
         hub,
-        {"version": version("denseface"), "consent": settings.consent,
+        {"version": VERSION, "consent": settings.consent,
          "links": settings.lan_url or (f"{lan[0]}:{lan[1]}" if lan else None),
          "links_tls": settings.lan_certificate is not None
          or (settings.lan_url or "").startswith("https:"),
