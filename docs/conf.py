@@ -39,6 +39,7 @@ myst_links_external_new_tab = False
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 # A word in backticks of a docstring leads to what it names, if anything.
+highlight_language = "none"
 default_role = "py:obj"
 python_use_unqualified_type_names = True
 toc_object_entries_show_parents = "hide"
@@ -57,7 +58,7 @@ html_theme_options = {
     "pygments_light_style": "default",
     "pygments_dark_style": "github-dark",
 }
-html_sidebars = {"index": [], "changelog": [], "contributing": []}
+html_sidebars: dict[str, list[str]] = {"index": [], "changelog": [], "contributing": []}
 html_static_path = ["static"]
 html_css_files = ["denseface.css"]
 html_copy_source = html_show_sourcelink = False

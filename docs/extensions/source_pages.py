@@ -72,6 +72,8 @@ class PageLinks(SphinxPostTransform):
             if node["reftype"] != "myst":
                 continue
             here, target = node.get("refdoc", self.env.docname), node["reftarget"]
+            if Path(target).is_absolute():  # a page that is none of these
+                target = f"{Path(target).relative_to(_ROOT).as_posix()}.md"
             if page := _PAGES.get(target):
                 there = self.app.builder.get_relative_uri(here, page)
                 node.replace_self(

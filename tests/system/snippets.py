@@ -12,9 +12,19 @@ from typing import NamedTuple
 
 from markdown_it import MarkdownIt
 
-from tests.system.running import PACE
+from tests.system.running import PACE, REPOSITORY
 
-__all__ = ["Snippet", "reader", "run_all", "snippets"]
+__all__ = ["CONSOLES", "HOW_TOS", "PAGES", "SESSION", "Snippet", "reader", "run_all", "snippets"]
+
+PAGES = ("README.md", "CONTRIBUTING.md", "docs/kiosk.md", "docs/operating.md")
+"""Run as shell and Python, by `test_pages`."""
+HOW_TOS = tuple(sorted(
+    path.relative_to(REPOSITORY).as_posix() for path in (REPOSITORY / "docs/howto").glob("*.md")))
+"""Run in a copy of the code, by `test_pages`."""
+CONSOLES = ("docs/first-hour.md",)
+"""Typed, and compared with what they show, by `test_first_hour`."""
+SESSION = "docs/python.md"
+"""Run as one notebook, by `test_service`."""
 
 _NOT_RUN = "<!-- not run: "
 _FILE = "<!-- file: "

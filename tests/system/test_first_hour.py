@@ -33,13 +33,6 @@ def test_the_first_hour_is_as_the_page_shows_it():
     assert not other, "\n".join(["printed otherwise than shown:", *other])
 
 
-def test_blocks_of_the_page_are_run_or_say_why_not():
-    for block in snippets(PAGE):
-        assert block.language in ("console", "python"), f"{PAGE.name}:{block.line}"
-        assert block.language == "console" or block.file
-        assert block.reason == "" or len(block.reason) > 10
-
-
 @pytest.mark.parametrize(("shown", "printed", "same"), [
     ("16,123 points, 0.5 mm\n", "9 points, 1,000.25 mm\n", True),
     ("16,123 points\n", "no points\n", False),

@@ -21,7 +21,7 @@ from denseface.service.errors import (
 from denseface.service.export import load_face
 from tests.ports import free_port
 from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, service, sockets
-from tests.system.snippets import snippets
+from tests.system.snippets import SESSION, snippets
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.process import environment, play
 from tests.waiting import LIMIT_S, until
@@ -56,11 +56,11 @@ def test_the_python_page_is_one_session(running, tmp_path, monkeypatch):
     monkeypatch.setenv("DENSEFACE_ADDRESS", running.address)
     (tmp_path / "fixtures").symlink_to(REPOSITORY / "fixtures")
     session = {"__name__": "notebook"}
-    for block in snippets(REPOSITORY / "docs/python.md"):
+    for block in snippets(REPOSITORY / SESSION):
         assert block.language == "python"
         if not block.reason:
             code = "\n" * block.line + block.text
-            exec(compile(code, "docs/python.md", "exec"), session)  # noqa: S102
+            exec(compile(code, SESSION, "exec"), session)  # noqa: S102
     assert repr(session["frame"]).startswith("<RgbdFrame: depth 640x480")
     assert len(session["again"].initial) == len(load_face("face.npz").initial)
     assert len(list((tmp_path / "faces").glob("*.ply"))) == 1
