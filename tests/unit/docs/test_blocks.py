@@ -80,7 +80,7 @@ def test_the_key_that_is_shown_is_one(tmp_path):
     path = tmp_path / "bench2.secret"
     path.write_text(json_of("docs/wire.md"))
     path.chmod(0o600)
-    assert len(read_pair(path).public_key) == 40
+    assert len(read_pair(path).public) == 40
 
 
 def test_no_other_page_shows_json_that_nobody_reads():
