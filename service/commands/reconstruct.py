@@ -2,15 +2,12 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from denseface.service.commands import _options
+from denseface.service.commands._options import reading
 from denseface.service.export import FORMATS
 from denseface.service.runtime.collection import collect_from_now_on
 from denseface.service.runtime.terminal import say
-
-if TYPE_CHECKING:
-    from denseface.service.tools.frames import FrameChoice
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,19 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                        help="a face of each frame, NAME_0000 and so on")
     parser.add_argument("--frames", type=_options.burst, default=1, metavar="N",
                         help="average the depth of N frames from there on (default: 1)")
-    parser.add_argument("--depth", type=Path, metavar="D.png",
-                        help="instead of INPUT: a depth image, .png .tiff .exr or .npy")
-    parser.add_argument("--color", type=Path, metavar="C.png",
-                        help="its colour image, .png .jpg .webp or .npy")
-    parser.add_argument("--unit", metavar="UNIT",
-                        help="what 1 stands for in a depth image: mm, 100um, 0.2mm (TUM RGB-D) or "
-                             "m (default: guessed where only one makes sense)")
-    parser.add_argument("--registered", choices=("yes", "no", "auto"), default="auto",
-                        help="whether a depth image is in the colour image's pixels "
-                             "(default: auto)")
-    parser.add_argument("--rounding", choices=("cut", "round", "none"),
-                        help="how a depth image's depth became a whole number: cut, as "
-                             "PrimeSense's drivers do (default: round)")
+    reading.add_pair(parser)
     *endings, last = FORMATS
     parser.add_argument("-o", "--output", metavar="OUT|DIR/",
                         help=f"write the face: {' '.join(endings)} or {last}; into a folder as "
@@ -49,9 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "what looked like one")
     parser.add_argument("--table", type=Path, metavar="T.csv",
                         help="write the table of the faces, of one INPUT too")
-    parser.add_argument("--calibration", type=Path, metavar="FILE",
-                        help="calibration that wins over the file's own: JSON, or OpenCV's or "
-                             "ROS's YAML")
+    reading.add_calibration(parser)
     _options.add_rotation(parser)
     _options.add_recon(parser)
 
@@ -62,7 +45,9 @@ def run(args: argparse.Namespace) -> int:
     from denseface.service.tools.reconstruction.outputs import Outputs
 
     _check(args)
-    settings, choice = _options.recon_settings(args), _choice(args)
+    settings = _options.recon_settings(args)
+    choice = reading.frame_choice(
+        args, _options.service_settings(args).max_frame_pixels, args.frames)
     outputs = Outputs(args.output, args.report, args.rendering,
                       f".{args.format}" if args.format else None, args.table)
     inputs = find_inputs(args.inputs)
@@ -110,22 +95,3 @@ def _check(args: argparse.Namespace) -> None:
     if args.all_frames and args.frames > 1:
         raise UsageError("--frames is given with --all-frames: each frame becomes a face of its "
                          "own")
-
-
-def _choice(args: argparse.Namespace) -> "FrameChoice":
-    """Read how frames are to be read."""
-    from denseface.capture import DepthRounding
-    from denseface.capture.image_pair import PairReading, parse_unit
-    from denseface.service.errors import UsageError
-    from denseface.service.tools.frames import FrameChoice
-
-    try:
-        unit_mm = parse_unit(args.unit) if args.unit else None
-    except ValueError as error:
-        raise UsageError(f"--unit {error}") from error
-    registered = None if args.registered == "auto" else args.registered == "yes"
-    said = unit_mm is not None or registered is not None or args.rounding is not None
-    reading = PairReading(unit_mm, registered,
-                          rounding=DepthRounding(args.rounding or DepthRounding.ROUND))
-    return FrameChoice(_options.service_settings(args).max_frame_pixels, args.calibration,
-                       reading if said else None, args.rotate, args.frames)
