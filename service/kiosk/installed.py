@@ -12,12 +12,12 @@ LANGUAGES = Path(__file__).parent / "languages"
 _PACKAGES = ("starlette", "uvicorn", "websockets")
 
 
-def why_not() -> str | None:
-    """Say in one line what is missing; None where nothing is."""
+def why_not(what: str = "kiosk") -> str | None:
+    """Say in one line what is missing for a page, called `what`; None where nothing is."""
     if missing := [name for name in _PACKAGES if find_spec(name) is None]:
-        return (f"no kiosk: {missing[0]} is not installed; pip install 'denseface-core[kiosk]' "
+        return (f"no {what}: {missing[0]} is not installed; pip install 'denseface-core[kiosk]' "
                 "brings what it needs")
     if not (STATIC / "kiosk.js").is_file():
-        return ("no kiosk: its page is not built; npm ci --ignore-scripts && node build.mjs in "
+        return (f"no {what}: its page is not built; npm ci --ignore-scripts && node build.mjs in "
                 "service/kiosk/frontend builds it")
     return None

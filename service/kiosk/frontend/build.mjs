@@ -13,6 +13,8 @@ const ENTRY_POINTS = [
   { in: "src/style.css", out: "kiosk" },
   { in: "src/operator.ts", out: "operator" },
   { in: "src/operator.css", out: "operator" },
+  { in: "src/view.ts", out: "view" },
+  { in: "src/view.css", out: "view" },
 ].filter((one) => existsSync(one.in));
 
 /** The packages of which at least a byte is in the bundle, sorted. */
@@ -45,6 +47,9 @@ async function bundle() {
     outdir: STATIC,
     bundle: true,
     format: "esm",
+    // The viewer is in two pages.
+    splitting: true,
+    chunkNames: "shared-[hash]",
     target: "es2022",
     minify: true,
     sourcemap: false,

@@ -48,7 +48,7 @@ def outcome(capfd, *arguments):
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
-    (["fly"], "unknown command 'fly', expected reconstruct, doctor, "),
+    (["fly"], "unknown command 'fly', expected reconstruct, "),
     (["reconstruct"], "expected INPUT or --depth, found neither"),
     (["reconstruct", "{tmp}/no.npz"], "no.npz"),
     (["reconstruct", "{tmp}/no.oni"], "no.oni"),

@@ -46,7 +46,7 @@ def _place(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(("arguments", "status", "line"), [
-    (["fly"], 2, "unknown command 'fly', expected reconstruct, doctor, "),
+    (["fly"], 2, "unknown command 'fly', expected reconstruct, "),
     (["statsu"], 2, "unknown command 'statsu'; did you mean status? (see denseface --help)"),
     (["--x"], 2, "denseface: unknown flag --x (see denseface --help)"),
     (["status", "--helpp"], 2, "unknown flag --helpp; did you mean --help? (see denseface status"),
@@ -84,6 +84,23 @@ def _place(tmp_path, monkeypatch):
     (["reconstruct", "e.npz", "--rotate", "91"], 2, "expected 0, 90, 180 or 270, found '91'"),
     (["reconstruct", "e.npz", "--rotate", "up"], 2, "--rotate: "),
     (["reconstruct", "--depth", "p", "--color", "p"], 2, "p: Not a regular file"),
+
+    (["view"], 2, "expected FILE or ID, --last or --depth"),
+    (["view", ""], 2, "FILE|ID: expected a word, found ''"),
+    (["view", "f"], 2, f"f: {KIND}"),
+    (["view", "p"], 2, f"p: {KIND}"),
+    (["view", "d"], 2, "d: "),
+    (["view", "e.npz"], 2, "e.npz: no .npz file, or one that is damaged or cut short"),
+    (["view", "e.oni"], 2, "e.oni: "),
+    (["view", "none.ply"], 2, "none.ply: "),
+    (["view", "openni2:"], 2, "openni2:: expected a .npz or .oni file or a folder"),
+    (["view", "x", "--address", "ftp://x"], 2, "ftp://x: expected ipc://PATH or tcp://HOST:PORT"),
+    (["view", "e.npz", "--port", "65536"], 2, "--port: expected a whole number from 0 to 65535"),
+    (["view", "e.npz", "--frame", "-1"], 2, f"--frame: {WHOLE}0, found '-1'"),
+    (["view", "e.npz", "--color", "f"], 2, "--color is given without --depth"),
+    (["view", "e.npz", "--unit", "ell"], 2, "--unit "),
+    (["view", "e.npz", "--save", "x.ply"], 2, "x.ply: expected a name that ends in .rrd"),
+    (["view", "e.npz", "--preset", "x"], 2, "--preset: expected 'paper', 'faithful' or 'best'"),
 
     (["calibrate"], 2, "required: --infrared, --color, --square"),
     (["calibrate", "--infrared", "d", "--color", "d", *BOARD], 2, "d: no images (.jpeg"),

@@ -46,7 +46,7 @@ const position = fields({
   with_warnings: or(flag, false),
 });
 
-const measurement = fields({ name: text, value_mm: real, low_mm: real, high_mm: real });
+export const measurement = fields({ name: text, value_mm: real, low_mm: real, high_mm: real });
 
 const result = fields({
   capture_id: text,

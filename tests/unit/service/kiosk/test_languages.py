@@ -101,7 +101,8 @@ def test_every_key_that_the_page_asks_for_exists():
 def test_no_text_stands_in_the_code():
     """Two words in a row between quotes are a text; errors are for whoever reads the console."""
     texts = []
-    for path in SOURCES.rglob("*.ts"):
+    english = SOURCES / "view" / "words.ts"  # of a page that is a tool's, and no visitor's
+    for path in set(SOURCES.rglob("*.ts")) - {english}:
         for line in path.read_text().splitlines():
             if re.match(r"\s*(\*|/\*|//)", line) or re.search(
                     r"Error\(|warn\(|complain\(|wrong\(|class:|class |className|font", line):

@@ -16,13 +16,18 @@ function row(measured: Measurement, texts: Texts): HTMLElement {
       html("small", {}, texts.t("result.interval", values))));
 }
 
+/** A table of lengths. */
+export function lengths(given: readonly Measurement[], texts: Texts): HTMLElement {
+  return html("dl", {}, ...given.map((each) => row(each, texts)));
+}
+
 /** A panel over the face and the button that opens it. */
 export function measurements(
   given: readonly Measurement[], texts: Texts,
 ): { readonly toggle: HTMLElement; readonly panel: HTMLElement; close(): boolean } {
   const panel = html("div", { class: "measurements", id: "measurements", hidden: true },
     html("h2", {}, texts.t("result.measurements")),
-    html("dl", {}, ...given.map((each) => row(each, texts))));
+    lengths(given, texts));
   const open = (opened: boolean): void => {
     set(panel, { hidden: !opened });
     set(toggle, { "aria-expanded": String(opened) });

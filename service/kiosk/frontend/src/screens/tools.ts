@@ -1,15 +1,19 @@
 /** What can be done with a face: each gesture has its button. */
 import { button, html, set } from "../dom.ts";
-import type { FaceStage } from "../face_stage.ts";
 import type { IconName } from "../icons.ts";
 import type { Texts } from "../i18n.ts";
-import { drawSigmaScale, type Mode, sigmaLegend } from "../viewer/viewer.ts";
+import { drawSigmaScale, type FaceViewer, type Mode, sigmaLegend } from "../viewer/viewer.ts";
+
+/** What shows a face. */
+export interface Shows {
+  readonly viewer: Pick<FaceViewer, "rotate" | "zoom" | "reset" | "blend" | "mode">;
+}
 
 /** Of one press of a button: a turn in degrees, and a factor. */
 const STEP = 15;
 const CLOSER = 1.25;
 
-const MOVES: readonly (readonly [string, IconName, (face: FaceStage) => void])[] = [
+const MOVES: readonly (readonly [string, IconName, (face: Shows) => void])[] = [
   ["turn_left", "turnLeft", (face) => face.viewer.rotate(-STEP, 0)],
   ["turn_right", "turnRight", (face) => face.viewer.rotate(STEP, 0)],
   ["turn_up", "turnUp", (face) => face.viewer.rotate(0, -STEP)],
@@ -25,14 +29,14 @@ const KEYS: Readonly<Record<string, string>> = {
 };
 
 /** What a key does with the face; gives whether it did something. */
-export function turnByKey(face: FaceStage, key: string): boolean {
+export function turnByKey(face: Shows, key: string): boolean {
   const move = MOVES.find(([name]) => name === KEYS[key]);
   move?.[2](face);
   return move !== undefined;
 }
 
 /** Turn, come closer, begin anew. */
-export function moves(face: FaceStage, { t }: Texts): HTMLElement {
+export function moves(face: Shows, { t }: Texts): HTMLElement {
   return html("div", { class: "moves", role: "group", "aria-label": t("view.move"), dir: "ltr" },
     ...MOVES.map(([name, picture, move]) => button({
       action: name, label: t(`view.${name}`), icon: picture, look: "tool", repeats: true,
@@ -41,7 +45,7 @@ export function moves(face: FaceStage, { t }: Texts): HTMLElement {
 }
 
 /** From what the sensor measured to the dense face: a slider with a button at each end. */
-export function beforeAfter(face: FaceStage, { t }: Texts): HTMLElement {
+export function beforeAfter(face: Shows, { t }: Texts): HTMLElement {
   const slider = html("input", {
     type: "range", min: 0, max: 100, value: 100, "data-action": "blend",
     "aria-label": t("view.before_after"),
@@ -63,7 +67,7 @@ export function beforeAfter(face: FaceStage, { t }: Texts): HTMLElement {
 const MODES: readonly Mode[] = ["mesh", "points", "sigma"];
 
 /** Mesh, points or confidence, and the legend of the last. */
-export function modes(face: FaceStage, texts: Texts): HTMLElement {
+export function modes(face: Shows, texts: Texts): HTMLElement {
   const { t } = texts;
   const legend = legendOf(texts);
   const buttons = MODES.map((mode) => button({

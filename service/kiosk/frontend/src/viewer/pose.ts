@@ -15,6 +15,8 @@ export interface View {
 
 const MAX_YAW = 75;
 const MAX_PITCH = 50;
+/** Where a shape may be looked at from everywhere: over its top one is lost. */
+const FREE_PITCH = 89;
 const MIN_ZOOM = 0.7;
 const MAX_ZOOM = 6;
 /** Greatest angle and time of a whole swing of the pendulum: a face has no back to turn to. */
@@ -37,12 +39,17 @@ export class Pose {
   readonly view: View = { yaw: 0, pitch: 0, zoom: 1, panX: 0, panY: 0 };
   readonly #wanted: View = { ...this.view };
   readonly #still: boolean;
+  readonly #free: boolean;
   #turning = false;
   #phase = 0;
 
-  /** @param still whether what is asked for is shown at once, and nothing turns by itself. */
-  constructor(still: boolean) {
+  /**
+   * @param still whether what is asked for is shown at once, and nothing turns by itself.
+   * @param free whether it may be looked at from all sides.
+   */
+  constructor(still: boolean, free = false) {
     this.#still = still;
+    this.#free = free;
   }
 
   get turning(): boolean {
@@ -79,9 +86,16 @@ export class Pose {
     this.#want({ ...wanted, panX: wanted.panX + x, panY: wanted.panY + y }, direct);
   }
 
+  /** Takes another one's view, at once. */
+  take(view: View): void {
+    this.#want(view, true);
+  }
+
   /** Back to the front view; at once for a new face. */
   reset(direct = false): void {
     this.#phase = 0;
+    // The short way, after however many turns.
+    this.view.yaw -= 360 * Math.round(this.view.yaw / 360);
     this.#want({ yaw: 0, pitch: 0, zoom: 1, panX: 0, panY: 0 }, direct);
   }
 
@@ -112,13 +126,17 @@ export class Pose {
     return moving;
   }
 
+  get #most(): number {
+    return this.#free ? FREE_PITCH : MAX_PITCH;
+  }
+
   #want(view: View, direct = false): void {
     const zoom = clamp(view.zoom, MIN_ZOOM, MAX_ZOOM);
     // All of the face is in sight at zoom 1; nearer, its rim may come to the middle.
     const reach = Math.max(0, 1 - 1 / zoom);
     Object.assign(this.#wanted, {
-      yaw: clamp(view.yaw, -MAX_YAW, MAX_YAW),
-      pitch: clamp(view.pitch, -MAX_PITCH, MAX_PITCH),
+      yaw: this.#free ? view.yaw : clamp(view.yaw, -MAX_YAW, MAX_YAW),
+      pitch: clamp(view.pitch, -this.#most, this.#most),
       zoom,
       panX: clamp(view.panX, -reach, reach),
       panY: clamp(view.panY, -reach, reach),

@@ -1,16 +1,16 @@
-/** A face in WebGL: surface, dots and initial cloud, drawn from a view. */
+/** A face or a mesh in WebGL: surface, dots and initial cloud, drawn from a view. */
 
 import {
-  BufferAttribute, BufferGeometry, DataTexture, DoubleSide, Group, LinearFilter, Mesh,
-  PerspectiveCamera, Points, Scene, ShaderMaterial, Vector2, WebGLRenderer,
+  type BufferGeometry, DataTexture, DoubleSide, Group, LinearFilter, Mesh, PerspectiveCamera, Points,
+  Scene, ShaderMaterial, Vector2, WebGLRenderer,
 } from "three";
 
-import type { FaceGrid } from "../face_grid.ts";
 import type { Mode } from "./flat.ts";
+import { load, type Loaded, type Shape } from "./loaded.ts";
 import type { View } from "./pose.ts";
 import { dotFragment, dotVertex, screenVertex, surfaceFragment, surfaceVertex } from "./shaders.ts";
 import { sigmaColor, sigmaPosition } from "./sigma_scale.ts";
-import { thinned, toSurface, triangulate, type Surface } from "./surface.ts";
+import type { Surface } from "./surface.ts";
 
 /** What is drawn of a face. */
 export interface Shown {
@@ -86,14 +86,14 @@ export class Stage {
     this.#aspect = width / height;
   }
 
-  /** Takes another face, or none. */
-  load(face: FaceGrid | null): void {
+  /** Takes another face or mesh, or none. */
+  load(shape: Shape | null): void {
     this.#loaded?.dispose();
     this.#turned.clear();
     this.#loaded = null;
-    if (!face) return;
-    this.#loaded = new Loaded(face);
-    const [low, high] = face.sigmaMm;
+    if (!shape) return;
+    this.#loaded = load(shape);
+    const [low, high] = this.#loaded.sigmaMm;
     this.#sigma.sigmaCodes.value.set(sigmaPosition(low), sigmaPosition(high));
   }
 
@@ -124,8 +124,8 @@ export class Stage {
     }
     if (at < 1) {
       this.#within(at * width, (1 - at) * width, height);
-      this.#seedMaterial.uniforms["diameter"]!.value = SEED_SIZE * this.#loaded.face.spacingMm;
-      this.#draw(this.#points, this.#loaded.seeds, this.#seedMaterial);
+      this.#seedMaterial.uniforms["diameter"]!.value = SEED_SIZE * this.#loaded.spacingMm;
+      if (this.#loaded.seeds) this.#draw(this.#points, this.#loaded.seeds, this.#seedMaterial);
     }
     if (at <= 0 || at >= 1) return null;
     const [bottom, top] = this.#faceHeight(shown, this.#loaded.surface);
@@ -156,16 +156,18 @@ export class Stage {
   }
 
   #drawDense({ mode, stride }: Shown, loaded: Loaded): void {
-    if (mode !== "points") {
+    if (mode !== "points" && loaded.meshed) {
       this.#draw(this.#mesh, loaded.mesh(stride), this.#surfaceMaterial);
       return;
     }
-    const { face, surface } = loaded;
+    const { stepMm, surface } = loaded;
     const distance = this.#camera.position.z - surface.halfSize[2];
-    const pixels = face.stepMm * this.#focal.value / distance;
+    const pixels = stepMm * this.#focal.value / distance;
     const every = Math.max(1, Math.round(DOT_DISTANCE_PX / pixels));
-    this.#dotMaterial.uniforms["diameter"]!.value = DOT_SIZE * every * face.stepMm;
-    this.#draw(this.#mesh, loaded.mesh(Math.max(2, stride)), this.#screenMaterial);
+    this.#dotMaterial.uniforms["diameter"]!.value = DOT_SIZE * every * stepMm;
+    if (loaded.meshed) {
+      this.#draw(this.#mesh, loaded.mesh(Math.max(2, stride)), this.#screenMaterial);
+    }
     this.#draw(this.#points, loaded.dots(every), this.#dotMaterial);
   }
 
@@ -189,6 +191,9 @@ export class Stage {
     camera.aspect = this.#aspect;
     camera.zoom = view.zoom;
     camera.position.set(-view.panX * halfWidth, view.panY * halfHeight, fit + halfDepth);
+    // Of a room or a coin, too.
+    camera.near = Math.min(NEAR_MM, fit / 20);
+    camera.far = Math.max(FAR_MM, 4 * (fit + halfDepth));
     camera.updateProjectionMatrix();
     this.#turned.rotation.set(view.pitch * Math.PI / 180, view.yaw * Math.PI / 180, 0);
     const { height } = this.renderer.getDrawingBufferSize(new Vector2());
@@ -215,76 +220,6 @@ export class Stage {
     this.renderer.setScissorTest(true);
     this.renderer.setScissor(left, bottom, width, height);
   }
-}
-
-/** The buffers of one face; what is coarser shares the vertices. */
-class Loaded {
-  readonly face: FaceGrid;
-  readonly surface: Surface;
-  readonly seeds: BufferGeometry;
-  readonly #attributes: Record<string, BufferAttribute>;
-  readonly #meshes = new Map<number, BufferGeometry>();
-  readonly #dots = new Map<number, BufferGeometry>();
-
-  constructor(face: FaceGrid) {
-    this.face = face;
-    this.surface = toSurface(face);
-    this.#attributes = {
-      position: new BufferAttribute(this.surface.positions, 3),
-      bearing: new BufferAttribute(this.surface.normals, 4, true),
-      tint: new BufferAttribute(face.colors, 4, true),
-    };
-    this.seeds = toSeeds(face, this.surface);
-  }
-
-  /** The triangles of every `stride`-th row and column. */
-  mesh(stride: number): BufferGeometry {
-    return this.#kept(this.#meshes, stride, () => triangulate(this.face, stride));
-  }
-
-  /** The points of every `stride`-th row and column. */
-  dots(stride: number): BufferGeometry {
-    return this.#kept(this.#dots, stride, () => thinned(this.face, stride));
-  }
-
-  dispose(): void {
-    for (const geometry of [...this.#meshes.values(), ...this.#dots.values(), this.seeds]) {
-      geometry.dispose();
-    }
-  }
-
-  #kept(
-    all: Map<number, BufferGeometry>, stride: number, make: () => Uint32Array,
-  ): BufferGeometry {
-    let geometry = all.get(stride);
-    if (!geometry) {
-      geometry = new BufferGeometry();
-      for (const [name, attribute] of Object.entries(this.#attributes)) {
-        geometry.setAttribute(name, attribute);
-      }
-      geometry.setIndex(new BufferAttribute(make(), 1));
-      all.set(stride, geometry);
-    }
-    return geometry;
-  }
-}
-
-function toSeeds({ seeds }: FaceGrid, { origin: [x, y, z] }: Surface): BufferGeometry {
-  const positions = new Float32Array(3 * seeds.points);
-  const tints = new Uint8Array(4 * seeds.points);
-  const bearings = new Int8Array(4 * seeds.points);
-  for (let point = 0; point < seeds.points; point++) {
-    positions[3 * point] = seeds.positions[3 * point]! - x;
-    positions[3 * point + 1] = y - seeds.positions[3 * point + 1]!;
-    positions[3 * point + 2] = z - seeds.positions[3 * point + 2]!;
-    tints.set(seeds.colors.subarray(3 * point, 3 * point + 3), 4 * point);
-    bearings[4 * point + 2] = 127;
-  }
-  const geometry = new BufferGeometry();
-  geometry.setAttribute("position", new BufferAttribute(positions, 3));
-  geometry.setAttribute("bearing", new BufferAttribute(bearings, 4, true));
-  geometry.setAttribute("tint", new BufferAttribute(tints, 4, true));
-  return geometry;
 }
 
 function dotMaterial(

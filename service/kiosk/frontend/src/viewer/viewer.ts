@@ -1,21 +1,25 @@
 /** A face to be looked at: turns by itself until touched, is turned, brought nearer and compared. */
 
-import type { FaceGrid } from "../face_grid.ts";
 import { Detail, pixelRatio } from "./detail.ts";
 import { drawFlat, type Mode } from "./flat.ts";
 import { listen } from "./gestures.ts";
 import { drawn, openGraphics, type Graphics } from "./graphics.ts";
-import { Pose } from "./pose.ts";
+import { isMesh, type Shape } from "./loaded.ts";
+import { Pose, type View } from "./pose.ts";
 import { SIGMA_RANGE_MM } from "./sigma_scale.ts";
 import { Stage } from "./stage.ts";
 
 export { drawSigmaScale, sigmaLegend, type LegendMark } from "./sigma_scale.ts";
 export type { Mode } from "./flat.ts";
+export type { Shape } from "./loaded.ts";
+export type { View } from "./pose.ts";
 
 /** How a viewer is to behave. */
 export interface ViewerOptions {
   /** Nothing moves by itself, and what is asked for is shown at once. */
   readonly reducedMotion: boolean;
+  /** It may be looked at from all sides, and not from the front alone. */
+  readonly free?: boolean;
   /** Called where there is no WebGL: the face is a picture that cannot be turned. */
   readonly onFlat?: () => void;
 }
@@ -44,6 +48,8 @@ export class FaceViewer {
   /** Called after each drawing where the line between dense and initial cloud is, as a part of the
    * canvas's width; null where there is none. */
   onSplit: ((at: number | null) => void) | null = null;
+  /** Called when the view has changed, but not by `look`. */
+  onView: ((view: View) => void) | null = null;
   /** Sigma at the ends of the colours' scale, mm. */
   readonly sigmaRange = SIGMA_RANGE_MM;
   readonly #canvas: HTMLCanvasElement;
@@ -54,7 +60,7 @@ export class FaceViewer {
   readonly #pose: Pose;
   readonly #detail: Detail;
   readonly #ended = new AbortController();
-  #face: FaceGrid | null = null;
+  #face: Shape | null = null;
   #mode: Mode = "mesh";
   #blend = 1;
   #confidence = 0;
@@ -62,11 +68,13 @@ export class FaceViewer {
   #settle: ReturnType<typeof setTimeout> | undefined;
   #last = 0;
   #ratio = 0;
+  /** Whether the next view is this viewer's own. */
+  #told = false;
 
-  constructor(canvas: HTMLCanvasElement, { reducedMotion, onFlat }: ViewerOptions) {
+  constructor(canvas: HTMLCanvasElement, { reducedMotion, free, onFlat }: ViewerOptions) {
     this.#canvas = canvas;
     this.#still = reducedMotion;
-    this.#pose = new Pose(reducedMotion);
+    this.#pose = new Pose(reducedMotion, free);
     this.#graphics = openGraphics(canvas);
     this.#detail = new Detail(this.#graphics?.software ?? true);
     this.#stage = this.#graphics && new Stage(canvas, this.#graphics.context);
@@ -115,13 +123,14 @@ export class FaceViewer {
   }
 
   /**
-   * Shows another face from the front.
+   * Shows another face from the front, or as the one before was seen.
    *
+   * @param keep whether the view stays.
    * @returns a promise of whether it was drawn: false where another one came first, or the end.
    */
-  async show(face: FaceGrid): Promise<boolean> {
+  async show(face: Shape, keep = false): Promise<boolean> {
     this.#face = face;
-    this.#pose.reset(true);
+    if (!keep) this.#pose.reset(true);
     this.#stage?.load(face);
     for (;;) {
       // What comes first is as coarse as what moves: the rest follows.
@@ -154,6 +163,18 @@ export class FaceViewer {
   /** Shows the face from the front again, all of it; it turns no more by itself. */
   reset(): void {
     this.#moved(() => this.#pose.reset());
+  }
+
+  /** Takes another viewer's view, at once. */
+  look(view: View): void {
+    this.#pose.turning = false;
+    this.#pose.take(view);
+    this.#request();
+  }
+
+  /** Draws all of what is seen, to be taken from the canvas in the same task. */
+  redraw(): void {
+    this.#draw(true);
   }
 
   /** To be called when the canvas's size in CSS pixels has changed. */
@@ -209,6 +230,7 @@ export class FaceViewer {
   #moved(change: () => void): void {
     this.#pose.turning = false;
     change();
+    this.#told = true;
     this.#request();
   }
 
@@ -236,6 +258,8 @@ export class FaceViewer {
     if (elapsed) this.#detail.took(elapsed);
     const seconds = Math.min(MAX_STEP_S, (elapsed || 16) / 1000);
     const moving = this.#pose.step(seconds) && !this.#flat;  // a flat picture is of the front
+    if (this.#told) this.onView?.(this.#pose.view);
+    this.#told = moving;
     const fading = this.#fade(seconds);
     this.#draw(false);
     if (moving || fading) {
@@ -266,7 +290,7 @@ export class FaceViewer {
     if (this.#flat) {
       this.#canvas.width = Math.round(width * ratio);
       this.#canvas.height = Math.round(height * ratio);
-      drawFlat(this.#flat, this.#face, this.#mode, this.#blend);
+      if (!isMesh(this.#face)) drawFlat(this.#flat, this.#face, this.#mode, this.#blend);
       this.onSplit?.(null);
       return;
     }

@@ -74,3 +74,20 @@ test("reset goes back smoothly and arrives", () => {
   settle(pose);
   assert.deepEqual({ ...pose.view }, { yaw: 0, pitch: 0, zoom: 1, panX: 0, panY: 0 });
 });
+
+test("where all sides may be seen it turns round, and back to the front the short way", () => {
+  const pose = new Pose(false, true);
+  pose.rotate(3 * 360 + 170, 300);
+  settle(pose);
+  assert.deepEqual([pose.view.yaw, pose.view.pitch], [3 * 360 + 170, 89]);
+  pose.reset();
+  pose.step(1 / 60);
+  assert.ok(pose.view.yaw > 0 && pose.view.yaw < 170);
+});
+
+test("it takes another one's view at once", () => {
+  const pose = new Pose(false);
+  pose.take({ yaw: 20, pitch: -10, zoom: 2, panX: 0.1, panY: -0.1 });
+  assert.deepEqual(pose.view, { yaw: 20, pitch: -10, zoom: 2, panX: 0.1, panY: -0.1 });
+  assert.equal(pose.step(1 / 60), false);
+});
