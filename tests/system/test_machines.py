@@ -149,6 +149,17 @@ def _press_and_check(
 
 
 @pytest.mark.parametrize("machines", ["loopback"], indirect=True)
+def test_the_program_in_javascript_says_that_its_key_is_refused(machines, tmp_path):
+    guarded, _, hub_key = machines.guarded
+    stranger, _ = new_pair(tmp_path / "keys", "stranger")
+    done = subprocess.run(
+        [*program("javascript", tmp_path), guarded, str(stranger), str(hub_key)], check=False,
+        capture_output=True, text=True, timeout=LIMIT_S)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == f"{guarded}: the hub refuses this key\n"
+
+
+@pytest.mark.parametrize("machines", ["loopback"], indirect=True)
 def test_faces_are_handed_on_to_rerun_mcap_and_ros_2(machines, tmp_path, monkeypatch):
     """Each of the examples gets the last face, in this process, which has imported so much."""
     monkeypatch.setenv("DENSEFACE_ADDRESS", machines.local)

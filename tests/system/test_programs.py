@@ -58,8 +58,8 @@ def served(
     Parameters
     ----------
     answers : for each kind of request the answers, one after another, the last one repeated; ids
-        and numbers become those of the request
-    published : what is published where `get_next` found nothing newer
+        and numbers become those of the request. An empty one is lost
+    published : what is published, once, where `get_next` found nothing newer
     """
     heard: list[str] = []
     pressed = ""
@@ -78,7 +78,10 @@ def served(
                 heard.append(request["kind"])
                 pressed = request.get("capture_id", pressed)
                 given = answers[request["kind"]]
-                header, *arrays = given[min(heard.count(request["kind"]), len(given)) - 1]
+                answer = given[min(heard.count(request["kind"]), len(given)) - 1]
+                if not answer:
+                    continue
+                header, *arrays = answer
                 router.send_multipart([peer, changed(
                     header, request=request["request"], capture_id=pressed), *arrays])
                 if published and json.loads(header)["kind"] == "nothing_newer":
@@ -86,7 +89,8 @@ def served(
                     assert publisher.recv() == b"\x01faces"
                     topic, header, *arrays = published
                     publisher.send_multipart(
-                        [topic, changed(header, capture_id=pressed, sequence=43), *arrays])
+                        [topic, changed(header, capture_id=pressed), *arrays])
+                    published = None
             out, err = process.communicate()
     written = [np.loadtxt(path, ndmin=2) for path in folder.glob("*.xyz")]
     return Ended(process.returncode, out, err, written[0] if written else None, heard)
@@ -110,10 +114,20 @@ def check_vector(points: np.ndarray | None) -> None:
     assert np.array_equal(points[:, 6].astype(np.float32), np.float32(dense["sigma"]))
 
 
-def test_a_face_that_is_published_is_that_of_the_vector(command, tmp_path):
-    ended = served(command, tmp_path, USUAL, vector("face_done"))
+@pytest.mark.parametrize(("number", "asked"), [(43, 1), (44, 2)], ids=["next", "after a gap"])
+def test_a_face_that_is_published_is_that_of_the_vector(command, tmp_path, number, asked):
+    topic, header, *arrays = vector("face_done")
+    ended = served(command, tmp_path, USUAL, [topic, changed(header, sequence=number), *arrays])
     assert (ended.status, ended.err) == (0, "")
-    assert ended.heard == ["find_start", "press", "get_next"]
+    assert ended.heard == ["find_start", "press", *["get_next"] * asked]
+    check_vector(ended.points)
+
+
+def test_a_request_whose_answer_is_lost_is_said_again(command, tmp_path):
+    ended = served(command, tmp_path, USUAL | {
+        "press": [[], vector("press_accepted")], "get_next": [vector("face_done.answer")]})
+    assert (ended.status, ended.err) == (0, "")
+    assert ended.heard == ["find_start", "press", "press", "get_next"]
     check_vector(ended.points)
 
 

@@ -60,23 +60,27 @@ def test_no_service_is_not_no_vulnerability(audit, monkeypatch):
     assert audit.vulnerabilities() is None
 
 
-_OF_THE_FRONT_END = json.dumps({"vulnerabilities": {
+_OF_NPM = json.dumps({"vulnerabilities": {
     "a": {"range": "<2", "via": [{"url": "https://example.org/V-1"}]},
     "b": {"range": "*", "via": ["a"]}}})
+_NOTHING = json.dumps({"vulnerabilities": {}})
 
 
-@pytest.mark.parametrize(("answer", "known"), [
-    (_OF_THE_FRONT_END, ["a <2: https://example.org/V-1"]),
-    (json.dumps({"vulnerabilities": {}}), []),
-    (json.dumps({"message": "405 Method Not Allowed"}), None),
-    ("", None),
+@pytest.mark.parametrize(("answers", "known"), [
+    ((_OF_NPM, _NOTHING), ["a <2: https://example.org/V-1"]),
+    ((_NOTHING, _OF_NPM), ["a <2: https://example.org/V-1"]),
+    ((_NOTHING, _NOTHING), []),
+    ((json.dumps({"message": "405 Method Not Allowed"}),), None),
+    ((_OF_NPM, ""), None),
 ])
-def test_of_the_front_end_too(audit, monkeypatch, answer, known):
-    _answering(monkeypatch, answer)
-    assert audit.frontend_vulnerabilities() == known
+def test_of_npms_packages_too(audit, monkeypatch, answers, known):
+    left = _answering(monkeypatch, *answers)
+    assert audit.npm_vulnerabilities() == known
+    assert not left
 
 
-def test_the_front_ends_packages_have_licences_that_are_allowed(audit):
-    licences = audit.frontend_licences()
+def test_npms_packages_have_licences_that_are_allowed(audit):
+    licences = audit.npm_licences()
     assert licences["three"] == "MIT"
+    assert licences["zeromq"] == "MIT AND MPL-2.0"
     assert not {name: text for name, text in licences.items() if not audit.is_allowed(text)}

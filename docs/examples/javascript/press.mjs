@@ -16,6 +16,7 @@ if (own) {
 const dealer = new Dealer({ ...options, immediate: true });
 const subscriber = new Subscriber(options);
 const fail = (why) => { console.error(why); process.exit(1); };
+dealer.events.on("handshake:error:auth", () => fail(`${address}: the hub refuses this key`));
 
 async function receive(socket, at = 0) { // a header and its arrays; {} after two silent seconds
   const parts = await socket.receive().catch(

@@ -76,6 +76,23 @@ test("the initial cloud is as the service reads it", async () => {
   });
 });
 
+test("the test vector of docs/wire.md is read as it says", async () => {
+  const docs = new URL("../../../../docs/vectors/", import.meta.url);
+  const face = await decodeFaceGrid(readFileSync(new URL("face_grid.bin", docs)));
+  const { initial, dense } = JSON.parse(readFileSync(new URL("face_grid.json", docs), "utf8")).decoded;
+  const near = (found: number, told: number) => assert.ok(Math.abs(found - told) <= 1e-4 * told);
+  assert.equal(face.points, dense.points.length);
+  dense.points.forEach(([, , z]: number[], point: number) => {
+    const [row, column] = dense.cells[point];
+    assert.equal(face.places[point], row * face.columns + column);
+    near(face.z[point]!, z!);
+    const [red, green, blue, code] = face.colors.subarray(4 * point, 4 * point + 4);
+    assert.deepEqual([red, green, blue], dense.colors[point]);
+    near(sigmaOf(code!, face.sigmaMm), dense.sigma[point]);
+  });
+  assert.deepEqual(Array.from(face.seeds.colors), initial.colors.flat());
+});
+
 test("bytes in the middle of a buffer are read alike", async () => {
   const within = new Uint8Array(dome.length + 7);
   within.set(dome, 3);
