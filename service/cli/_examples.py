@@ -22,6 +22,7 @@ EXAMPLES = {
                  "-o sensor.calibration.json",
     "live": "live --source openni2: --seconds 30",
     "record": "record take.oni --seconds 10",
+    "info": "info face.ply recording.oni",
     "up": "up --source openni2: --workers 2 --retention 7d",
     "press": "press --save face.ply --report report.json",
     "get": "get 3f2a --save face.ply",

@@ -16,6 +16,7 @@ COMMANDS = {
     "calibrate": "find both cameras and their pose by a board that they see",
     "live": "reconstruct a source frame after frame and show the times",
     "record": "record a sensor, or any source, to a file or folder",
+    "info": "say what a file is: a face, a frame, a recording, a calibration",
     "up": "run the whole service on this machine",
     "press": "take a frame now and wait for its face",
     "get": "fetch a capture that the hub keeps: its face, its frame",

@@ -128,6 +128,14 @@ def _place(tmp_path, monkeypatch):
     (["record", "x.oni", "--mode", "0777777"], 2, "the first a 6 or 7, found '0777777'"),
     (["record", "d", "--source", "none.oni"], 2, "none.oni: no such file"),
 
+    (["info"], 2, "required: FILE"),
+    (["info", ""], 2, "FILE: expected a word, found ''"),
+    (["info", "d"], 2, "d: is a folder, expected a file"),
+    (["info", "p"], 2, "p: Not a regular file"),
+    (["info", "f"], 2, "f: nothing that is known here: expected a face (.npz .ply .pcd .obj"),
+    (["info", "e.npz"], 2, "e.npz: is empty"),
+    (["info", f"{LONG}.npz"], 2, "the name is too long"),
+
     (["up", "--data", "f"], 2, "f: is a file, expected a folder"),
     (["up", "--data", "f/x"], 2, "f/x: lies in what is a file, expected a folder"),
     (["up", "--data", "/dev/null"], 2, "/dev/null: is a file, expected a folder"),
