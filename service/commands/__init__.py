@@ -35,7 +35,8 @@ COMMANDS = {
 """What each does, by the name of its module, in the order of `denseface --help`."""
 
 _SUBROOMS = (dict.fromkeys(("calibrate", "doctor", "record"), "sensor")
-             | dict.fromkeys(("get", "list"), "captures"))
+             | dict.fromkeys(("get", "list"), "captures")
+             | dict.fromkeys(("info",), "files"))
 """Where a command's module is, if not here."""
 
 
