@@ -1,5 +1,6 @@
 """A synchronized depth + colour frame, what its numbers mean and where it comes from."""
 
+import math
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from enum import StrEnum
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from denseface.arguments import describe
 from denseface.capture.calibration import Calibration, CameraModel, DepthToColor
 from denseface.capture.errors import FrameError
+from denseface.html_repr import PICTURE_SIDE, html_repr
 from denseface.short_repr import short_repr
 
 __all__ = ["MAX_BURST", "DepthMeaning", "DepthRounding", "FrameOrigin", "RgbdFrame"]
@@ -190,6 +192,24 @@ class RgbdFrame:
             "registered" if self.registered else "",
             self.origin.sensor or self.origin.source, self.origin.captured_at)
 
+    def _repr_html_(self) -> str:
+        meaning, origin = self.depth_meaning, self.origin
+        depths = self.depth[self.depth > 0] * (meaning.unit_um / 1000)
+        near, far = np.percentile(depths, [5, 95]) if depths.size else (0.0, 0.0)
+        rows = [
+            ("depth", "{1} x {0}".format(*self.depth.shape)),
+            ("of it measured", f"{depths.size / self.depth.size:.0%}"),
+            ("most within", f"{near:.0f} to {far:.0f} mm" if depths.size else ""),
+            ("color", "none" if self.color is None else "{1} x {0}".format(*self.color.shape)),
+            ("registered", "yes" if self.registered else "no"), ("skew", f"{self.skew_us} us"),
+            ("calibration", self.calibration_origin), ("sensor", origin.sensor),
+            ("source", origin.source), ("captured", origin.captured_at),
+            *(("note", note) for note in origin.notes)]
+        pictures = [("depth", _depth_picture(self.depth))]
+        if self.color is not None:
+            pictures.append(("color", _smaller(self.color)))
+        return html_repr("RgbdFrame", rows, pictures)
+
     @property
     def rgb(self) -> NDArray[np.uint8]:
         """`color`, where there is one.
@@ -229,6 +249,34 @@ class RgbdFrame:
     def with_note(self, *notes: str) -> Self:
         """Give the same frame with more notes of its origin."""
         return replace(self, origin=replace(self.origin, notes=(*self.origin.notes, *notes)))
+
+
+def _depth_picture(depth: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    """Draw a depth image small: near is light, what has no reading is transparent."""
+    step = _step(depth)
+    small = depth[::step, ::step].astype(np.float32)
+    there = small > 0
+    image = np.zeros((*small.shape, 4), np.uint8)
+    if there.any():
+        near, far = np.percentile(small[there], [2, 98])
+        share = np.clip((far - small) / max(far - near, 1), 0, 1)
+        image[..., :3] = (40 + 215 * share)[..., None]
+        image[there, 3] = 255
+    return image
+
+
+def _smaller(color: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Average a colour image over squares, so that it is as small as a depth's picture."""
+    step = _step(color)
+    height, width = (color.shape[0] // step, color.shape[1] // step)
+    squares = color[:height * step, :width * step].reshape(height, step, width, step, 3)
+    small: NDArray[np.uint8] = squares.mean(axis=(1, 3), dtype=np.float32).astype(np.uint8)
+    return small
+
+
+def _step(image: NDArray[Any]) -> int:
+    side: int = max(image.shape[:2])
+    return math.ceil(side / PICTURE_SIDE)
 
 
 _KINDS: dict[str, type] = {

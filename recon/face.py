@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Annotated, Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,16 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, FailFast, Field, fiel
 from denseface.arguments import describe
 from denseface.capture.frame import DepthRounding
 from denseface.checked_model import CheckedModel
+from denseface.html_repr import html_repr
+from denseface.recon import thumbnail
 from denseface.recon.arrays import Bytes, Floats, Ints
 from denseface.recon.candidates import Box, FaceCandidate
 from denseface.recon.settings import Settings
 from denseface.short_repr import short_repr
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from trimesh import Trimesh
 
 __all__ = [
     "Box", "Consent", "DenseCloud", "Face", "FaceCandidate", "PointCloud", "Report", "Seeds",
@@ -51,6 +58,26 @@ class PointCloud:
 
     def __repr__(self) -> str:
         return short_repr(self, f"{len(self):,} points", _extent(self.points))
+
+    def _repr_html_(self) -> str:
+        return html_repr(type(self).__name__, self._rows(), self._pictures())
+
+    def to_open3d(self) -> Any:
+        """Give an `open3d.geometry.PointCloud`: mm, camera frame, with colours, normals if any.
+
+        Raises
+        ------
+        MissingPackageError
+            Open3D is not installed.
+        """
+        return _call("to_open3d_cloud", self)
+
+    def _rows(self) -> list[tuple[str, str]]:
+        return [("points", f"{len(self):,}"), ("extent", _extent(self.points)),
+                ("distance", _distance(self.points))]
+
+    def _pictures(self) -> list[tuple[str, Bytes]]:
+        return [("colors", thumbnail.seen_from_the_camera(self.points, self.colors))]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -109,6 +136,16 @@ class DenseCloud(PointCloud):
         return short_repr(
             self, f"{len(self):,} points", _extent(self.points), _sigma(self),
             f"grid {rows}x{columns} every {self.grid_step_mm:.2f} mm")
+
+    def _rows(self) -> list[tuple[str, str]]:
+        rows, columns = self.grid_shape
+        return [*super()._rows(), ("sigma", _spread_of_sigma(self)),
+                ("grid", f"{rows} x {columns}, every {self.grid_step_mm:.2f} mm")]
+
+    def _pictures(self) -> list[tuple[str, Bytes]]:
+        looks = ("colors", self.colors), ("relief", thumbnail.relief(self.normals))
+        return [(name, thumbnail.seen_on_the_grid(self.cells, self.grid_shape, colors))
+                for name, colors in looks]
 
 
 MAX_STEP = 20.0
@@ -248,6 +285,59 @@ class Face:
             f"{len(self.dense):,} dense points", _sigma(self.dense),
             self.report.sensor or self.report.source, self.report.captured_at)
 
+    def _repr_html_(self) -> str:
+        report = self.report
+        score = report.face_score
+        took = report.timings_ms.get("total")
+        return html_repr(" ".join(filter(None, ("Face", report.capture_id))), [
+            ("measured points", f"{len(self.initial):,}"), ("dense points", f"{len(self.dense):,}"),
+            ("extent", _extent(self.dense.points)), ("distance", _distance(self.dense.points)),
+            ("sigma", _spread_of_sigma(self.dense)),
+            ("noise of the depth", f"{report.noise_mm:.2f} mm"),
+            ("a face by its shape", "" if score is None else f"{score:.0%}"),
+            ("preset", str(report.settings.preset)), ("took", f"{took:.0f} ms" if took else ""),
+            ("sensor", report.sensor), ("source", report.source), ("captured", report.captured_at),
+            *(("warning", one) for one in report.warnings)], self.dense._pictures())
+
+    def plot(self) -> "Figure":
+        """Draw the face with matplotlib: its colours, its depth and `sigma`, in mm, as seen.
+
+        Returns
+        -------
+        matplotlib.figure.Figure, which a notebook shows; `savefig` writes it
+
+        Raises
+        ------
+        MissingPackageError
+            matplotlib is not installed: the extra `notebook` brings it.
+        """
+        figure: Figure = _call("plot", self)
+        return figure
+
+    def to_open3d(self) -> Any:
+        """Give an `open3d.geometry.TriangleMesh` of the dense points: mm, camera frame.
+
+        Its vertices are `dense.points`, in their order, with colours and normals; triangles are
+        counter-clockwise as the camera sees them. `dense.to_open3d()` gives the points alone.
+
+        Raises
+        ------
+        MissingPackageError
+            Open3D is not installed.
+        """
+        return _call("to_open3d_mesh", self)
+
+    def to_trimesh(self) -> "Trimesh":
+        """Give a `trimesh.Trimesh` of the dense points, as `to_open3d` does.
+
+        Raises
+        ------
+        MissingPackageError
+            trimesh is not installed: the extra `notebook` brings it.
+        """
+        mesh: Trimesh = _call("to_trimesh", self)
+        return mesh
+
 
 def _extent(points: Floats) -> str:
     """Say how large a cloud is, along x, y and z."""
@@ -256,8 +346,24 @@ def _extent(points: Floats) -> str:
     return "{:.0f} x {:.0f} x {:.0f} mm".format(*np.ptp(points, axis=0))
 
 
+def _distance(points: Floats) -> str:
+    return f"{np.median(points[:, 2]):.0f} mm" if len(points) else ""
+
+
 def _sigma(dense: DenseCloud) -> str:
     return f"sigma {np.median(dense.sigma):.2f} mm (median)" if len(dense) else ""
+
+
+def _spread_of_sigma(dense: DenseCloud) -> str:
+    if not len(dense):
+        return ""
+    middle, most = np.percentile(dense.sigma, [50, 95])
+    return f"{middle:.2f} mm (median), {most:.2f} mm (95 % are below)"
+
+
+def _call(name: str, thing: object) -> Any:
+    # By name: it knows the meshes of files, and is above all that is here.
+    return getattr(import_module("denseface.notebook"), name)(thing)
 
 
 def _check_array(name: str, given: object) -> None:
