@@ -2,8 +2,8 @@
 
 import json
 import subprocess
-import tempfile
 from collections.abc import Mapping
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 import zmq
 
+from denseface.service.transport.addresses import publications_of
+from tests.ports import free_port
 from tests.system.programs import LANGUAGES, Program, program
 from tests.system.running import REPOSITORY
-from tests.waiting import LIMIT_MS
+from tests.waiting import LIMIT_MS, until
 
 _VECTORS = REPOSITORY / "docs" / "vectors"
 _DONE = json.loads((_VECTORS / "face_done.json").read_text())
@@ -36,6 +38,21 @@ def changed(header: bytes, **fields: Any) -> bytes:
                       ).encode()
 
 
+def bound(context: zmq.Context, address: str) -> tuple[zmq.Socket, zmq.Socket]:
+    """Bind as a hub does, as soon as the address is free."""
+    def bind(kind: int, to: str) -> zmq.Socket | None:
+        socket = context.socket(kind)
+        socket.linger = 0
+        with suppress(zmq.ZMQError):
+            socket.bind(to)
+            return socket
+        socket.close()
+        return None
+
+    return tuple(until(lambda kind=kind, to=to: bind(kind, to)) for kind, to in (
+        (zmq.ROUTER, address), (zmq.XPUB, publications_of(address))))
+
+
 @dataclass
 class Ended:
     """How a program ended."""
@@ -51,7 +68,7 @@ class Ended:
 
 def served(
     command: Program, folder: Path, answers: Mapping[str, list[list[bytes]]],
-    published: list[bytes] | None = None,
+    published: list[bytes] | None = None, restart_after: str = "",
 ) -> Ended:
     """Be the hub of a program until it ends.
 
@@ -60,15 +77,16 @@ def served(
     answers : for each kind of request the answers, one after another, the last one repeated; ids
         and numbers become those of the request. An empty one is lost
     published : what is published, once, where `get_next` found nothing newer
+    restart_after : kind of request behind whose answer the hub ends, and is there again
     """
     heard: list[str] = []
     pressed = ""
-    with tempfile.TemporaryDirectory(prefix="df-") as short, zmq.Context() as context, \
-            context.socket(zmq.ROUTER) as router, context.socket(zmq.XPUB) as publisher:
-        router.linger = publisher.linger = 0
-        router.bind(f"ipc://{short}/hub")
-        publisher.bind(f"ipc://{short}/hub.publications")
-        with subprocess.Popen([*command, f"ipc://{short}/hub"], cwd=folder, text=True,
+    address = f"tcp://127.0.0.1:{free_port()}"
+    with ExitStack() as done:
+        context = zmq.Context()
+        done.callback(context.destroy, linger=0)
+        router, publisher = bound(context, address)
+        with subprocess.Popen([*command, address], cwd=folder, text=True,
                               stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
             while process.poll() is None:
                 if not router.poll(20):
@@ -84,6 +102,11 @@ def served(
                 header, *arrays = answer
                 router.send_multipart([peer, changed(
                     header, request=request["request"], capture_id=pressed), *arrays])
+                if request["kind"] == restart_after:
+                    restart_after = ""
+                    router.close(linger=LIMIT_MS)
+                    publisher.close()
+                    router, publisher = bound(context, address)
                 if published and json.loads(header)["kind"] == "nothing_newer":
                     assert publisher.poll(LIMIT_MS)
                     assert publisher.recv() == b"\x01faces"
@@ -105,6 +128,12 @@ USUAL = {"find_start": [vector("start_at")], "press": [vector("press_accepted")]
          "get_next": [vector("nothing_newer"), vector("face_done.answer")]}
 
 
+def next_face(number: int) -> list[bytes]:
+    """Give the publication of the face under another number."""
+    topic, header, *arrays = vector("face_done")
+    return [topic, changed(header, sequence=number), *arrays]
+
+
 def check_vector(points: np.ndarray | None) -> None:
     """Check that it is the face of the vector."""
     dense = _DONE["decoded"]["dense"]
@@ -116,8 +145,7 @@ def check_vector(points: np.ndarray | None) -> None:
 
 @pytest.mark.parametrize(("number", "asked"), [(43, 1), (44, 2)], ids=["next", "after a gap"])
 def test_a_face_that_is_published_is_that_of_the_vector(command, tmp_path, number, asked):
-    topic, header, *arrays = vector("face_done")
-    ended = served(command, tmp_path, USUAL, [topic, changed(header, sequence=number), *arrays])
+    ended = served(command, tmp_path, USUAL, next_face(number))
     assert (ended.status, ended.err) == (0, "")
     assert ended.heard == ["find_start", "press", *["get_next"] * asked]
     check_vector(ended.points)
@@ -138,6 +166,13 @@ def test_a_face_that_was_missed_is_asked_for(command, tmp_path):
     ended = served(command, tmp_path, USUAL | {"get_next": [other]})
     assert (ended.status, ended.err) == (0, "")
     assert ended.heard == ["find_start", "press", "get_next", "get_next"]
+    check_vector(ended.points)
+
+
+def test_a_hub_that_is_started_again_is_found_again(command, tmp_path):
+    """Its publications, too."""
+    ended = served(command, tmp_path, USUAL, next_face(43), restart_after="press")
+    assert (ended.status, ended.err) == (0, "")
     check_vector(ended.points)
 
 

@@ -9,7 +9,6 @@ import pytest
 
 from denseface.service.protocol import messages
 from denseface.service.protocol.message_base import BaseAnswer, BaseRequest
-from denseface.service.security import read_pair
 
 ROOT = Path(__file__).resolve().parents[3]
 FOLDER = ROOT / "docs" / "examples"
@@ -63,11 +62,3 @@ def test_the_fields_of_a_kind_are_those_of_the_code(kind):
         name for name, field in fields.items() if field.is_required()}
     assert set(re.findall(r"`(\w+)`", optional)) == {
         name for name, field in fields.items() if not field.is_required()}
-
-
-def test_the_key_file_on_the_page_is_one(tmp_path):
-    (shown,) = re.findall(r"```json\n(.*?)```", WIRE, re.DOTALL)
-    path = tmp_path / "bench2.secret"
-    path.write_text(shown)
-    path.chmod(0o600)
-    assert read_pair(path).public == json.loads(shown)["public_key"]
