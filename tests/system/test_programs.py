@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 import zmq
 
+from denseface.service.protocol.messages import FROM_HUB, TO_HUB
 from denseface.service.transport.addresses import publications_of
 from tests.ports import free_port
-from tests.system.programs import LANGUAGES, Program, program
+from tests.system.programs import LANGUAGES, NODE, Program, program
 from tests.system.running import REPOSITORY
 from tests.waiting import LIMIT_MS, until
 
@@ -126,6 +127,14 @@ def command(request, tmp_path_factory):
 
 USUAL = {"find_start": [vector("start_at")], "press": [vector("press_accepted")],
          "get_next": [vector("nothing_newer"), vector("face_done.answer")]}
+
+
+def test_node_reads_every_vector():
+    done = subprocess.run([str(NODE), str(Path(__file__).with_name("read_vectors.mjs")),
+                           str(_VECTORS)], check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.split() == sorted(
+        kind.model_fields["kind"].default for kind in (*TO_HUB, *FROM_HUB))
 
 
 def next_face(number: int) -> list[bytes]:
