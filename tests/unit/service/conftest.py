@@ -5,10 +5,19 @@ from collections.abc import Iterator
 import pytest
 import structlog
 
+from denseface.service.log.output import process_log
+from tests.waiting import LIMIT_S
+
 
 @pytest.fixture(autouse=True)
 def _log_as_before() -> Iterator[None]:
-    """A command run in this process sets the log up for itself."""
+    """A command run in this process sets the log up for itself.
+
+    Its thread lives on, and would tell within a later test what was suppressed in this one.
+    """
+    before = process_log.on_interval, process_log.on_recovery
     yield
+    process_log.on_interval, process_log.on_recovery = before
+    process_log.flush(LIMIT_S)
     structlog.reset_defaults()
     structlog.contextvars.clear_contextvars()
