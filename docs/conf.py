@@ -21,6 +21,7 @@ extensions = [
     "mathml",
     "public_names",
     "source_pages",
+    "tables",
 ]
 exclude_patterns = ["examples/**/node_modules"]
 nitpicky = True
@@ -42,10 +43,12 @@ autodoc_typehints_format = "short"
 highlight_language = "none"
 default_role = "py:obj"
 python_use_unqualified_type_names = True
+maximum_signature_line_length = 90
 toc_object_entries_show_parents = "hide"
 
 html_theme = "pydata_sphinx_theme"
 html_title = f"denseface {version}"
+html_context = {"default_mode": "auto"}
 html_theme_options = {
     "logo": {"text": "denseface"},
     "icon_links": [],
