@@ -1,6 +1,7 @@
 """Every block of code on every page is run by a test, is checked here, or says why not."""
 
 import json
+import re
 from functools import cache
 from pathlib import Path
 
@@ -22,7 +23,7 @@ RUN = {page: {"sh", "python"} for page in PAGES} | {
 """Kinds of blocks that a test of each page runs; `json` is checked below."""
 SITE = {"{toctree}", "{include}", "{eval-rst}", "{decisions}", "math"}
 """What `script/docs` reads; a mistake there is one of its errors."""
-NOT_RUN = 12
+NOT_RUN = 14
 """Blocks that say why they are not."""
 
 
@@ -38,6 +39,13 @@ def test_blocks_are_run_or_say_why_not():
         elif not block.file:
             assert block.language.split(" ")[0] in RUN.get(page, set()) | SITE | {"", "json"}, (
                 f"{page}:{block.line}: {block.language} is run by no test")
+
+
+def test_what_somebody_would_type_is_told_from_files_and_pictures():
+    for page, block in blocks():
+        if not block.language:
+            typed = re.search(r"^(\$ |denseface \S|pip |python |script/)", block.text, re.M)
+            assert not typed, f"{page}:{block.line}: {typed[0]}... without sh or console before it"
 
 
 def test_what_is_not_run_is_counted():
