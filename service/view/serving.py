@@ -57,8 +57,11 @@ async def _serve(items: Sequence[Item], options: PageOptions, bound: socket.sock
     pages = Pages()
     token = secrets.token_urlsafe(_TOKEN_BYTES)
     port = bound.getsockname()[1]
-    app = view_app(Shelf(items), pages, token, origins_of("http", _HOST, port), once=options.once)
+    shelf = Shelf(items)
+    app = view_app(shelf, pages, token, origins_of("http", _HOST, port), once=options.once)
     serving = asyncio.create_task(serve(app, bound))
+    # While the browser starts: what is asked for first is there then.
+    ahead = asyncio.create_task(shelf.told(0, items[0].head.first))
     url = f"http://{_HOST}:{port}/{token}/"
     say(url, flush=True)
     opened = options.browser and _open(url)
@@ -73,7 +76,8 @@ async def _serve(items: Sequence[Item], options: PageOptions, bound: socket.sock
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
     finally:
         serving.cancel()
-        ended = await asyncio.gather(serving, return_exceptions=True)
+        ahead.cancel()
+        ended = await asyncio.gather(serving, ahead, return_exceptions=True)
     if isinstance(ended[0], Exception):
         raise ended[0]
     return 128 + stopped.result() if stopped.done() else 0

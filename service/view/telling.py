@@ -98,7 +98,8 @@ def figures(face: Face) -> tuple[Fact, ...]:
         told |= {
             "Size": "{:.0f} x {:.0f} x {:.0f} mm".format(*np.ptp(dense.points, axis=0)),
             "Distance": f"{np.median(dense.points[:, 2]):.0f} mm",
-            "Standard error": f"{middle:.2f} mm (median), {most:.2f} mm (19 of 20 are below)"}
+            "Standard error, median": f"{middle:.2f} mm",
+            "Standard error, 19 of 20 below": f"{most:.2f} mm"}
     told |= {
         "Grid": f"{rows} x {columns}, every {dense.grid_step_mm:.2f} mm",
         "Spacing of measured points": f"{report.mean_spacing_mm:.2f} mm",

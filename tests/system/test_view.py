@@ -134,7 +134,7 @@ def test_keys_turn_it_and_change_what_is_shown(page):
     expect(page.locator(".legend")).to_be_hidden()
 
 
-def test_the_mouse_turns_it_and_others_beside_it_as_well(page, tmp_path):
+def test_the_mouse_turns_it_and_others_beside_it_as_well(page):
     page.locator("[data-action=beside-2]").click()
     expect(page.locator(".stage")).to_have_count(2)
     before = shown(page)
@@ -148,7 +148,7 @@ def test_the_mouse_turns_it_and_others_beside_it_as_well(page, tmp_path):
     for side in (slice(half), slice(half, None)):
         until(lambda side=side: differs(look(page)[:, side], before[:, side]) > 0.02)
     after = look(page)
-    check(page, tmp_path, "beside")
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     with page.expect_download() as download:
         page.keyboard.press("s")
     assert download.value.suggested_filename == "face.png"
