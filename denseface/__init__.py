@@ -68,8 +68,9 @@ if TYPE_CHECKING:
         ServiceError,
         SettingsError,
         UnknownCaptureError,
+        UsageError,
     )
-    from denseface.service.export import load_face, save_face
+    from denseface.service.export import ExportOptions, load_face, save_face
     from denseface.service.export.refusal import draw_refusal
     from denseface.service.export.render import render
     from denseface.service.protocol.message_base import CaptureSummary, DeadLetter
@@ -82,17 +83,18 @@ __all__ = [
     "CameraModel", "CaptureError", "CaptureFailedError", "CaptureSummary", "Client",
     "ClientClosedError", "ClientForkedError", "ClientTimeoutError", "CoarseDepthError", "Consent",
     "DeadLetter", "DenseCloud", "DensefaceError", "DepthMeaning", "DepthRounding", "DepthToColor",
-    "DriverError", "Face", "FaceCandidate", "FaceWithoutDepthError", "FormatError", "FrameError",
-    "FrameOrigin", "ImpossibleFrameError", "ImpossibleSettingsError", "KeyFileError",
+    "DriverError", "ExportOptions", "Face", "FaceCandidate", "FaceWithoutDepthError", "FormatError",
+    "FrameError", "FrameOrigin", "ImpossibleFrameError", "ImpossibleSettingsError", "KeyFileError",
     "KeyRefusedError", "Length", "LocalProtocolError", "Measurements", "MismatchedFrameError",
     "MissingPackageError", "Neighbors", "NoDepthError", "NoFaceError", "Operator", "PointCloud",
     "Preset", "PressRefusedError", "ProtocolError", "Published", "PublishedFace",
     "PublishedFailure", "PublishedHint", "PublishedPreview", "ReconstructionError",
     "RemoteProtocolError", "Report", "RequestFailedError", "RgbdFrame", "SensorError",
     "SensorTimeoutError", "ServiceError", "Settings", "SettingsError", "Source", "Status",
-    "TooLittleDepthError", "UnknownCaptureError", "UnreadableSourceError", "WrongSizeError",
-    "__version__", "draw_refusal", "fuse", "load_calibration", "load_face", "load_frame", "measure",
-    "open_source", "reconstruct", "render", "save_face", "save_frame", "warm",
+    "TooLittleDepthError", "UnknownCaptureError", "UnreadableSourceError", "UsageError",
+    "WrongSizeError", "__version__", "draw_refusal", "fuse", "load_calibration", "load_face",
+    "load_frame", "measure", "open_source", "reconstruct", "render", "save_face", "save_frame",
+    "warm",
 ]
 
 _NAMES = {
@@ -118,8 +120,9 @@ _NAMES = {
     "service.errors": "AddressError CaptureFailedError ClientClosedError ClientForkedError "
                       "ClientTimeoutError FormatError KeyFileError KeyRefusedError "
                       "LocalProtocolError PressRefusedError ProtocolError RemoteProtocolError "
-                      "RequestFailedError ServiceError SettingsError UnknownCaptureError",
-    "service.export": "load_face save_face",
+                      "RequestFailedError ServiceError SettingsError UnknownCaptureError "
+                      "UsageError",
+    "service.export": "ExportOptions load_face save_face",
     "service.export.refusal": "draw_refusal",
     "service.export.render": "render",
     "service.protocol.message_base": "CaptureSummary DeadLetter",

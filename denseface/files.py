@@ -8,13 +8,13 @@ import errno
 import os
 import secrets
 import stat
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from io import BufferedReader
 from pathlib import Path
 
 __all__ = ["check_place", "make_folder", "open_regular", "read_bounded", "sync",
-           "write_whole"]
+           "write_all", "write_whole"]
 
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 """Fails where the name is taken, by whatever it is."""
@@ -90,6 +90,42 @@ def write_whole(
             raise
     except OSError as error:
         raise _named(error, path) from error
+
+
+def write_all(files: Mapping[Path, bytes], *, mode: int | None = None) -> None:
+    """Write files that belong together, in their order: the one that names the others last.
+
+    All are on the disk before the first takes its name, so that a full disk leaves what was there;
+    each is whole, whatever happens between two of them.
+
+    Raises
+    ------
+    OSError
+        As `write_whole`; it names the file that could not be written.
+    """
+    kept: dict[Path, Path] = {}
+    try:
+        for path, data in files.items():
+            temporary = path.with_name(f".{secrets.token_hex(8)}.tmp")
+            try:
+                make_folder(path.absolute().parent, mode)
+                descriptor = os.open(temporary, _NEW, 0o666 if mode is None else mode)
+                kept[temporary] = path
+                _fill(descriptor, [data], mode, synced=True)
+                if path.is_dir():
+                    raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            except OSError as error:
+                raise _named(error, path) from error
+        for temporary, path in list(kept.items()):
+            try:
+                temporary.replace(path)
+            except OSError as error:
+                raise _named(error, path) from error
+            del kept[temporary]
+    finally:
+        for temporary in kept:
+            with suppress(OSError):
+                temporary.unlink()
 
 
 def _fill(

@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--table", type=Path, metavar="T.csv",
                         help="write the table of the faces, of one INPUT too")
     reading.add_calibration(parser)
+    _options.add_export(parser)
     _options.add_rotation(parser)
     _options.add_recon(parser)
 
@@ -49,7 +50,8 @@ def run(args: argparse.Namespace) -> int:
     choice = reading.frame_choice(
         args, _options.service_settings(args).max_frame_pixels, args.frames)
     outputs = Outputs(args.output, args.report, args.rendering,
-                      f".{args.format}" if args.format else None, args.table)
+                      f".{args.format}" if args.format else None, args.table,
+                      _options.export_options(args), args.textured)
     inputs = find_inputs(args.inputs)
     if args.inputs and not inputs:
         raise UsageError("INPUT: calibrations alone, expected a frame, recording or folder")

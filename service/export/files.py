@@ -2,15 +2,17 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from denseface.files import check_place, write_whole
 from denseface.service.errors import StoreError, UsageError, reason_of
-from denseface.service.export.formats import check_ending, save_face
+from denseface.service.export.formats import beside, check_options, save_face
+from denseface.service.export.options import PLAIN, ExportOptions
 
 if TYPE_CHECKING:
+    from denseface.capture.frame import RgbdFrame
     from denseface.recon.face import Face
 
 __all__ = ["FaceFiles", "check_outputs", "save_report"]
@@ -62,6 +64,8 @@ class FaceFiles:
     ------
     FormatError
         Where an ending is not known.
+    UsageError
+        The format cannot have what is asked for.
     UsageError, StoreError
         As `check_outputs`.
     """
@@ -74,26 +78,51 @@ class FaceFiles:
     """`.png`"""
     mode: int | None = None
     """Of each file; None for 666 less the umask."""
+    options: ExportOptions = PLAIN
+    """Of cloud or mesh."""
+    textured: bool = False
+    """The mesh has a texture: the colour image of its frame."""
 
     def __post_init__(self) -> None:
+        asked = self.options.asked | ({"texture"} if self.textured else set())
         if self.output:
-            check_ending(self.output)
-        check_outputs((self.output, None), (self.report, ".json"), (self.rendering, ".png"))
+            check_options(self.output, asked)
+        elif asked:
+            raise UsageError(f"{' and '.join(sorted(asked))}: expected with a file of the face, "
+                             "and none is asked for")
+        check_outputs((self.output, None), (self.report, ".json"), (self.rendering, ".png"),
+                      *((path, None) for path in self.beside))
 
     def __bool__(self) -> bool:
         return bool(self.output or self.report or self.rendering)
 
-    def write(self, face: "Face") -> None:
+    @property
+    def beside(self) -> tuple[Path, ...]:
+        """Give the files that the cloud's or mesh's own file names."""
+        return beside(self.output, textured=self.textured) if self.output else ()
+
+    def write(self, face: "Face", frame: "RgbdFrame | None" = None) -> None:
         """Write all; each file is whole or not there.
+
+        Parameters
+        ----------
+        frame : that the face was made of: the texture, where it is `textured`; the points' own
+            colours are, where there is none or it has no colour image
 
         Raises
         ------
         StoreError
             Where a file cannot be written.
+        UsageError
+            There is no texture to be had of this frame.
         """
         if self.output:
+            options = self.options
+            if self.textured:
+                whole = frame is not None and frame.color is not None
+                options = replace(options, texture=frame if whole else "points")
             with _naming(self.output):
-                save_face(face, self.output, mode=self.mode)
+                save_face(face, self.output, mode=self.mode, options=options)
         if self.report:
             with _naming(self.report):
                 save_report(face, self.report, mode=self.mode)

@@ -4,29 +4,37 @@ A further format is one function and one row of `FORMATS`. Its module is importe
 written: the command line names the formats, and is to be quick.
 """
 
+from collections.abc import Collection
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from denseface.arguments import as_path, expect
-from denseface.service.errors import FormatError
+from denseface.service.errors import FormatError, UsageError
+from denseface.service.export.options import PLAIN, ExportOptions
 
 if TYPE_CHECKING:
     from denseface.recon.face import Face
 
-__all__ = ["FORMATS", "check_ending", "face_bytes", "load_face", "save_face"]
+__all__ = ["FORMATS", "beside", "check_ending", "check_options", "face_bytes", "load_face",
+           "save_face"]
 
 
-def save_face(face: "Face", path: str | Path, *, mode: int | None = None) -> None:
+def save_face(
+    face: "Face", path: str | Path, *, mode: int | None = None, options: ExportOptions = PLAIN
+) -> None:
     """Write a face in the format that the path's ending names.
 
     The file is either whole or not there, what was of that name before is left then; folders that
-    are missing are made. Its mode is `mode`, or 666 less the umask.
+    are missing are made. Its mode is `mode`, or 666 less the umask. A textured `.obj` has its
+    material and its texture in files beside it (`beside`), which are there first.
 
     Raises
     ------
     FormatError
         Where the ending is not known.
+    UsageError
+        Where the format cannot have what `options` ask for.
     TypeError
         Where `face` is no face, or `path` no path.
     ServiceError
@@ -34,22 +42,57 @@ def save_face(face: "Face", path: str | Path, *, mode: int | None = None) -> Non
     OSError
         Where the file cannot be written: it names the file.
     """
-    from denseface.files import write_whole
+    from denseface.files import write_all
     from denseface.recon.face import Face
     from denseface.service.runtime.files import check_outside_hub
 
     expect("face", face, Face, "save_face(face, path)")
     path = as_path(path)
     ending = check_ending(path)
+    check_options(path, options.asked)
     check_outside_hub(path)
-    write_whole(path, [face_bytes(face, ending)], mode=mode)
+    if beside(path, textured=options.texture is not None):
+        from denseface.service.export.models.obj import with_material
+
+        write_all(with_material(face, path, options), mode=mode)
+    else:
+        write_all({path: face_bytes(face, ending, options)}, mode=mode)
 
 
-def face_bytes(face: "Face", ending: str) -> bytes:
-    """Give the bytes of a face's file with an ending of `FORMATS`."""
+def beside(path: str | Path, *, textured: bool = False) -> tuple[Path, ...]:
+    """Give the further files that `save_face` writes: what a textured `.obj` names."""
+    path = Path(path)
+    if not textured or path.suffix.lower() not in _BESIDE:
+        return ()
+    from denseface.service.export.models.material import beside_obj
+
+    return beside_obj(path)
+
+
+def face_bytes(face: "Face", ending: str, options: ExportOptions = PLAIN) -> bytes:
+    """Give the bytes of a face's file with an ending of `FORMATS`; an `.obj` without texture."""
     module, name = FORMATS[ending].split(":")
-    data: bytes = getattr(import_module(f"denseface.service.export.{module}"), name)(face)
+    function = getattr(import_module(f"denseface.service.export.{module}"), name)
+    data: bytes = function(face, options) if ending in _OPTIONS else function(face)
     return data
+
+
+def check_options(path: str | Path, asked: Collection[str]) -> None:
+    """Check that a file can be written as it is asked for.
+
+    Parameters
+    ----------
+    asked : names of `ExportOptions` that differ from what is written without them
+
+    Raises
+    ------
+    UsageError
+        One line that names what its format cannot have.
+    """
+    ending = check_ending(path)
+    for name in sorted({*asked} - _OPTIONS.get(ending, frozenset())):
+        able = " or ".join(one for one, names in _OPTIONS.items() if name in names)
+        raise UsageError(f"{path}: {name} is for {able}, not {ending}")
 
 
 def load_face(path: str | Path) -> "Face":
@@ -88,12 +131,21 @@ def check_ending(path: str | Path) -> str:
 _WHOLE = ".npz"
 """Of the files that keep the whole face."""
 
+_OPTIONS = {
+    ".glb": frozenset({"holes", "texture", "compact", "copyright"}),
+    ".obj": frozenset({"holes", "texture"}),
+    ".stl": frozenset({"holes"}),
+}
+"""What each format can have of `ExportOptions`; its function takes them then."""
+_BESIDE = {".obj"}
+"""Formats that have a texture in files beside them."""
+
 FORMATS = {
     ".ply": "cloud:to_ply",
     ".pcd": "cloud:to_pcd",
     ".npz": "_npz:to_npz",
-    ".obj": "mesh:to_obj",
-    ".glb": "glb:to_glb",
+    ".obj": "models.obj:to_obj",
+    ".glb": "models.glb:to_glb",
     ".stl": "mesh:to_stl",
 }
 """Which function of which module of `service.export` makes a face's bytes, by a file's ending.
@@ -101,5 +153,6 @@ FORMATS = {
 `.ply`, `.pcd`: the dense cloud, binary, mm, camera frame: x y z, nx ny nz (float), red green blue
 (uchar), sigma (float: standard error along the viewing ray). `.npz`: the whole face, read back by
 `load_face`. `.obj`, `.stl`: the dense mesh, mm, camera frame. `.glb`: the same as glTF 2.0: metres,
-y up. Each says where the face comes from, as far as it can (`service.export.provenance`).
+y up. What is in each, and what reads it: `docs/files.md`. Each says where the face comes from, as
+far as it can (`service.export.provenance`).
 """

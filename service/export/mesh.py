@@ -1,18 +1,86 @@
-"""Triangles between neighbouring points of a dense cloud, and files of them."""
+"""Triangles between neighbouring points of a dense cloud, and files of nothing else."""
 
 import struct
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.face import MAX_STEP, DenseCloud, Face
-from denseface.service.export.provenance import comments, stl_header
+from denseface.service.errors import UsageError
+from denseface.service.export.options import PLAIN, ExportOptions
+from denseface.service.export.provenance import stl_header
 
-__all__ = ["to_obj", "to_stl", "triangulate"]
+__all__ = ["LONGEST_EDGE", "FaceMesh", "face_mesh", "local_spacing", "to_stl", "triangulate"]
+
+LONGEST_EDGE = 2.0
+"""Of a triangle, in local spacings; along a diagonal of an even slope it is the square root of 2.
+"""
+
+
+class FaceMesh(NamedTuple):
+    """A mesh of a face: mm, camera frame, the front of each triangle toward the camera."""
+
+    points: NDArray[np.float32]
+    """(n, 3); each is a corner of a triangle."""
+    normals: NDArray[np.float32]
+    """(n, 3), unit length, toward the camera."""
+    colors: NDArray[np.uint8]
+    """(n, 3), RGB."""
+    cells: NDArray[np.int32]
+    """(n, 2), (row, column) on the cloud's grid."""
+    triangles: NDArray[np.int32]
+    """(t, 3), rows of the others."""
+    step_mm: float
+    """Distance of neighbouring grid points."""
+
+
+def face_mesh(cloud: DenseCloud, options: ExportOptions = PLAIN) -> FaceMesh:
+    """Give the mesh that is written of a dense cloud.
+
+    Points that no triangle has are left out of it. Holes are left, or closed
+    (`ExportOptions.holes`): then there are points within them, of which nothing was measured.
+
+    Raises
+    ------
+    UsageError
+        There is no triangle.
+    """
+    if options.holes == "close":
+        from denseface.service.export.models.holes import without_holes
+
+        cloud = without_holes(cloud)
+    triangles = triangulate(cloud)
+    if not len(triangles):
+        raise UsageError("the face has no mesh: no three of its points are neighbours")
+    used = np.zeros(len(cloud), np.bool_)
+    used[triangles] = True
+    if not used.all():
+        triangles = (np.cumsum(used, dtype=np.int32) - np.int32(1))[triangles]
+        return FaceMesh(cloud.points[used], cloud.normals[used], cloud.colors[used],
+                        cloud.cells[used], triangles, cloud.grid_step_mm)
+    return FaceMesh(cloud.points, cloud.normals, cloud.colors, cloud.cells, triangles,
+                    cloud.grid_step_mm)
+
+
+def local_spacing(cloud: DenseCloud) -> NDArray[np.float64]:
+    """Give how far neighbours of the grid are apart on the surface at each point, mm.
+
+    A grid step, over the cosine of the angle between the normal and the z axis: the distance that a
+    step up the slope of the tangent plane covers. On a surface that the camera sees from the front
+    it is the step itself, on a side of a nose of 70 degrees three of them. The normals are those of
+    the fitted surface, and know nothing of a gap between two surfaces: an edge across one is long
+    by this measure, however long it is.
+
+    Returns
+    -------
+    (n,) float64
+    """
+    return cloud.grid_step_mm / np.maximum(np.abs(cloud.normals[:, 2]).astype(np.float64), 1e-6)
 
 
 def triangulate(cloud: DenseCloud) -> NDArray[np.int32]:
-    """Join each 2x2 block of grid points by two triangles.
+    """Join each 2x2 block of grid points by two triangles, along its shorter diagonal.
 
     Parameters
     ----------
@@ -21,55 +89,49 @@ def triangulate(cloud: DenseCloud) -> NDArray[np.int32]:
     Returns
     -------
     (t, 3) int32, rows of `cloud.points`, counter-clockwise as the camera sees them, so that the
-    front is toward the camera. A block with three points gives one triangle; triangles that span
-    more than `MAX_STEP` grid steps in depth are left out.
+    front is toward the camera; in the order of the blocks, row by row. A block with three points
+    gives one triangle. Left out are triangles with an edge longer than `LONGEST_EDGE` times the
+    local spacing, the greater one of its two ends, and such as span more than `MAX_STEP` grid steps
+    in depth. None is degenerate: no two points are at one place of the grid.
     """
     rows, columns = cloud.grid_shape
     index = np.full((rows, columns), -1, np.int32)
     index[cloud.cells[:, 0], cloud.cells[:, 1]] = np.arange(len(cloud), dtype=np.int32)
-    a, b = index[:-1, :-1].ravel(), index[:-1, 1:].ravel()
-    c, d = index[1:, :-1].ravel(), index[1:, 1:].ravel()
+    blocks = np.stack([index[:-1, :-1].ravel(), index[:-1, 1:].ravel(),
+                       index[1:, :-1].ravel(), index[1:, 1:].ravel()], axis=1)
+    blocks = blocks[(blocks >= 0).sum(axis=1) > 2]
+    a, b, c, d = blocks.T
+    z = cloud.points[:, 2]
+    along_bc = (a < 0) | (d < 0)
+    whole = (blocks >= 0).all(axis=1)
+    along_bc[whole] = (np.abs(z[b[whole]] - z[c[whole]]) < np.abs(z[a[whole]] - z[d[whole]]))
     # y points down: a -> c -> b is counter-clockwise seen along z.
-    whole = (a >= 0) & (d >= 0)
-    triangles = np.concatenate([
-        np.stack([a, c, d], axis=1)[whole & (c >= 0)],
-        np.stack([a, d, b], axis=1)[whole & (b >= 0)],
-        np.stack([a, c, b], axis=1)[(a >= 0) & (c >= 0) & (b >= 0) & (d < 0)],
-        np.stack([b, c, d], axis=1)[(a < 0) & (b >= 0) & (c >= 0) & (d >= 0)],
-    ])
-    z = cloud.points[:, 2][triangles]
-    limit = MAX_STEP * cloud.grid_step_mm
-    kept: NDArray[np.int32] = triangles[z.max(axis=1) - z.min(axis=1) <= limit]
-    return kept
+    pairs = np.where(along_bc[:, None, None], np.stack([[a, c, b], [b, c, d]]).transpose(2, 0, 1),
+                     np.stack([[a, c, d], [a, d, b]]).transpose(2, 0, 1))
+    triangles = pairs.reshape(-1, 3)
+    triangles = triangles[(triangles >= 0).all(axis=1)]
+    return np.asarray(triangles[~_too_long(cloud, triangles)])
 
 
-def to_obj(face: Face) -> bytes:
-    """Give the bytes of an `.obj` file: mm, camera frame, with vertex colours and normals."""
-    cloud = face.dense
-    vertices = np.hstack([cloud.points, cloud.colors / 255])
-    # Numbers of vertices, from 1; a vertex's normal has the same.
-    faces = np.repeat(triangulate(cloud) + 1, 2, axis=1)
-    return "".join([
-        f"# by denseface, mm: {len(cloud)} vertices\n",
-        *(f"# {line}\n" for line in comments(face.report)),
-        _lines("v %.4f %.4f %.4f %.6g %.6g %.6g\n", vertices),
-        _lines("vn %.6g %.6g %.6g\n", cloud.normals),
-        _lines("f %d//%d %d//%d %d//%d\n", faces)]).encode()
+def _too_long(cloud: DenseCloud, triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Say of each triangle whether its points are not of one surface."""
+    corners = cloud.points[triangles]
+    spacing = local_spacing(cloud)[triangles]
+    long = np.ptp(corners[:, :, 2], axis=1) > MAX_STEP * cloud.grid_step_mm
+    for one, other in ((0, 1), (1, 2), (2, 0)):
+        edge = (corners[:, one] - corners[:, other]).astype(np.float64)
+        limit = LONGEST_EDGE * np.maximum(spacing[:, one], spacing[:, other])
+        long |= np.einsum("tx,tx->t", edge, edge) > limit**2
+    return np.asarray(long)
 
 
-def to_stl(face: Face) -> bytes:
+def to_stl(face: Face, options: ExportOptions = PLAIN) -> bytes:
     """Give the bytes of a binary `.stl` file: mm, camera frame, with the triangles' normals."""
-    cloud = face.dense
-    corners = cloud.points[triangulate(cloud)]
+    mesh = face_mesh(face.dense, options)
+    corners = mesh.points[mesh.triangles]
     table = np.zeros(len(corners), [
         ("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    table["normal"] = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
+    table["normal"] = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     table["corners"] = corners
     return stl_header(face.report) + struct.pack("<I", len(table)) + table.tobytes()
-
-
-def _lines(line: str, rows: NDArray[np.floating | np.integer]) -> str:
-    """Format a row to a line."""
-    return line * len(rows) % tuple(rows.ravel().tolist())

@@ -26,15 +26,21 @@ _VIEWERS = {
 }
 """By a file's ending, where it is known: with what to look at it."""
 _MESHES = {".obj", ".glb", ".stl"}
+_COMPACT = "pages with three.js or Babylon.js open it, few other programs do"
+_BESIDE = {".mtl": "its material", ".jpg": "its texture"}
 
 
 def describe(files: FaceFiles, face: "Face") -> list[str]:
     """Say of each file of a face what it is, a line each; nothing where nothing was asked for."""
     lines = []
     if files.output:
-        points = f"{len(face.dense):,} points"
-        what = f"mesh of {points}" if files.output.suffix.lower() in _MESHES else points
-        lines.append(describe_file(files.output, what))
+        what = f"{len(face.dense):,} points"
+        if files.output.suffix.lower() in _MESHES:
+            from denseface.service.export.mesh import face_mesh
+
+            what = f"mesh of {len(face_mesh(face.dense, files.options).points):,} points"
+        lines.append(describe_file(files.output, what, compact=files.options.compact))
+    lines += [describe_file(path, _BESIDE.get(path.suffix.lower(), "")) for path in files.beside]
     if files.report:
         lines.append(describe_file(files.report, "report"))
     if files.rendering:
@@ -62,10 +68,10 @@ class WrittenFiles:
                 for (folder, ending), (count, size, path) in self._kinds.items()]
 
 
-def describe_file(path: Path, what: str) -> str:
+def describe_file(path: Path, what: str, *, compact: bool = False) -> str:
     """Say of a file that was written what it is, its size, and what opens it."""
-    ending = path.suffix.lower()
-    return f"{path}: {what}, {_in_words(path.stat().st_size)}{_viewers(ending)}"
+    opened = f"; {_COMPACT}" if compact else _viewers(path.suffix.lower())
+    return f"{path}: {what}, {_in_words(path.stat().st_size)}{opened}"
 
 
 def _viewers(ending: str) -> str:

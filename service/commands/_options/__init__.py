@@ -18,13 +18,14 @@ from denseface.service.commands._options.values import (
     timestamp,
     whole,
 )
-from denseface.service.export import FORMATS
+from denseface.service.export import FORMATS, ExportOptions
+from denseface.service.export.options import HOLES, PLAIN
 
 __all__ = [
-    "add_client", "add_hub", "add_keys", "add_log", "add_mode", "add_outputs", "add_recon",
-    "add_rotation", "add_source", "burst", "client", "count", "file_mode", "operator",
-    "recon_settings", "repeated", "seconds", "sensor_name", "service_settings", "timestamp",
-    "warn", "whole",
+    "add_client", "add_export", "add_hub", "add_keys", "add_log", "add_mode", "add_outputs",
+    "add_recon", "add_rotation", "add_source", "burst", "client", "count", "export_options",
+    "file_mode", "operator", "recon_settings", "repeated", "seconds", "sensor_name",
+    "service_settings", "timestamp", "warn", "whole",
 ]
 
 if TYPE_CHECKING:
@@ -120,6 +121,24 @@ def add_outputs(parser: argparse.ArgumentParser, *flags: str) -> None:
     parser.add_argument("--report", type=Path, metavar="R.json", help="write the report")
     parser.add_argument("--preview", type=Path, metavar="P.png", dest="rendering",
                         help="write a picture")
+
+
+def add_export(parser: argparse.ArgumentParser) -> None:
+    """Add `--textured`, `--compact`, `--holes` and `--copyright`, of a face's mesh."""
+    parser.add_argument("--textured", action="store_true",
+                        help="take the mesh's colours from the colour image, at full resolution: "
+                             ".glb or .obj")
+    parser.add_argument("--compact", action="store_true",
+                        help="pack a .glb to a tenth, for browsers (EXT_meshopt_compression)")
+    parser.add_argument("--holes", choices=HOLES, default=PLAIN.holes,
+                        help="of a mesh: leave them open, or close them (default: leave)")
+    parser.add_argument("--copyright", metavar="TEXT", default=PLAIN.copyright,
+                        help="who has the rights in a .glb")
+
+
+def export_options(args: argparse.Namespace) -> ExportOptions:
+    """Read what `add_export` added, but for `--textured`; raises `UsageError`."""
+    return ExportOptions(args.holes, None, args.compact, args.copyright)
 
 
 def add_mode(parser: argparse.ArgumentParser) -> None:

@@ -16,6 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--timeout", type=_options.seconds, default=60.0, metavar="S",
                         help="longest wait for a face that is being made, seconds (default: 60)")
     _options.add_outputs(parser, "--save")
+    _options.add_export(parser)
     parser.add_argument("--frame", type=Path, metavar="F.npz",
                         help="write the frame as the sensor gave it, for `denseface reconstruct`; "
                              "also where no face was found in it")
@@ -31,7 +32,8 @@ def run(args: argparse.Namespace) -> int:
     from denseface.service.tools.fetch import fetch_face
     from denseface.service.tools.frame_files import FrameFiles
 
-    files = FaceFiles(args.output, args.report, args.rendering, args.mode)
+    files = FaceFiles(args.output, args.report, args.rendering, args.mode,
+                      _options.export_options(args), args.textured)
     frame_files = FrameFiles(args.frame, args.photo, args.mode)
     with _options.operator(args) as client:
         capture_id = args.capture_id
@@ -39,8 +41,10 @@ def run(args: argparse.Namespace) -> int:
             if not (newest := client.captures(1)):
                 raise UnknownCaptureError("--last: the hub keeps no capture")
             capture_id = newest[0].capture_id
-        if frame_files:  # first: where there is no face, it shows why
+        frame = None
+        if frame_files or files.textured:  # first: where there is no face, it shows why
             frame = client.get_frame(capture_id, timeout=args.timeout)
+        if frame is not None and frame_files:
             frame_files.write(frame)
             for line in frame_files.describe(frame):
                 complain(line)
@@ -48,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
                 say(capture_id)
                 return 0
         face = fetch_face(client, capture_id, files, args.timeout)
-    files.write(face)
+    files.write(face, frame)
     say(f"{capture_id} {len(face.dense)} points")
     _options.warn(face)
     for line in describe(files, face):

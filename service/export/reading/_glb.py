@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from denseface.service.export.reading._images import sample
+from denseface.service.export.reading._meshopt import unpack
 from denseface.service.export.reading.meshes import RawMesh
 
 __all__ = ["from_glb"]
@@ -20,7 +22,8 @@ _JSON, _BIN = 0x4E4F534A, 0x004E4942
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _POINTS, _TRIANGLES = 0, 4
-_KNOWN_EXTENSIONS = {"KHR_mesh_quantization"}
+_MESHOPT, _TRANSFORM = "EXT_meshopt_compression", "KHR_texture_transform"
+_KNOWN_EXTENSIONS = {"KHR_mesh_quantization", "KHR_materials_unlit", _MESHOPT, _TRANSFORM}
 _MAX_NODES = 1000
 _MAX_POINTS = 1 << 24
 """Of all meshes as often as they are shown."""
@@ -58,6 +61,7 @@ def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
 class _Document:
     def __init__(self, document: dict[str, Any], body: bytes) -> None:
         self._document, self._body = document, body
+        self._unpacked: dict[int, bytes] = {}
         unknown = set(document.get("extensionsRequired", ())) - _KNOWN_EXTENSIONS
         if unknown:
             raise ValueError(f"needs what is not read: {', '.join(sorted(map(str, unknown)))}")
@@ -75,7 +79,7 @@ class _Document:
                 positions = self._accessor(named["POSITION"], ("VEC3",))
                 placed = positions @ matrix[:3, :3].T + matrix[:3, 3]
                 points.append(placed * _TO_CAMERA)
-                colors.append(self._colors(named, len(positions)))
+                colors.append(self._colors(primitive, len(positions)))
                 if mode == _TRIANGLES:
                     corners = self._corners(primitive, len(positions))
                     if np.linalg.det(matrix[:3, :3]) < 0:  # section 3.7.4: the front is mirrored
@@ -136,9 +140,8 @@ class _Document:
                              "not sparse")
         item = np.dtype(_COMPONENTS[accessor["componentType"]])
         view = self._item("bufferViews", accessor["bufferView"])
-        data, stride = self._view(view), view.get("byteStride", item.itemsize * _SIZES[kind])
-        start = accessor.get("byteOffset", 0)
-        width = item.itemsize * _SIZES[kind]
+        data, width = self._view(accessor["bufferView"]), item.itemsize * _SIZES[kind]
+        stride, start = view.get("byteStride", width), accessor.get("byteOffset", 0)
         if (type(stride) is not int or type(start) is not int or start < 0
                 or not width <= stride <= 252 or start + stride * (count - 1) + width > len(data)):
             raise ValueError("an accessor goes beyond its bytes")
@@ -146,7 +149,18 @@ class _Document:
         values = np.ndarray(shape, item, data, start, steps)
         return (values[:, 0] if kind == "SCALAR" else values), accessor
 
-    def _view(self, view: dict[str, Any]) -> bytes:
+    def _view(self, number: int) -> bytes:
+        view = self._item("bufferViews", number)
+        packed = view.get("extensions", {}).get(_MESHOPT)
+        if packed is None:
+            return self._part(view)
+        if number not in self._unpacked:
+            self._unpacked[number] = unpack(
+                self._part(packed), mode=packed["mode"], count=packed["count"],
+                stride=packed["byteStride"], packing=packed.get("filter"))
+        return self._unpacked[number]
+
+    def _part(self, view: dict[str, Any]) -> bytes:
         if view.get("buffer") != 0 or "uri" in self._item("buffers", 0):
             raise ValueError("buffers beside the file are not read")
         start, size = view.get("byteOffset", 0), view["byteLength"]
@@ -165,9 +179,11 @@ class _Document:
                              f"one of {count} points")
         return corners.astype(np.int64).reshape(-1, 3)
 
-    def _colors(self, named: dict[str, Any], count: int) -> NDArray[np.uint8] | None:
+    def _colors(self, primitive: dict[str, Any], count: int) -> NDArray[np.uint8] | None:
+        """Give the points' own colours, or else those of the texture."""
+        named = primitive["attributes"]
         if "COLOR_0" not in named:
-            return None
+            return self._texture(primitive, count)
         linear = self._accessor(named["COLOR_0"], ("VEC3", "VEC4"))[:, :3]
         if len(linear) != count:
             raise ValueError(f"{len(linear)} colours of {count} points")
@@ -176,6 +192,25 @@ class _Document:
         curved = np.where(linear <= 0.0031308, linear * 12.92,
                           1.055 * linear ** (1 / 2.4) - 0.055)
         return np.asarray(np.rint(curved * 255), np.uint8)
+
+
+    def _texture(self, primitive: dict[str, Any], count: int) -> NDArray[np.uint8] | None:
+        if "material" not in primitive:
+            return None
+        used = self._item("materials", primitive["material"]).get(
+            "pbrMetallicRoughness", {}).get("baseColorTexture")
+        if used is None or used.get("texCoord", 0) or "TEXCOORD_0" not in primitive["attributes"]:
+            return None
+        uv = self._accessor(primitive["attributes"]["TEXCOORD_0"], ("VEC2",))
+        if len(uv) != count:
+            raise ValueError(f"{len(uv)} places in the texture of {count} points")
+        moved = used.get("extensions", {}).get(_TRANSFORM, {})
+        if moved.get("rotation") or moved.get("texCoord"):
+            return None
+        uv = (uv * _numbers(moved.get("scale", (1, 1)), 2)
+              + _numbers(moved.get("offset", (0, 0)), 2))
+        image = self._item("images", self._item("textures", used["index"]).get("source"))
+        return sample(self._view(image["bufferView"]), uv) if "bufferView" in image else None
 
 
 def _matrix(node: dict[str, Any]) -> NDArray[np.float64]:
@@ -200,5 +235,5 @@ def _matrix(node: dict[str, Any]) -> NDArray[np.float64]:
 def _numbers(values: Any, count: int) -> NDArray[np.float64]:
     numbers = np.array(values, np.float64)
     if numbers.shape != (count,) or not (np.abs(numbers) < 1e9).all():
-        raise ValueError(f"a node is placed by {str(values)[:40]}, expected {count} numbers")
+        raise ValueError(f"{str(values)[:40]}, expected {count} numbers")
     return numbers

@@ -120,6 +120,6 @@ def _row(
             draw_refused(files.rendering, taken.frame, error, f"{one.uri}, frame {taken.number}")
             written.add(files.rendering)
         return Row(name, one.uri, taken.number, str(error), warnings=taken.frame.origin.notes)
-    files.write(face)
-    written.add(files.output, files.report, files.rendering)
+    files.write(face, taken.frame)
+    written.add(files.output, *files.beside, files.report, files.rendering)
     return Row.of(name, one.uri, taken.number, face)

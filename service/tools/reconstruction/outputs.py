@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from denseface.service.errors import UsageError
-from denseface.service.export import FORMATS, FaceFiles, check_outputs
+from denseface.service.export import FORMATS, ExportOptions, FaceFiles, check_outputs
+from denseface.service.export.formats import beside
 
 __all__ = ["Outputs"]
 
@@ -25,6 +26,8 @@ class Outputs:
     face, report, picture : file or folder, as given; None where not asked for
     ending : of faces' files in a folder, with its dot; None for `.ply`
     table : file of the table, `.csv`; None where not asked for
+    options : of faces' files
+    textured : faces' meshes have the colour image as their texture
     """
 
     face: str | None = None
@@ -32,6 +35,8 @@ class Outputs:
     picture: str | None = None
     ending: str | None = None
     table: Path | None = None
+    options: ExportOptions = field(default_factory=ExportOptions)
+    textured: bool = False
     _taken: set[str] = field(default_factory=set, init=False)
     _read: set[Path] = field(default_factory=set, init=False)
 
@@ -84,7 +89,7 @@ class Outputs:
 
     def files(self, name: str) -> FaceFiles:
         """Give the files of a face of a name; raises as `FaceFiles`, and where one is read."""
-        return FaceFiles(*self._placed(name))
+        return FaceFiles(*self._placed(name), options=self.options, textured=self.textured)
 
     def _placed(self, name: str) -> tuple[Path | None, Path | None, Path | None]:
         """Give where face, report and picture go."""
@@ -93,7 +98,8 @@ class Outputs:
             Path(given, name + ending) if given and _is_folder(given) else
             None if given is None else Path(given)
             for given, ending in zip(self._given.values(), endings, strict=True))
-        for path in filter(None, (face, report, picture)):
+        further = beside(face, textured=self.textured) if face else ()
+        for path in filter(None, (face, report, picture, *further)):
             if path.resolve() in self._read:
                 raise UsageError(f"{path}: is read, and would be replaced by what is written: name "
                                  "another place")

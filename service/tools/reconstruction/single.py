@@ -66,7 +66,7 @@ def reconstruct_one(taken: Taken, settings: Settings, outputs: Outputs) -> tuple
             draw_refused(files.rendering, frame, error, taken.shown)
         raise explained(error, taken.shown, frames=taken.read.total,
                         picture=files.rendering) from error
-    files.write(face)
+    files.write(face, frame)
     report = face.report
     return face, [
         f"{report.initial_points:,} measured points, {report.dense_points:,} dense points, "

@@ -14,6 +14,7 @@ from PIL import Image
 from denseface.capture.frame import FrameOrigin
 from denseface.recon.settings import Settings
 from denseface.service.export import FORMATS, load_face, save_face
+from denseface.service.export.options import LIKENESS
 from denseface.service.export.photo import to_photo
 from denseface.service.export.provenance import comments, provenance, stl_header
 from denseface.service.export.refusal import draw_refusal
@@ -77,7 +78,7 @@ def test_glb_says_it_in_its_asset(saved):
     data = saved(".glb").read_bytes()
     size = struct.unpack_from("<I", data, 12)[0]
     asset = json.loads(data[20:20 + size])["asset"]
-    assert asset == {"version": "2.0", "generator": TOLD["generator"],
+    assert asset == {"version": "2.0", "generator": TOLD["generator"], "copyright": LIKENESS,
                      "extras": {name: TOLD[name] for name in TOLD if name != "generator"}}
 
 

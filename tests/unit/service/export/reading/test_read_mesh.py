@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from denseface.service.errors import FormatError
-from denseface.service.export import FORMATS, save_face
+from denseface.service.export import FORMATS, ExportOptions, save_face
 from denseface.service.export.mesh import triangulate
 from denseface.service.export.reading import MESH_ENDINGS, read_mesh
 from tests.unit.service.faces import small_face
@@ -295,9 +295,10 @@ def test_what_is_no_file_is_told(tmp_path):
         read_mesh(5)
 
 
-@pytest.mark.parametrize("ending", [".ply", ".pcd", ".obj", ".stl", ".glb"])
+@pytest.mark.parametrize("ending", [".ply", ".pcd", ".obj", ".stl", ".glb", ".compact.glb"])
 def test_damage_anywhere_is_a_line_or_another_mesh(tmp_path, ending):
-    save_face(small_face(3, 3), tmp_path / f"f{ending}")
+    save_face(small_face(4, 4), tmp_path / f"f{ending}",
+              options=ExportOptions(compact="compact" in ending))
     whole = (tmp_path / f"f{ending}").read_bytes()
     rng, refused = np.random.default_rng(3), []
     for _ in range(60):

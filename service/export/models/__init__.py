@@ -1,0 +1,1 @@
+"""Meshes as files of several parts: OBJ with its material, glTF plain, textured and compact."""
