@@ -5,9 +5,13 @@ forward). `docs/howto/view.md` says what is logged where.
 """
 
 import os
+import subprocess
+import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
+from shutil import which
+from tempfile import TemporaryDirectory
 
 import cv2
 import numpy as np
@@ -26,10 +30,12 @@ from denseface.service.view.items import Item, Taken
 from denseface.service.view.shelf import short_names
 from denseface.service.view.telling import figures
 
-__all__ = ["SIGMA_RANGE_MM", "log_items", "sigma_colors", "to_rerun", "written"]
+__all__ = ["SIGMA_RANGE_MM", "log_items", "sigma_colors", "to_rerun", "viewer_command",
+           "written"]
 
 SIGMA_RANGE_MM = 0.5, 4.0
 """Standard errors at the ends of the colours' scale, as the page has it."""
+_SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
 _M = 1e-3
 """Of a millimetre, metres."""
 _PLANE_M = 0.2
@@ -43,7 +49,7 @@ def to_rerun(items: Sequence[Item], number: int | None, save: Path | None, *, vi
     ----------
     items, number : as of `log_items`
     save : file to write, `.rrd`
-    viewer : whether rerun's viewer is started, and shows them
+    viewer : whether rerun's viewer shows them; it is waited for until it is closed
 
     Raises
     ------
@@ -52,14 +58,16 @@ def to_rerun(items: Sequence[Item], number: int | None, save: Path | None, *, vi
     UsageError
         The viewer cannot be started.
     """
+    command = viewer_command() if viewer else []
     stream = rr.RecordingStream("denseface")
-    if viewer:
-        _show(stream)
-    with written(stream, save) if save else nullcontext():
-        frames, shapes = log_items(stream, items, number)
-    stream.disconnect()
-    say(f"{frames} frame{'s' * (frames != 1)}, {shapes} to be seen"
-        + (f"; {save}: `rerun {save}` shows it" if save else ""))
+    with TemporaryDirectory(prefix="denseface-") as folder:
+        path = save or Path(folder, "denseface.rrd")
+        with written(stream, path):
+            frames, shapes = log_items(stream, items, number)
+        say(f"{frames} frame{'s' * (frames != 1)}, {shapes} to be seen"
+            + (f"; {save}: `rerun {save}` shows it" if save else ""), flush=True)
+        if viewer and shapes:
+            _show([*command, str(path)], Path(folder, "log"))
     return 0 if shapes else 1
 
 
@@ -85,19 +93,34 @@ def written(stream: rr.RecordingStream, path: Path) -> Iterator[None]:
         part.unlink(missing_ok=True)
 
 
-def _show(stream: rr.RecordingStream) -> None:
-    """Let rerun's viewer show what is logged from now on.
+def viewer_command() -> list[str]:
+    """Give how rerun's viewer is started; a file follows.
 
     Raises
     ------
     UsageError
-        It cannot be started.
+        There is none, or no screen for it.
     """
-    try:
-        rr.spawn(recording=stream)
-    except (OSError, RuntimeError) as error:
-        raise UsageError(f"--rerun: {reason_of(error)}; --save OUT.rrd writes a file for "
-                         "it") from error
+    beside = Path(sys.executable).with_name("rerun")
+    found = str(beside) if beside.exists() else which("rerun")
+    if found is None:
+        raise UsageError("--rerun: there is no program `rerun`; pip install rerun-sdk brings it")
+    if sys.platform == "linux" and not any(os.environ.get(name) for name in _SCREENS):
+        raise UsageError("--rerun: no screen here; --save OUT.rrd writes a file for it")
+    # Of itself it listens on all addresses of the machine, for whoever wants to follow.
+    return [found, "--bind", "127.0.0.1", "--port", "auto"]
+
+
+def _show(command: list[str], log: Path) -> None:
+    """Run the viewer until it is closed. It reads a file: a stream could be read by others, too."""
+    with log.open("wb") as said:
+        status = subprocess.run(command, check=False, stdout=said, stderr=said,
+                                stdin=subprocess.DEVNULL).returncode
+    if status:
+        lines = log.read_text(errors="replace").split("\n")
+        errors = [line for line in lines if line.startswith("Error")] or [
+            line for line in lines if line] or [f"status {status}"]
+        raise UsageError(f"--rerun: rerun's viewer failed: {errors[-1]}")
 
 
 def log_items(

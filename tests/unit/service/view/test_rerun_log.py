@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from denseface.recon import NoFaceError, Settings
-from denseface.service.errors import StoreError
+from denseface.service.errors import StoreError, UsageError
 from denseface.service.export.mesh import triangulate
 from denseface.service.export.reading import Mesh
 from denseface.service.view import items as module
@@ -149,3 +149,30 @@ def test_a_file_is_whole_or_not_there(tmp_path):
         to_rerun([Broken("x", FACE)], None, tmp_path / "out.rrd", viewer=False)
     assert (tmp_path / "out.rrd").read_text() == "before"
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_the_viewer_gets_a_file_that_is_gone_when_it_is_closed(tmp_path, monkeypatch):
+    from denseface.service.view.rerun_log import to_rerun
+
+    program = tmp_path / "rerun"
+    program.write_text(f'#!/bin/sh\necho "$@" > {tmp_path}/asked\nfor one; do true; done\n'
+                       f'cp "$one" {tmp_path}/shown.rrd\n')
+    program.chmod(0o700)
+    monkeypatch.setattr("sys.executable", str(tmp_path / "python"))
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(UsageError, match="--rerun: no screen here; --save"):
+        to_rerun([FaceItem("x", FACE)], None, None, viewer=True)
+    monkeypatch.setenv("DISPLAY", ":0")
+    assert to_rerun([FaceItem("x", FACE)], None, None, viewer=True) == 0
+    *flags, file = (tmp_path / "asked").read_text().split()
+    assert flags == ["--bind", "127.0.0.1", "--port", "auto"], "for nobody else"
+    assert not Path(file).parent.exists()
+    assert "/face/mesh" in read(tmp_path / "shown.rrd")
+    program.write_text("#!/bin/sh\necho no graphics >&2; exit 3\n")
+    with pytest.raises(UsageError, match="rerun's viewer failed: no graphics"):
+        to_rerun([FaceItem("x", FACE)], None, None, viewer=True)
+    program.unlink()
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(UsageError, match="there is no program `rerun`"):
+        to_rerun([FaceItem("x", FACE)], None, None, viewer=True)
