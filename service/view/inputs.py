@@ -6,12 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from denseface.capture.errors import CaptureError
 from denseface.capture.source import ReplayOptions
 from denseface.recon import Settings
-from denseface.service.errors import UsageError
+from denseface.service.errors import FormatError, UsageError
 from denseface.service.export import load_face
 from denseface.service.export.reading import MESH_ENDINGS, read_mesh
 from denseface.service.tools.frames import FrameChoice
+from denseface.service.tools.info import Info, inspect
 from denseface.service.tools.reconstruction.inputs import find_inputs
 from denseface.service.tools.reconstruction.single import take_pair
 from denseface.service.view.items import FaceItem, FrameItem, Item, MeshItem, RecordingItem
@@ -68,12 +70,20 @@ class Reader:
         if path.suffix.lower() == _WHOLE and _is_face(path):
             return [FaceItem(given, load_face(path))]
         if path.suffix.lower() in _MESHES:
-            return [MeshItem(given, read_mesh(path))]
+            return [MeshItem(given, read_mesh(path), _info(path))]
         inputs = find_inputs([given])
         if not inputs:
             raise UsageError(f"{given}: a calibration, expected a face, frame, recording or folder")
         return [RecordingItem.opened(one, self.choice, self.settings, self.first)
                 for one in inputs]
+
+
+def _info(path: Path) -> Info:
+    """Say what a file of a mesh tells of itself; nothing where it tells it wrongly."""
+    try:
+        return inspect(path)
+    except (FormatError, CaptureError):
+        return {}
 
 
 def _is_face(path: Path) -> bool:

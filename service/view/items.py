@@ -1,8 +1,9 @@
 """What can be looked at: faces, frames of recordings, captures of a hub."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, NamedTuple, Protocol
 
 from denseface.capture import RgbdFrame
 from denseface.capture.errors import CaptureError
@@ -24,6 +25,8 @@ class Taken(NamedTuple):
     frame: RgbdFrame | None = None
     error: Exception | None = None
     mesh: Mesh | None = None
+    info: Mapping[str, Any] = MappingProxyType({})
+    """Of a mesh: what `denseface info` says of its file."""
 
 
 class Item(Protocol):
@@ -78,6 +81,8 @@ class MeshItem:
 
     name: str
     mesh: Mesh
+    info: Mapping[str, Any] = field(default_factory=dict)
+    """What `denseface info` says of the file; empty where that is not known."""
 
     @property
     def head(self) -> ItemHead:
@@ -87,7 +92,7 @@ class MeshItem:
     def take(self, number: int) -> Taken:
         """Give its frame of a number."""
         _check_number(self.name, number, 1)
-        return Taken(0, mesh=self.mesh)
+        return Taken(0, mesh=self.mesh, info=self.info)
 
     def each(self) -> Iterator[Taken]:
         """Give every frame."""

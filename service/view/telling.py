@@ -1,6 +1,7 @@
 """What is told of a face, a frame without one, or a mesh: texts and bytes for the page."""
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,21 +49,24 @@ def tell(item: Item, number: int, name: str) -> Told:
     head, taken = item.head, item.take(number)
     title = name if head.kind != "frames" or head.frames == 1 else f"{name}, frame {number}"
     if taken.mesh:
-        return _mesh(title, taken.mesh)
+        return _mesh(title, taken.mesh, taken.info)
     return _face(title, taken.face) if taken.face else _refused(title, taken)
 
 
-def _mesh(title: str, mesh: Mesh) -> Told:
+def _mesh(title: str, mesh: Mesh, info: Mapping[str, Any]) -> Told:
     points, triangles = mesh.points, mesh.triangles
-    told = {"Points": f"{len(points):,}"}
+    told = {"Format": str(info.get("format", "")), "Points": f"{len(points):,}"}
     if triangles is not None:
         told["Triangles"] = f"{len(triangles):,}"
     if len(points):
         told["Size"] = "{:.1f} x {:.1f} x {:.1f} mm".format(*np.ptp(points, axis=0))
     told["Colours"] = "none" if mesh.colors is None else "of each point"
+    if "closed" in info:
+        told["Closed"] = "yes" if info["closed"] else "no"
     problem = "" if len(points) else "there are no points in it"
     return Told(Seen(shape="mesh" if len(points) else "none", title=title, problem=problem,
-                     figures=_facts(told)), encode_mesh(mesh) if len(points) else b"")
+                     figures=_facts(told), provenance=_facts(info.get("provenance", {}))),
+                encode_mesh(mesh) if len(points) else b"")
 
 
 def _face(title: str, face: Face) -> Told:
@@ -119,6 +123,6 @@ def figures(face: Face) -> tuple[Fact, ...]:
     return _facts(told)
 
 
-def _facts(told: dict[str, str]) -> tuple[Fact, ...]:
+def _facts(told: Mapping[str, str]) -> tuple[Fact, ...]:
     return tuple(Fact(name=_NAMES.get(name, name), value=text) for name, text in told.items()
                  if text)

@@ -17,6 +17,7 @@ from denseface.service.view import items as module
 from denseface.service.view.captures import Captures
 from denseface.service.view.inputs import Reader
 from denseface.service.view.items import FaceItem, FrameItem, MeshItem, RecordingItem
+from denseface.service.view.messages import Fact
 from denseface.service.view.shelf import Shelf, short_names
 from denseface.service.view.telling import tell
 from tests.face_grid_reader import read_face_grid
@@ -46,6 +47,8 @@ def test_a_word_is_a_face_a_mesh_frames_or_a_capture(tmp_path, monkeypatch):
         save_frame(FRAME, name if name.endswith("z") else f"{name}.npz")
     kinds = [(item.head.kind, item.head.name, item.head.frames) for item in reader().items(
         ["face.npz", "face.PLY", "frame.npz", "frames", "3f2a"])]
+    mesh = reader().items(["face.PLY"])[0]
+    assert [fact.name for fact in tell(mesh, 0, "x").seen.provenance][:1] == ["Made by"]
     assert kinds == [("face", "face.npz", 1), ("mesh", "face.PLY", 1), ("frames", "frame.npz", 1),
                      ("frames", "frames", 2), ("capture", "3f2a", 1)]
     (tmp_path / "3f2a").write_text("")
@@ -91,9 +94,13 @@ def test_a_face_off_its_grid_is_said_to_be_none():
 
 def test_a_mesh_is_told_with_its_size():
     points = np.array([[0, 0, 700], [10, 0, 700], [0, 20, 705]], np.float32)
-    told = tell(MeshItem("a.stl", Mesh(points, np.array([[0, 1, 2]], np.int32), None)), 0, "a.stl")
+    mesh = Mesh(points, np.array([[0, 1, 2]], np.int32), None)
+    info = {"format": "STL", "closed": False, "provenance": {"sensor": "A"}}
+    told = tell(MeshItem("a.stl", mesh, info), 0, "a.stl")
+    assert told.seen.provenance == (Fact(name="Sensor", value="A"),)
     assert {fact.name: fact.value for fact in told.seen.figures} == {
-        "Points": "3", "Triangles": "1", "Size": "10.0 x 20.0 x 5.0 mm", "Colours": "none"}
+        "Format": "STL", "Closed": "no", "Points": "3", "Triangles": "1",
+        "Size": "10.0 x 20.0 x 5.0 mm", "Colours": "none"}
     assert told.shape[:4] == b"DFMS"
     empty = tell(MeshItem("a.ply", Mesh(points[:0], None, None)), 0, "a.ply")
     assert (empty.seen.shape, empty.seen.problem) == ("none", "there are no points in it")

@@ -57,6 +57,7 @@ export class ItemStage {
       if (asked.signal.aborted) return;
       this.looked = null;
       this.viewer.clear();
+      set(this.picture, { hidden: true });
       write(this.state, error instanceof Error ? error.message : String(error));
     } finally {
       clearTimeout(told);

@@ -115,17 +115,19 @@ export class Stage {
     this.wipe();
     if (!this.#loaded) return null;
     this.#look(shown.view, this.#loaded.surface);
-    this.#sigma.confidence.value = shown.confidence;
-    const at = this.#split(shown, this.#loaded.surface);
+    // A mesh has neither: it stays as it is beside faces that show theirs.
+    const { seeds } = this.#loaded;
+    this.#sigma.confidence.value = seeds ? shown.confidence : 0;
+    const at = seeds ? this.#split(shown, this.#loaded.surface) : 1;
     const { width, height } = renderer.getSize(new Vector2());
     if (at > 0) {
       this.#within(0, at * width, height);
       this.#drawDense(shown, this.#loaded);
     }
-    if (at < 1) {
+    if (seeds && at < 1) {
       this.#within(at * width, (1 - at) * width, height);
       this.#seedMaterial.uniforms["diameter"]!.value = SEED_SIZE * this.#loaded.spacingMm;
-      if (this.#loaded.seeds) this.#draw(this.#points, this.#loaded.seeds, this.#seedMaterial);
+      this.#draw(this.#points, seeds, this.#seedMaterial);
     }
     if (at <= 0 || at >= 1) return null;
     const [bottom, top] = this.#faceHeight(shown, this.#loaded.surface);
