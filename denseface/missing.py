@@ -5,8 +5,10 @@ from contextlib import contextmanager
 
 from denseface.errors import MissingPackageError
 
-__all__ = ["EXTRAS", "explained", "missing"]
+__all__ = ["BASE", "EXTRAS", "explained", "missing"]
 
+BASE = "numpy", "pydantic", "pyzmq"
+"""Packages that are always there."""
 EXTRAS = {
     "cv2": ("opencv-python-headless", "worker"),
     "matplotlib": ("matplotlib", "notebook"),

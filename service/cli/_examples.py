@@ -39,6 +39,8 @@ EXAMPLES = {
     "hub": "hub --listen tcp://0.0.0.0:5555 --metrics 9100",
     "capture": "capture --source openni2: --name entrance",
     "warm": "warm",
+    "bench": "bench --quick",
+    "completion": "completion bash",
     "worker": "worker --address ipc:///run/denseface/hub",
     "kiosk": "kiosk --kiosk-address 8080",
     "help": "help press",

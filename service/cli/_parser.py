@@ -4,7 +4,8 @@ import argparse
 import itertools
 import re
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from functools import partial
 from typing import Any, NoReturn
@@ -23,11 +24,15 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     """Read the arguments of a process, or these; exits where they are wrong or ask for help."""
     parser = _parser()
     args = parser.parse_args(arguments)
+    if args.version:
+        say(*_versions(everything=args.verbose), flush=True)
+        parser.exit()
     if args.command is None:
         parser.print_help()
         parser.exit()
     if args.command == "help":
         parser.parse_args([*args.words, "--help"])
+    args.whole_parser = _whole_parser  # for what tells a shell of all flags
     return args
 
 
@@ -118,7 +123,9 @@ def _parser() -> _Parser:
     parser = _Parser(
         prog="denseface", description="One press, one depth frame, one dense coloured 3D face.",
         epilog=f"{FIRST}\n\n{EXIT_STATUSES}")
-    parser.add_argument("--version", action=_Version)
+    parser.add_argument("--version", action="store_true", help="show the version and exit")
+    parser.add_argument("--verbose", action="store_true",
+                        help="with --version: show those of Python, the system and packages, too")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for name, text in COMMANDS.items():
         command = commands.add_parser(
@@ -137,15 +144,38 @@ def _declare(name: str, parser: argparse.ArgumentParser) -> None:
     load(name).add_arguments(parser)
 
 
-class _Version(argparse.Action):
-    def __init__(self, option_strings: Sequence[str], dest: str) -> None:
-        super().__init__(option_strings, dest, nargs=0, help="show the version and exit")
+def _whole_parser() -> argparse.ArgumentParser:
+    """Give the parser with the flags of all commands, which `parse` declares when they are run."""
+    def complete(parser: argparse.ArgumentParser) -> None:
+        if isinstance(parser, _Parser):
+            parser.complete()
+        for action in parser._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                for one in action.choices.values():
+                    complete(one)
 
-    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
-        from denseface.version import VERSION
+    parser = _parser()
+    complete(parser)
+    return parser
 
-        say(VERSION, flush=True)
-        parser.exit()
+
+def _versions(*, everything: bool) -> Iterator[str]:
+    """Give this version; also those of all that it rests on, as a report of a fault needs them."""
+    from denseface.version import VERSION
+
+    yield VERSION
+    if not everything:
+        return
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    from denseface.missing import BASE, EXTRAS
+
+    yield f"Python {platform.python_version()} ({sys.executable})"
+    yield platform.platform()
+    for package in sorted({*BASE, "open3d-cpu", *(package for package, _ in EXTRAS.values())}):
+        with suppress(PackageNotFoundError):
+            yield f"{package} {version(package)}"
 
 
 def _example(prog: str) -> str | None:

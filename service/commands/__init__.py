@@ -30,13 +30,16 @@ COMMANDS = {
     "capture": "run a capture process alone",
     "worker": "run a reconstruction worker alone",
     "warm": "compile now what the first start would otherwise wait for",
+    "bench": "measure how fast this machine makes faces",
+    "completion": "print what a shell needs to complete commands and flags",
     "kiosk": "run the page alone where visitors see their own face",
 }
 """What each does, by the name of its module, in the order of `denseface --help`."""
 
 _SUBROOMS = (dict.fromkeys(("calibrate", "doctor", "record"), "sensor")
              | dict.fromkeys(("get", "list"), "captures")
-             | dict.fromkeys(("info",), "files"))
+             | dict.fromkeys(("info",), "files")
+             | dict.fromkeys(("bench", "completion", "warm"), "machine"))
 """Where a command's module is, if not here."""
 
 

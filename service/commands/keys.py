@@ -5,7 +5,7 @@ import os
 from contextlib import suppress
 
 from denseface.service.commands import _options
-from denseface.service.runtime.terminal import say
+from denseface.service.runtime.terminal import say, suggest
 
 _ROLES = ("sensor", "worker", "presser", "subscriber", "operator")
 
@@ -41,6 +41,9 @@ def run(args: argparse.Namespace) -> int:
             secret, public = security.new_pair(folder, args.name)
             say(f"{secret}  stays where it is used",
                 f"{public}  goes to the other side: {security.read_public(public)}")
+            if args.name != "hub":
+                suggest(f"denseface keys allow {args.name} {public.name} ROLE",
+                        f"on the hub's machine, which {public.name} was brought to")
         case "allow":
             one = security.allow(folder, args.name, security.read_public(args.public),
                                  frozenset(map(Role, args.roles)))

@@ -1,9 +1,10 @@
 """`denseface press`."""
 
 import argparse
+import shlex
 
 from denseface.service.commands import _options
-from denseface.service.runtime.terminal import complain, say
+from denseface.service.runtime.terminal import complain, say, suggest
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,4 +52,6 @@ def run(args: argparse.Namespace) -> int:
     _options.warn(face)
     for line in describe(files, face):
         complain(line)  # stdout has the id, and nothing else
+    suggest(f"denseface view {shlex.quote(str(files.output)) if files.output else capture_id}",
+            "look at it")
     return 0

@@ -1,13 +1,14 @@
 """`denseface reconstruct`."""
 
 import argparse
+import shlex
 from pathlib import Path
 
 from denseface.service.commands import _options
 from denseface.service.commands._options import reading
 from denseface.service.export import FORMATS
 from denseface.service.runtime.collection import collect_from_now_on
-from denseface.service.runtime.terminal import say
+from denseface.service.runtime.terminal import say, suggest
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,6 +78,8 @@ def run(args: argparse.Namespace) -> int:
     total = taken.read.total or 1
     if args.frame is None and args.frames == 1 and total > 1:
         say(f"frame 0 of {total}: --frame N takes another, --all-frames each")
+    if args.output and Path(args.output).is_file():
+        suggest(f"denseface view {shlex.quote(args.output)}", "look at it")
     return 0
 
 

@@ -1,5 +1,6 @@
 """Record a source, so that whatever ends it what was recorded can be played."""
 
+import shlex
 import shutil
 import time
 from collections.abc import Iterator
@@ -18,7 +19,7 @@ from denseface.service.errors import StoreError, UsageError, reason_of
 from denseface.service.log.output import exit_now
 from denseface.service.runtime.files import check_outside_hub
 from denseface.service.runtime.signals import StopSignal
-from denseface.service.runtime.terminal import complain, flush_stdout, say
+from denseface.service.runtime.terminal import complain, flush_stdout, say, suggest
 from denseface.service.runtime.terminal.progress import Progress
 from denseface.service.tools._recording import FrameReader
 
@@ -88,6 +89,8 @@ def run(
     held = f"{writer.frames} frames" if writer.frames else "nothing was recorded"
     lost = f", {reader.lost} were lost" if reader.lost else ""
     say(f"{out}: {held}{lost}; {end.why}")
+    if writer.frames:
+        suggest(f"denseface reconstruct {shlex.quote(str(out))} -o face.ply", "a face of it")
     if hangs:
         flush_stdout()
         exit_now(end.status)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from denseface.capture.frame import DepthMeaning, DepthRounding
+from denseface.service.tools.bench import sample_frame
 from tests.virtual_sensor.fixtures import FIXTURES, FOLDER
 from tests.virtual_sensor.process import play
 
@@ -35,6 +36,12 @@ def test_a_fixture_plays(name):
         assert origin.startswith("recording: ZPD 120")
     truth: Path = FOLDER / f"{name}.truth.npz"
     assert truth.exists() == bool(FIXTURES[name].scene.people)
+    if name == "wall_close":  # what `denseface bench` measures is this
+        sample = sample_frame()
+        assert (sample.depth == frames[0].depth).all()
+        assert np.abs(sample.rgb.astype(int) - frames[0].rgb).mean() < 2
+        assert (sample.calibration, sample.depth_meaning) == (
+            frames[0].calibration, frames[0].depth_meaning)
     for frame in frames:
         assert frame.depth.shape == (480, 640)
         assert np.count_nonzero(frame.depth) > 10_000

@@ -2,12 +2,13 @@
 
 import argparse
 import re
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from denseface.service.commands import _options
 from denseface.service.commands._options.values import wanted
-from denseface.service.runtime.terminal import complain, say
+from denseface.service.runtime.terminal import complain, say, suggest
 from denseface.service.runtime.terminal.progress import Progress
 
 if TYPE_CHECKING:
@@ -70,6 +71,8 @@ def run(args: argparse.Namespace) -> int:
     say(*_lines(solution), *map(str, outputs))
     for warning in warnings:
         complain(f"warning: {warning}")
+    for path in outputs[:1]:
+        suggest(f"denseface live --calibration {shlex.quote(str(path))}", "faces by it")
     return 0
 
 

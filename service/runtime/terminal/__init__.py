@@ -11,9 +11,10 @@ from denseface.service.runtime.terminal._lines import (
     printable,
     reader_left,
     say,
+    suggest,
 )
 
 __all__ = [
     "ask", "can_ask", "complain", "complain_of", "discard_unless_flushed",
-    "fill_standard_descriptors", "flush_stdout", "printable", "reader_left", "say",
+    "fill_standard_descriptors", "flush_stdout", "printable", "reader_left", "say", "suggest",
 ]

@@ -15,6 +15,7 @@ from typing import TextIO
 __all__ = [
     "ask", "can_ask", "complain", "complain_of", "discard_unless_flushed",
     "fill_standard_descriptors", "flush_stdout", "printable", "reader_left", "say", "step_aside_by",
+    "suggest",
 ]
 
 _aside: Callable[[], AbstractContextManager[object]] = nullcontext
@@ -63,6 +64,16 @@ def complain(line: str) -> None:
     with _aside(), suppress(OSError, ValueError):
         print(printable(line), file=sys.stderr)
     discard_unless_flushed(sys.stderr)
+
+
+def suggest(command: str, why: str = "") -> None:
+    """Say on stderr what people type next; only to somebody who sees what the command said."""
+    try:
+        seen = all(one is not None and one.isatty() for one in (sys.stdout, sys.stderr))
+    except ValueError:  # closed
+        return
+    if seen:
+        complain(f"next: {command}{'    ' if why else ''}{why}")
 
 
 def can_ask() -> bool:

@@ -8,11 +8,13 @@ import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import structlog
 
+import denseface
 from denseface.capture.npz import save_frame
 from denseface.service.cli import _main, main
 from denseface.service.log.output import process_log
@@ -161,6 +163,30 @@ def test_a_frame_without_a_face_is_one_line_and_status_1(room, tmp_path, capfd):
     assert (status, len(text.splitlines())) == (1, 1)
     assert "face" in text
     assert not (tmp_path / "face.ply").exists()
+
+
+@pytest.mark.parametrize(("command", "extra"), [("reconstruct", "worker"), ("capture", "capture"),
+                                                ("up", "all")])
+def test_a_missing_package_is_one_line_that_names_the_extra(monkeypatch, capfd, command, extra):
+    def run(_):
+        raise ModuleNotFoundError("No module named 'numba'", name="numba.core")
+
+    monkeypatch.setattr(_main, "load", lambda _: SimpleNamespace(run=run))
+    assert outcome(capfd, command, *["x.npz"][:command == "reconstruct"]) == (
+        2, f"denseface {command}: numba is not installed: pip install 'denseface-core[{extra}]' "
+           "brings what is needed here\n")
+
+
+def test_the_version_and_those_of_what_it_rests_on(capsys):
+    for more, least in (([], 1), (["--verbose"], 8)):
+        with pytest.raises(SystemExit) as ended:
+            main(["--version", *more])
+        assert not ended.value.code
+        lines = capsys.readouterr().out.splitlines()
+        assert lines[0] == denseface.__version__
+        assert len(lines) == 1 if least == 1 else len(lines) >= least
+    assert f"numpy {np.__version__}" in lines
+    assert any(line.startswith("Python 3.") for line in lines)
 
 
 def test_debug_shows_the_traceback(tmp_path):

@@ -134,6 +134,13 @@ def _place(tmp_path, monkeypatch):
     (["record", "x.oni", "--mode", "0777777"], 2, "the first a 6 or 7, found '0777777'"),
     (["record", "d", "--source", "none.oni"], 2, "none.oni: no such file"),
 
+    (["bench", "f"], 2, f"f: {KIND}"),
+    (["bench", "none.npz"], 2, "none.npz: no such file"),
+    (["bench", "--calibration", "f"], 2, "f: "),
+    (["bench", "--preset", "x"], 2, "--preset: expected 'paper', 'faithful' or 'best'"),
+    (["completion"], 2, "required: SHELL"),
+    (["completion", "tcsh"], 2, "SHELL: expected bash, zsh or fish, found 'tcsh'"),
+
     (["info"], 2, "required: FILE"),
     (["info", ""], 2, "FILE: expected a word, found ''"),
     (["info", "d"], 2, "d: is a folder, expected a file"),

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from denseface.service import runtime
-from denseface.service.runtime.terminal import printable, say
+from denseface.service.runtime.terminal import printable, say, suggest
 from tests.waiting import LIMIT_S
 
 SERVICE = Path(runtime.__file__).parents[1]
@@ -30,6 +30,15 @@ def test_what_a_terminal_would_obey_is_escaped(given, shown):
 def test_each_line_that_is_said_is_one_line(capsys):
     say("a\nb", "c\x1b")
     assert capsys.readouterr().out == "a\\nb\nc\\x1b\n"
+
+
+@pytest.mark.parametrize(("out", "error", "said"), [
+    (True, True, "next: denseface view x    look at it\n"), (True, False, ""), (False, True, "")])
+def test_the_next_command_is_said_to_who_sees_both_streams(monkeypatch, capsys, out, error, said):
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: out)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: error)
+    suggest("denseface view x", "look at it")
+    assert capsys.readouterr() == ("", said)
 
 
 def test_nothing_else_prints():

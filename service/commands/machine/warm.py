@@ -2,7 +2,7 @@
 
 import argparse
 
-from denseface.service.runtime.terminal import complain, say
+from denseface.service.runtime.terminal import complain, say, suggest
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:  # it has none
@@ -20,4 +20,5 @@ def run(args: argparse.Namespace) -> int:  # noqa: ARG001
         complain(f"denseface warm: {kept.lost}")
         return 1
     say(kept.found)
+    suggest("denseface doctor", "is everything here that a sensor needs?")
     return 0
