@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from denseface.arguments import as_path, expect
+from denseface.missing import explained
 from denseface.service.errors import FormatError, UsageError
 from denseface.service.export.options import PLAIN, ExportOptions
 
@@ -39,6 +40,8 @@ def save_face(
         Where `face` is no face, or `path` no path.
     ServiceError
         Where the file would be in a hub's data folder.
+    MissingPackageError
+        Where `options` ask for what takes a package that is not installed.
     OSError
         Where the file cannot be written: it names the file.
     """
@@ -51,12 +54,14 @@ def save_face(
     ending = check_ending(path)
     check_options(path, options.asked)
     check_outside_hub(path)
-    if beside(path, textured=options.texture is not None):
-        from denseface.service.export.models.obj import with_material
+    with explained():  # a client alone writes every format, but not each with all options
+        if beside(path, textured=options.texture is not None):
+            from denseface.service.export.models.obj import with_material
 
-        write_all(with_material(face, path, options), mode=mode)
-    else:
-        write_all({path: face_bytes(face, ending, options)}, mode=mode)
+            files = with_material(face, path, options)
+        else:
+            files = {path: face_bytes(face, ending, options)}
+    write_all(files, mode=mode)
 
 
 def beside(path: str | Path, *, textured: bool = False) -> tuple[Path, ...]:

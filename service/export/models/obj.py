@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from denseface.recon.face import Face
 from denseface.service.export.mesh import FaceMesh, face_mesh
 from denseface.service.export.models.material import beside_obj, material
-from denseface.service.export.models.texture import textured
 from denseface.service.export.options import PLAIN, ExportOptions
 from denseface.service.export.provenance import comments
 
@@ -29,6 +28,8 @@ def with_material(face: Face, path: Path, options: ExportOptions) -> dict[Path, 
 
     UsageError where there is no texture to be had (`ExportOptions.texture`).
     """
+    from denseface.service.export.models.texture import textured  # OpenCV is for this alone
+
     library, image = beside_obj(path)
     painted = textured(face_mesh(face.dense, options), options.texture or "points")
     return {image: painted.jpeg, library: material(comments(face.report), image.name),

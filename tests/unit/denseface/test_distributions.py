@@ -6,6 +6,7 @@ from packaging.requirements import Requirement
 import denseface
 from denseface.errors import MissingPackageError
 from denseface.missing import EXTRAS, explained
+from denseface.service.export import FORMATS
 from tests.distributions import CORE, WHOLE, required, run_with
 from tests.unit.service.faces import jpeg
 from tests.unit.service.fake_hub import fake_hub
@@ -73,6 +74,7 @@ def test_a_role_imports_what_its_extra_brings(roles):
 _CLIENT = """
 address, folder = sys.argv[1:]
 import denseface.service.commands.press, denseface.service.tools.follow
+from denseface.service.export import FORMATS
 from denseface import Client, MissingPackageError, load_face, save_face
 import denseface
 
@@ -81,8 +83,8 @@ with Client(address) as client:
     face = client.get("a1")
     outcome = next(client.published(after=0, timeout=30))
     print(client.status().hub_version, client.get_frame("a1").depth.shape, outcome.capture_id)
-    for name in ("face.npz", "face.ply"):
-        save_face(face, f"{folder}/{name}")
+    for ending in FORMATS:
+        save_face(face, f"{folder}/face{ending}")
     again = load_face(f"{folder}/face.npz")
     print((again.dense.points == face.dense.points).all(), len(again.dense))
     for preview in client.previews(timeout=30):
@@ -119,4 +121,5 @@ def test_a_client_runs_with_three_packages_alone(tmp_path):
     assert said.splitlines() == [
         "0 (6, 8) a1", "True 102", decoder, decoder, lacking.format("primesense", "capture"),
         "102"]
+    assert {path.suffix for path in tmp_path.iterdir()} == {*FORMATS}
     assert (tmp_path / "face.ply").stat().st_size > 2000
