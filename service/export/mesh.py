@@ -98,31 +98,31 @@ def triangulate(cloud: DenseCloud) -> NDArray[np.int32]:
     index = np.full((rows, columns), -1, np.int32)
     index[cloud.cells[:, 0], cloud.cells[:, 1]] = np.arange(len(cloud), dtype=np.int32)
     blocks = np.stack([index[:-1, :-1].ravel(), index[:-1, 1:].ravel(),
-                       index[1:, :-1].ravel(), index[1:, 1:].ravel()], axis=1)
-    blocks = blocks[(blocks >= 0).sum(axis=1) > 2]
-    a, b, c, d = blocks.T
-    z = cloud.points[:, 2]
-    along_bc = (a < 0) | (d < 0)
-    whole = (blocks >= 0).all(axis=1)
-    along_bc[whole] = (np.abs(z[b[whole]] - z[c[whole]]) < np.abs(z[a[whole]] - z[d[whole]]))
+                       index[1:, :-1].ravel(), index[1:, 1:].ravel()])
+    blocks = blocks[:, (blocks >= 0).sum(axis=0) > 2]
+    a, b, c, d = blocks
+    step = cloud.grid_step_mm
+    # What is not there, at -1, is nowhere: it is joined to nothing.
+    z = np.append(cloud.points[:, 2].astype(np.float64), np.nan)[blocks]
+    limit = np.append((LONGEST_EDGE * local_spacing(cloud)) ** 2, np.nan)[blocks]
+
+    def joined(one: int, other: int, steps: int) -> NDArray[np.bool_]:
+        deep = np.abs(z[one] - z[other])
+        return np.asarray((deep**2 + steps * step**2 <= np.maximum(limit[one], limit[other]))
+                          & (deep <= MAX_STEP * step))
+
+    ab, ac, bd, cd = joined(0, 1, 1), joined(0, 2, 1), joined(1, 3, 1), joined(2, 3, 1)
+    ad, bc = joined(0, 3, 2), joined(1, 2, 2)
+    along_bc = (a < 0) | (d < 0) | (np.abs(z[1] - z[2]) < np.abs(z[0] - z[3]))
     # y points down: a -> c -> b is counter-clockwise seen along z.
-    pairs = np.where(along_bc[:, None, None], np.stack([[a, c, b], [b, c, d]]).transpose(2, 0, 1),
-                     np.stack([[a, c, d], [a, d, b]]).transpose(2, 0, 1))
-    triangles = pairs.reshape(-1, 3)
-    triangles = triangles[(triangles >= 0).all(axis=1)]
-    return np.asarray(triangles[~_too_long(cloud, triangles)])
-
-
-def _too_long(cloud: DenseCloud, triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Say of each triangle whether its points are not of one surface."""
-    corners = cloud.points[triangles]
-    spacing = local_spacing(cloud)[triangles]
-    long = np.ptp(corners[:, :, 2], axis=1) > MAX_STEP * cloud.grid_step_mm
-    for one, other in ((0, 1), (1, 2), (2, 0)):
-        edge = (corners[:, one] - corners[:, other]).astype(np.float64)
-        limit = LONGEST_EDGE * np.maximum(spacing[:, one], spacing[:, other])
-        long |= np.einsum("tx,tx->t", edge, edge) > limit**2
-    return np.asarray(long)
+    triangles = np.empty((len(a), 2, 3), np.int32)
+    triangles[:, 0, :2] = np.stack([a, c], axis=1)
+    triangles[:, 0, 2] = np.where(along_bc, b, d)
+    triangles[:, 1] = np.where(along_bc, np.stack([b, c, d]), np.stack([a, d, b])).T
+    kept = np.stack([np.where(along_bc, ac & bc & ab, ac & cd & ad),
+                     np.where(along_bc, bc & cd & bd, ad & bd & ab)], axis=1)
+    joint: NDArray[np.int32] = triangles[kept]
+    return joint
 
 
 def to_stl(face: Face, options: ExportOptions = PLAIN) -> bytes:
