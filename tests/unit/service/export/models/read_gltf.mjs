@@ -15,10 +15,16 @@ const { PLYLoader } = await load("three/examples/jsm/loaders/PLYLoader.js");
 const { PCDLoader } = await load("three/examples/jsm/loaders/PCDLoader.js");
 const { MeshoptDecoder } = await load("meshoptimizer/meshopt_decoder.mjs");
 
-/** Give a mesh's arrays as a viewer draws them, placed by its node. */
+/** Give a mesh's arrays as a viewer draws them, placed by its node; of a large one its size. */
 function arrays(mesh) {
   mesh.updateMatrixWorld(true);
   const { geometry, material } = mesh;
+  const { position } = geometry.attributes;
+  if (position.count > 10000) {
+    const box = new three.Box3().setFromObject(mesh);
+    return { points: position.count, corners: geometry.index.count,
+      size: box.getSize(new three.Vector3()).toArray() };
+  }
   const told = { index: geometry.index ? Array.from(geometry.index.array) : null };
   const turn = new three.Matrix3().getNormalMatrix(mesh.matrixWorld);
   for (const [name, attribute] of Object.entries(geometry.attributes)) {
