@@ -20,7 +20,7 @@ QUIET = Speed(
 
 @pytest.fixture(scope="module")
 def speed():
-    return measure_speed(None, None, FEW, 2)
+    return measure_speed(None, None, FEW, 1)
 
 
 def test_the_frame_that_comes_along_is_measured_stage_by_stage(speed):
