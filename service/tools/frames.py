@@ -14,8 +14,8 @@ from denseface.capture.source import is_folder_of_pairs
 from denseface.service.errors import FrameTooLargeError, UsageError
 from denseface.service.settings import check_frame_size
 
-__all__ = ["FrameChoice", "NumberedFrame", "UnreadFrame", "each_frame", "read_frame",
-           "read_image_pair"]
+__all__ = ["FrameChoice", "FrameReader", "NumberedFrame", "UnreadFrame", "each_frame",
+           "read_frame", "read_image_pair"]
 
 _AT_ONCE = FolderSource, npz.FolderSource
 """Sources that need not read the frames before the one that is asked for."""
@@ -71,9 +71,7 @@ def read_frame(path: str, number: int, choice: FrameChoice) -> NumberedFrame:
     burst = choice.burst
     with _opened(path, choice) as source:
         count = source.frame_count
-        if count is not None and not 0 <= number < count:
-            raise UsageError(f"{path}: has {count} frames (0 to {count - 1}), --frame asks for "
-                             f"{number}")
+        _check_number(path, count, number)
         frames: list[RgbdFrame] = []
         for frame in islice(_frames_from(source, number), burst):
             check_frame_size(frame.calibration, choice.max_pixels)
@@ -84,6 +82,57 @@ def read_frame(path: str, number: int, choice: FrameChoice) -> NumberedFrame:
         raise UsageError(f"{path}: has {len(frames)} frames from frame {number} on, --frames asks "
                          f"for {burst}")
     return NumberedFrame(number, count, fuse(frames))
+
+
+class FrameReader:
+    """Reads single frames of one file or folder; of a recording on from where it is.
+
+    What it gives is what `read_frame` gives, which begins each time at the first frame.
+
+    Parameters
+    ----------
+    path, choice : as of `read_frame`; one frame is never the mean of several
+    """
+
+    def __init__(self, path: str, choice: FrameChoice) -> None:
+        self._path, self._choice = path, choice
+        self._source: Source | None = None
+        self._frames: Iterator[RgbdFrame] = iter(())
+        self._next = 0
+        """Number of the frame that comes next."""
+
+    def read(self, number: int) -> RgbdFrame:
+        """Read a frame by its number, from 0; errors as `read_frame`."""
+        source = self._source
+        if source is None or number < self._next:
+            self.close()
+            source = self._source = _opened(self._path, self._choice)
+            self._frames, self._next = iter(source), 0
+        try:
+            frame = self._reached(source, number)
+            check_frame_size(frame.calibration, self._choice.max_pixels)
+        except BaseException:
+            self.close()  # what comes after an error is not known
+            raise
+        return frame
+
+    def close(self) -> None:
+        """Close the file; a further `read` opens it again."""
+        if self._source is not None:
+            self._source.close()
+            self._source = None
+
+    def _reached(self, source: Source, number: int) -> RgbdFrame:
+        _check_number(self._path, source.frame_count, number)
+        if isinstance(source, _AT_ONCE):
+            self._frames, self._next = source.frames_from(number), number
+        for _ in islice(self._frames, number - self._next):
+            self._next += 1
+        source.look_closely(refuse=True)
+        for frame in self._frames:
+            self._next += 1
+            return frame
+        raise UsageError(f"{self._path}: has fewer than {number + 1} pairs of depth and colour")
 
 
 def each_frame(path: str, choice: FrameChoice) -> Iterator[NumberedFrame | UnreadFrame]:
@@ -117,6 +166,12 @@ def each_frame(path: str, choice: FrameChoice) -> Iterator[NumberedFrame | Unrea
             number += 1
         if number == 0:
             raise UnreadableSourceError(f"{path}: holds no pair of depth and colour")
+
+
+def _check_number(path: str, count: int | None, number: int) -> None:
+    if count is not None and not 0 <= number < count:
+        raise UsageError(f"{path}: has {count} frames (0 to {count - 1}), --frame asks for "
+                         f"{number}")
 
 
 def _next(

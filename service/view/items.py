@@ -10,7 +10,13 @@ from denseface.capture.errors import CaptureError
 from denseface.recon import Face, ReconstructionError, Settings, reconstruct
 from denseface.service.errors import FrameTooLargeError, UsageError
 from denseface.service.export.reading import Mesh
-from denseface.service.tools.frames import FrameChoice, UnreadFrame, each_frame, read_frame
+from denseface.service.tools.frames import (
+    FrameChoice,
+    FrameReader,
+    UnreadFrame,
+    each_frame,
+    read_frame,
+)
 from denseface.service.tools.reconstruction.inputs import Input
 from denseface.service.view.messages import ItemHead
 
@@ -140,6 +146,10 @@ class RecordingItem:
     settings: Settings
     first: int
     frames: int | None
+    _reader: FrameReader = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_reader", FrameReader(self.one.uri, self.choice))
 
     @classmethod
     def opened(
@@ -158,7 +168,7 @@ class RecordingItem:
     def take(self, number: int) -> Taken:
         """Give its frame of a number."""
         try:
-            frame = read_frame(self.one.uri, number, self.choice).frame
+            frame = self._reader.read(number)
         except (CaptureError, FrameTooLargeError) as error:
             return Taken(number, error=error)
         return _made(number, frame, self.settings)
