@@ -31,6 +31,7 @@ nitpick_ignore_regex = [
     (r"py:class", r"denseface\..*\b(_\w+|Changes|Memory|BaseModel|CheckedModel)"),
 ]
 html_math_renderer = "mathml"
+linkcheck_ignore = [r"(?!https?://)"]  # pages of the site itself, which the build looks for
 
 # Markdown as a forge shows it.
 myst_heading_anchors = 6

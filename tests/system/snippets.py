@@ -16,11 +16,14 @@ from tests.system.running import PACE, REPOSITORY
 
 __all__ = ["CONSOLES", "HOW_TOS", "PAGES", "SESSION", "Snippet", "reader", "run_all", "snippets"]
 
-PAGES = ("README.md", "CONTRIBUTING.md", "docs/kiosk.md", "docs/operating.md")
-"""Run as shell and Python, by `test_pages`."""
-HOW_TOS = tuple(sorted(
-    path.relative_to(REPOSITORY).as_posix() for path in (REPOSITORY / "docs/howto").glob("*.md")))
+_HOW_TOS = {path.relative_to(REPOSITORY).as_posix(): "\n```diff\n" in path.read_text()
+            for path in sorted((REPOSITORY / "docs/howto").glob("*.md"))}
+"""Pages, and whether they change the code."""
+HOW_TOS = tuple(page for page, changes in _HOW_TOS.items() if changes)
 """Run in a copy of the code, by `test_pages`."""
+PAGES = ("README.md", "CONTRIBUTING.md", "docs/kiosk.md", "docs/operating.md",
+         *(page for page, changes in _HOW_TOS.items() if not changes))
+"""Run as shell and Python, by `test_pages`."""
 CONSOLES = ("docs/first-hour.md",)
 """Typed, and compared with what they show, by `test_first_hour`."""
 SESSION = "docs/python.md"

@@ -1,4 +1,4 @@
-"""docs/first-hour.md is typed as its reader would, and what is printed is what it shows."""
+"""The first hour and the tutorial are typed as their readers would, and print what they show."""
 
 from itertools import chain
 
@@ -6,18 +6,18 @@ import pytest
 
 from tests.system.consoles import matches, run_consoles, typed_in
 from tests.system.running import REPOSITORY
-from tests.system.snippets import reader, snippets
+from tests.system.snippets import CONSOLES, reader, snippets
 from tests.virtual_sensor.process import environment
 from tests.waiting import PATIENCE
 
-PAGE = REPOSITORY / "docs" / "first-hour.md"
 _KIOSK = {"DENSEFACE_KIOSK": "on", "DENSEFACE_KIOSK_ADDRESS": "0"}
 """Any free port."""
 
 
 @pytest.mark.timeout(420)
-def test_the_first_hour_is_as_the_page_shows_it():
-    blocks = snippets(PAGE)
+@pytest.mark.parametrize("page", CONSOLES)
+def test_what_is_typed_prints_what_the_page_shows(page):
+    blocks = snippets(REPOSITORY / page)
     with reader(REPOSITORY, environment()) as (desk, variables):
         for block in blocks:
             if block.file:
@@ -28,7 +28,7 @@ def test_the_first_hour_is_as_the_page_shows_it():
         # The page removes what is there in the end: it must not be the user's who tests.
         state = {"XDG_STATE_HOME": str(desk.parent / "state")}
         done = run_consoles(list(commands), desk, variables | _KIOSK | state, 200 * PATIENCE)
-    other = [f"{PAGE.name}:{one.line}: {one.command}\n{printed}" for one, printed in done
+    other = [f"{page}:{one.line}: {one.command}\n{printed}" for one, printed in done
              if not matches(one.shown, printed)]
     assert not other, "\n".join(["printed otherwise than shown:", *other])
 
