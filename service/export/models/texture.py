@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.capture.frame import RgbdFrame
-from denseface.recon.registration import register, sample_colors
 from denseface.service.errors import UsageError
 from denseface.service.export.mesh import FaceMesh
 from denseface.service.export.options import Texture
@@ -67,6 +66,9 @@ def of_frame(mesh: FaceMesh, frame: RgbdFrame) -> Textured:
     UsageError
         The frame has no colour image, or the face is not in it.
     """
+    # Here: the points' own colours need none of its compiled loops.
+    from denseface.recon.registration import register, sample_colors
+
     if frame.color is None:
         raise UsageError("texture: the frame has no colour image")
     _, seen = sample_colors(frame, register(frame, colors=False), mesh.points)

@@ -52,6 +52,18 @@ def test_frame_and_photo_are_written_where_there_is_no_face(hub, tmp_path, capfd
     assert {one.stat().st_mode & 0o777 for one in tmp_path.iterdir()} == {0o600}
 
 
+def test_a_texture_is_of_the_frame_that_the_hub_keeps(hub, tmp_path, capfd):
+    hub.frames = {"a"}
+    hub.conclude("a")
+    given = ["get", "a", "--save", str(tmp_path / "f.glb"), "--textured"]
+    assert main(given) == 2, "that of the made-up hub does not show the face"
+    assert capfd.readouterr().err.startswith(
+        "denseface get: texture: the face is not in this frame's colour image")
+    hub.frames = set()
+    assert main(given) == 1
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_frame_without_a_face_is_drawn_in_place_of_one(hub, tmp_path, capfd):
     hub.frames = {"a"}
     picture = tmp_path / "why.png"

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import cv2
+import numpy as np
 
 from denseface.recon import CoarseDepthError
 from denseface.service.tools.reconstruction.refused import explained
@@ -66,3 +67,41 @@ def test_several_boxes_are_counted_by_their_verdicts():
     assert str(told) == (
         "a.npz, frame 0: steps of 12 mm: was it kept in 8 bits? (2 boxes: flat, 1 box: taken, "
         "1 box: farther away); p.png shows what was looked at")
+
+
+def test_what_a_texture_takes_is_beside_it_and_named(take, tmp_path, capsys):
+    status, out, _ = run(capsys, take, "-o", tmp_path / "f.obj", "--textured", "--holes", "close")
+    names = ["f.obj", "f.mtl", "f.texture.jpg"]
+    assert status == 0
+    assert [line.split(": ")[0] for line in out[1:4]] == [f"{tmp_path}/{name}" for name in names]
+    assert [line.split(": ")[1].split(",")[0] for line in out[1:4]] == [
+        "mesh of 102 points", "its material", "its texture"]
+    photo = cv2.imread(str(tmp_path / "f.texture.jpg"))
+    assert abs(photo.astype(int) - 90).max() < 5, "the frame's, not the points'"
+
+
+def test_a_texture_replaces_no_image_that_is_read(take, tmp_path, capsys):
+    for name, image in (("d.png", np.full((120, 160), 700, np.uint16)),
+                        ("f.texture.png", np.zeros((120, 160, 3), np.uint8))):
+        cv2.imwrite(str(tmp_path / name), image)
+    (tmp_path / "f.texture.png").rename(tmp_path / "f.texture.jpg")
+    status, _, said = run(capsys, "--depth", tmp_path / "d.png", "--color",
+                          tmp_path / "f.texture.jpg", "-o", tmp_path / "f.obj", "--textured")
+    assert status == 2
+    assert f"{tmp_path}/f.texture.jpg: is read, and would be replaced" in said[0]
+
+
+def test_a_compact_file_is_named_with_what_opens_it(take, tmp_path, capsys):
+    status, out, _ = run(capsys, take, "-o", tmp_path / "f.glb", "--compact", "--textured")
+    assert status == 0
+    assert out[1].endswith("; pages with three.js or Babylon.js open it, few other programs do")
+    assert out[1].startswith(f"{tmp_path}/f.glb: mesh of 102 points, ")
+
+
+def test_each_of_several_faces_has_its_own_texture(take, tmp_path, capsys):
+    status, _, _ = run(capsys, take, "--all-frames", "-o", f"{tmp_path}/new/", "--format", "obj",
+                       "--textured")
+    assert status == 1, "one has no face"
+    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == [
+        f"take_000{number}.{ending}" for number in (0, 2)
+        for ending in ("mtl", "obj", "texture.jpg")]
