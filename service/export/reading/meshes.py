@@ -32,7 +32,8 @@ class Mesh(NamedTuple):
     triangles: NDArray[np.int32] | None
     """(t, 3), rows of `points`; None of a cloud."""
     colors: NDArray[np.uint8] | None
-    """(n, 3), RGB; None where the file has none."""
+    """(n, 3), RGB: the points' own, else those of a `.glb`'s texture; None where the file has none.
+    A texture beside an `.obj` is not read."""
 
 
 class RawMesh(NamedTuple):
