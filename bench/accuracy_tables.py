@@ -6,10 +6,19 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import gamma
 
 from denseface.recon import Preset
-from tests.simulator.accuracy import ERROR_BINS_MM, GROSS_MM, Accuracy
+from denseface.service.tools.evaluation.paper import (
+    ERROR_BINS_MM,
+    GROSS_MM,
+    PAPER_DENSE,
+    PAPER_INITIAL,
+    PAPER_MEAN_MM,
+    PAPER_SD_MM,
+    PAPER_TABLE_2,
+    paper_distribution,
+)
+from tests.simulator.accuracy import Accuracy
 
 __all__ = [
     "PAPER_MEAN_MM",
@@ -31,13 +40,6 @@ Taken: TypeAlias = Mapping[Preset, Sequence[Accuracy]]
 Results: TypeAlias = Mapping[str, Taken]
 """By recording or sensor."""
 
-PAPER_MEAN_MM, PAPER_SD_MM = 1.31, 1.07
-"""The paper's own error, Table 2."""
-_PAPER_TABLE_2 = (("Hernandez", 1.61, 1.62), ("Hwang", 3.58, 0.59), ("Lin", 3.12, 1.14),
-                  ("the paper's method", PAPER_MEAN_MM, PAPER_SD_MM))
-"""All four rows as the paper prints them: mean and SD, mm."""
-_PAPER_INITIAL, _PAPER_DENSE = "8,352-13,267", "79,482-132,476"
-"""The paper's Table 1."""
 _BINS_A_ROW = 5
 """The table of the distribution has a row for so many of `ERROR_BINS_MM`."""
 
@@ -64,17 +66,6 @@ def distribution(taken: Sequence[Accuracy]) -> NDArray[np.float64]:
     return np.mean([one.per_mm for one in taken], axis=0)
 
 
-def paper_distribution() -> NDArray[np.float64]:
-    """What the paper's mean and SD allow to say of its Figure 9: the gamma distribution of both.
-
-    Its bars are not known in numbers. (55,) share per mm, as in `distribution`.
-    """
-    scale = PAPER_SD_MM ** 2 / PAPER_MEAN_MM
-    below = gamma.cdf(ERROR_BINS_MM, PAPER_MEAN_MM / scale, scale=scale)
-    shares: NDArray[np.float64] = np.diff(below) / np.diff(ERROR_BINS_MM)
-    return shares
-
-
 def _headings(*names: str) -> Iterator[str]:
     yield f"| {' | '.join(names)} |"
     yield "|" + " --- |" * len(names)
@@ -89,8 +80,8 @@ def points_table(results: Results) -> Iterator[str]:
         dense = " | ".join(f"{_mean(taken[preset], 'dense_points'):,.0f} "
                            f"({_mean(taken[preset], 'ratio'):.1f})" for preset in presets)
         yield f"| {name} | {_mean(taken[presets[0]], 'initial_points'):,.0f} | {dense} |"
-    yield (f"| *the paper's Table 1: other faces, another sensor* | *{_PAPER_INITIAL}* "
-           f"| *{_PAPER_DENSE}* |" + " |" * (len(presets) - 1))
+    yield (f"| *the paper's Table 1: other faces, another sensor* | *{PAPER_INITIAL}* "
+           f"| *{PAPER_DENSE}* |" + " |" * (len(presets) - 1))
 
 
 def error_table(results: Results) -> Iterator[str]:
@@ -102,7 +93,7 @@ def error_table(results: Results) -> Iterator[str]:
         ours = " | ".join(f"{_mean(taken[preset], 'mean_mm'):.2f} ± "
                           f"{deviation_mm(taken[preset]):.2f}" for preset in presets)
         yield f"| {name} | {_mean(taken[presets[0]], 'raw_mean_mm'):.2f} | {ours} | |"
-    for name, mean, sd in _PAPER_TABLE_2:
+    for name, mean, sd in PAPER_TABLE_2:
         yield (f"| *{name}, in the paper's Table 2: other faces, sensors and references* |"
                + " |" * (len(presets) + 1) + f" *{mean:.2f} ± {sd:.2f}* |")
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.simulator.accuracy import ERROR_BINS_MM, GROSS_MM
+from denseface.service.tools.evaluation.paper import ERROR_BINS_MM, GROSS_MM
 
 __all__ = ["HEADINGS", "ErrorSummary"]
 

@@ -15,7 +15,7 @@ mpl.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from tests.simulator.accuracy import ERROR_BINS_MM, GROSS_MM
+from denseface.service.tools.evaluation.paper import ERROR_BINS_MM, GROSS_MM
 
 __all__ = [
     "error_distribution",

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import open3d as o3d
 
-from tests.simulator.accuracy import GROSS_MM
+from denseface.service.tools.evaluation.paper import GROSS_MM
 from tests.simulator.truth import Truth
 
 __all__: list[str] = []

@@ -17,7 +17,8 @@ from bench.machine import describe
 from bench.pcl_peer import Pcl, PclMissingError
 from bench.peer_methods import inpaint_points, poisson_points, rbf_points
 from denseface.recon import Preset
-from tests.simulator.accuracy import GROSS_MM, NEAR_MM
+from denseface.service.tools.evaluation.paper import GROSS_MM
+from tests.simulator.accuracy import NEAR_MM
 
 __all__ = ["Band", "bands"]
 

@@ -17,6 +17,8 @@ exit status:
 EXAMPLES = {
     "reconstruct": "reconstruct recording.oni --frame 3 -o face.ply --preview face.png",
     "view": "view recording.oni --frame 3",
+    "compare": "compare before.oni after.oni -o report.html",
+    "evaluate": "evaluate recording.oni --truth scan.ply -o evaluation/",
     "doctor": "doctor --source openni2:",
     "calibrate": "calibrate --infrared ir/ --color rgb/ --board 9x6 --square 24.5 "
                  "-o sensor.calibration.json",

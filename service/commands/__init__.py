@@ -12,6 +12,8 @@ __all__ = ["COMMANDS", "Command", "load"]
 COMMANDS = {
     "reconstruct": "make dense faces of frames in files and folders",
     "view": "look at faces, frames and recordings in a browser, or in rerun",
+    "compare": "lay two faces on each other and say what changed",
+    "evaluate": "measure how near faces are to a known true surface",
     "doctor": "look for what keeps a sensor from working",
     "calibrate": "find both cameras and their pose by a board that they see",
     "live": "reconstruct a source frame after frame and show the times",
@@ -39,6 +41,7 @@ COMMANDS = {
 _SUBROOMS = (dict.fromkeys(("calibrate", "doctor", "record"), "sensor")
              | dict.fromkeys(("get", "list"), "captures")
              | dict.fromkeys(("info",), "files")
+             | dict.fromkeys(("compare", "evaluate"), "comparing")
              | dict.fromkeys(("bench", "completion", "warm"), "machine"))
 """Where a command's module is, if not here."""
 

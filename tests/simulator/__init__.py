@@ -1,7 +1,7 @@
 """A Kinect v1 that is not there: frames of heads whose true shape is known."""
 
 from tests.simulator.accuracy import Accuracy, measure
-from tests.simulator.deformed import Deformed, Patch, patch
+from tests.simulator.deformed import Deformed, Patch, Raised, patch
 from tests.simulator.heads import Head, head_names, load_head, shared_folder
 from tests.simulator.kinect import KINECT_CALIBRATED, KINECT_DEFAULT, KinectModel
 from tests.simulator.labels import Label
@@ -21,6 +21,7 @@ __all__ = [
     "Light",
     "Patch",
     "Person",
+    "Raised",
     "Scene",
     "Simulated",
     "TrueColors",

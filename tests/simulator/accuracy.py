@@ -8,15 +8,12 @@ from scipy.spatial import cKDTree
 
 from denseface.capture.frame import RgbdFrame
 from denseface.recon.face import Face
+from denseface.service.tools.evaluation.paper import Errors, per_mm
 from tests.simulator.labels import Label
 from tests.simulator.truth import Truth
 
-__all__ = ["ERROR_BINS_MM", "GROSS_MM", "NEAR_MM", "Accuracy", "measure"]
+__all__ = ["NEAR_MM", "Accuracy", "measure"]
 
-GROSS_MM = 5.5
-"""The paper's Figure 9 ends here."""
-ERROR_BINS_MM = np.linspace(0, GROSS_MM, 56)
-"""Edges of a histogram of errors, mm."""
 NEAR_MM = 2.0
 
 # A point this far off the head's surface is not its rim but on something else.
@@ -62,17 +59,18 @@ def measure(face: Face, truth: Truth, frame: RgbdFrame) -> Accuracy:
     errors = truth.surface_distance(face.dense.points)
     nearest, _ = cKDTree(face.dense.points).query(
         truth.face_points(), distance_upper_bound=NEAR_MM)
+    figures = Errors.of(errors)
     return Accuracy(
         initial_points=len(face.initial),
         dense_points=len(face.dense),
-        mean_mm=float(errors.mean()),
-        sd_mm=float(errors.std()),
+        mean_mm=figures.mean_mm,
+        sd_mm=figures.sd_mm,
         raw_mean_mm=float(truth.surface_distance(face.initial.points).mean()),
-        gross=float((errors > GROSS_MM).mean()),
+        gross=figures.gross,
         covered=float(np.isfinite(nearest).mean()),
         lost=_lost(face, truth, frame),
         elsewhere=_elsewhere(face.dense.points, errors, truth),
-        per_mm=np.histogram(errors, ERROR_BINS_MM)[0] / (len(errors) * np.diff(ERROR_BINS_MM)),
+        per_mm=per_mm(errors),
     )
 
 

@@ -1,16 +1,21 @@
-"""Faces whose sides differ: `load_head("NAME+KIND")`, as `procedural+swollen`."""
+"""Faces whose sides differ, or that changed: `load_head("NAME+KIND")`, as `procedural+swollen`.
+
+`NAME+raised:0.5:20:38:52`: raised by 0.5 mm, 20 mm wide at half that, at x = 38 and y = 52 mm.
+"""
 
 from enum import StrEnum
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tests.simulator.landmarks import Landmarks
 
-__all__ = ["Deformed", "Patch", "displacement", "patch"]
+__all__ = ["Deformed", "Patch", "Raised", "displacement", "patch"]
 
 _FRONT_MM = 40.0
+_FWHM = float(2 * np.sqrt(2 * np.log(2)))
+"""Width of a Gaussian at half its height, standard deviations."""
 
 
 class Deformed(StrEnum):
@@ -28,6 +33,33 @@ class Deformed(StrEnum):
     """One corner 6 mm lower."""
     BENT_NOSE = "nose"
     """Its tip 6 mm aside."""
+
+
+class Raised(NamedTuple):
+    """A smooth bump, head frame, mm: as a Gaussian, along the surface's normals."""
+
+    height: float
+    """At its top; negative for a dent."""
+    width: float
+    """At half its height."""
+    x: float
+    y: float
+
+    @classmethod
+    def parse(cls, kind: str) -> Self | None:
+        """Read `raised:HEIGHT:WIDTH:X:Y`; None for another kind."""
+        name, *values = kind.split(":")
+        return cls(*map(float, values)) if name == "raised" else None
+
+    def __str__(self) -> str:
+        return ":".join(["raised", *(f"{value:g}" for value in self)])
+
+    def displacement(
+        self, vertices: NDArray[np.float32], normals: NDArray[np.float32], marks: Landmarks
+    ) -> NDArray[np.float32]:
+        """Give how far each vertex moves, (n, 3) mm, as `displacement`."""
+        near = _near(vertices, self.x, self.y, self.width / _FWHM, marks)
+        return np.asarray(self.height * normals * near, np.float32)
 
 
 class Patch(NamedTuple):

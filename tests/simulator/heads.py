@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tests.simulator import procedural
 from tests.simulator.clip import clip_below
-from tests.simulator.deformed import Deformed, displacement
+from tests.simulator.deformed import Deformed, Raised, displacement
 from tests.simulator.landmarks import SCANS, Landmarks
 from tests.simulator.surface import Surface
 from tests.simulator.varied import MODEL, identity, stretch
@@ -52,8 +52,8 @@ def head_names() -> list[str]:
 def load_head(name: str) -> Head:
     """Load a head by its name.
 
-    `NAME+KIND` for one of whose sides is deformed (`Deformed`), `NAME~SEED` for one of other
-    proportions (`varied`).
+    `NAME+KIND` for one of whose sides is deformed (`Deformed`, `Raised`), `NAME~SEED` for one of
+    other proportions (`varied`).
 
     Raises
     ------
@@ -63,7 +63,9 @@ def load_head(name: str) -> Head:
     name, _, kind = name.partition("+")
     if kind:
         head = load_head(name)
-        moved = displacement(Deformed(kind), head.vertices, head.normals, head.landmarks)
+        raised = Raised.parse(kind)
+        moved = (raised.displacement(head.vertices, head.normals, head.landmarks) if raised
+                 else displacement(Deformed(kind), head.vertices, head.normals, head.landmarks))
         return replace(head, vertices=head.vertices + moved, name=f"{name}+{kind}")
     name, _, seed = name.partition("~")
     if name not in head_names():

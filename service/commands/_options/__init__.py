@@ -13,6 +13,8 @@ from denseface.service.commands._options.values import (
     burst,
     count,
     file_mode,
+    millimetres,
+    percent,
     seconds,
     sensor_name,
     timestamp,
@@ -24,8 +26,8 @@ from denseface.service.export.options import HOLES, PLAIN
 __all__ = [
     "add_client", "add_export", "add_hub", "add_keys", "add_log", "add_mode", "add_outputs",
     "add_recon", "add_rotation", "add_source", "burst", "client", "count", "export_options",
-    "file_mode", "operator", "recon_settings", "repeated", "seconds", "sensor_name",
-    "service_settings", "timestamp", "warn", "whole",
+    "file_mode", "millimetres", "operator", "percent", "recon_settings", "repeated", "seconds",
+    "sensor_name", "service_settings", "timestamp", "warn", "whole",
 ]
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from datetime import datetime
 
 from denseface.validation import PEER_NAME, TEXT_OF_PATTERN
 
-__all__ = ["burst", "count", "file_mode", "seconds", "sensor_name", "timestamp", "wanted", "whole"]
+__all__ = ["burst", "count", "file_mode", "millimetres", "percent", "seconds", "sensor_name",
+           "timestamp", "wanted", "whole"]
 
 _MOST = 10**12
 """Largest whole number that anything takes."""
@@ -49,6 +50,26 @@ def seconds(text: str) -> float:
         value = math.nan
     if not 0 < value <= _DAY_S:
         raise wanted(f"seconds, more than 0 and at most {_DAY_S:.0f}", text)
+    return value
+
+
+def percent(text: str) -> float:
+    """Read a confidence."""
+    return _between(text, 50.0, 99.9, "a percentage from 50 to 99.9")
+
+
+def millimetres(text: str) -> float:
+    """Read a length on a face."""
+    return _between(text, 0.01, 100.0, "millimetres, 0.01 to 100")
+
+
+def _between(text: str, least: float, most: float, expected: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not least <= value <= most:
+        raise wanted(expected, text)
     return value
 
 

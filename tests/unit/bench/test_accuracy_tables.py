@@ -14,7 +14,8 @@ from bench.accuracy_tables import (
     quality_table,
 )
 from denseface.recon import Preset
-from tests.simulator.accuracy import ERROR_BINS_MM, Accuracy
+from denseface.service.tools.evaluation.paper import ERROR_BINS_MM
+from tests.simulator.accuracy import Accuracy
 
 MIDDLES = (ERROR_BINS_MM[1:] + ERROR_BINS_MM[:-1]) / 2
 WIDTHS = np.diff(ERROR_BINS_MM)

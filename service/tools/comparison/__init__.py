@@ -1,0 +1,1 @@
+"""Two faces of one person laid on each other: `denseface compare`."""

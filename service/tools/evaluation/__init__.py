@@ -1,0 +1,1 @@
+"""Faces against a known true surface, in the tables of the paper: `denseface evaluate`."""
