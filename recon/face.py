@@ -126,9 +126,9 @@ class DenseCloud(PointCloud):
         if len(self.sigma) and self.sigma.min() <= 0:
             raise ValueError("sigma must be positive")
         _check("cells", self.cells, np.int32, (len(self.points), 2))
-        rows, columns = self.cells[:, 0], self.cells[:, 1]
-        if len(self.cells) and (self.cells.min() < 0 or rows.max() >= self.grid_shape[0]
-                                or columns.max() >= self.grid_shape[1]):
+        row, column = _largest(self.cells)
+        if len(self.cells) and (self.cells.min() < 0 or row >= self.grid_shape[0]
+                                or column >= self.grid_shape[1]):
             raise ValueError(f"cells must lie on the {self.grid_shape} grid")
 
     def __repr__(self) -> str:
@@ -148,6 +148,8 @@ class DenseCloud(PointCloud):
                 for name, colors in looks]
 
 
+_PAIRS = 64
+"""NumPy compares long rows many numbers at once, and short ones one by one."""
 MAX_STEP = 20.0
 """Largest step in depth within a triangle of neighbours of the grid, in grid steps: more is a gap
 between two surfaces. A slope of 14, the steepest bridge that is kept, makes that along a diagonal.
@@ -337,6 +339,18 @@ class Face:
         """
         mesh: Trimesh = _call("to_trimesh", self)
         return mesh
+
+
+def _largest(pairs: Ints) -> tuple[int, int]:
+    """Give the largest of (n, 2) first and second numbers, -1 of none: many pairs to a row."""
+    whole = len(pairs) - len(pairs) % _PAIRS
+    sums = [np.ascontiguousarray(pairs[:whole]).reshape(-1, 2 * _PAIRS), pairs[whole:]]
+    first, second = np.array([-1, -1])
+    for some in sums:
+        if len(some):
+            most = some.max(axis=0).reshape(-1, 2).max(axis=0)
+            first, second = max(first, most[0]), max(second, most[1])
+    return int(first), int(second)
 
 
 def _extent(points: Floats) -> str:

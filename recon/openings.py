@@ -5,8 +5,9 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from denseface.recon.arrays import Bools, Bytes, Floats
+from denseface.recon.arrays import Bools, Bytes, Floats, Ints
 from denseface.recon.face import MAX_STEP, DenseCloud
+from denseface.recon.numerics.jit import compiled
 from denseface.recon.numerics.morphology import binary_fill_holes, enclosed_parts
 
 __all__ = ["Openings", "openings"]
@@ -26,36 +27,66 @@ class Openings(NamedTuple):
 
 def openings(cloud: DenseCloud) -> Openings:
     """Find holes: points all around, and inside none, or some that are a step apart in depth."""
-    rows, columns = cloud.grid_shape[0] + 2, cloud.grid_shape[1] + 2
-    places = cloud.cells[:, 0] * columns + cloud.cells[:, 1] + (columns + 1)
-    there = np.zeros((rows, columns), np.uint8)
-    there.ravel()[places] = 1
+    none = Openings(0, (0.0, 0.0))
+    there, depth, least_facing = _on_grid(cloud.cells, cloud.points, cloud.normals,
+                                          *cloud.grid_shape)
     torn = None
-    if _may_be_torn(cloud):
-        depth = np.zeros(there.shape, np.float32)
-        depth.ravel()[places] = cloud.points[:, 2]
-        torn = _torn(depth, MAX_STEP * cloud.grid_step_mm)
-    elif not (binary_fill_holes(there) - there).any():
-        return Openings(0, (0.0, 0.0))
+    # Slopes that make such a step, along a diagonal.
+    if least_facing < 1 / np.sqrt(1 + MAX_STEP**2 / 2):
+        some, blocks = _torn(there, depth, MAX_STEP * cloud.grid_step_mm)
+        torn = blocks if some else None
+    if torn is None and not (binary_fill_holes(there) != there).any():
+        return none
     _, parts = enclosed_parts(_uncovered(there, torn))
     if not len(parts):
-        return Openings(0, (0.0, 0.0))
+        return none
     # From point to point: places and what lies between count two to a step.
     sides = (parts[:, 3:5] + 1) / 2 * cloud.grid_step_mm
     width, height = sides[sides.max(axis=1).argmax()]
     return Openings(len(sides), (float(width), float(height)))
 
 
-def _may_be_torn(cloud: DenseCloud) -> bool:
-    """Say whether there are slopes that make such a step, along a diagonal."""
-    least = 1 / np.sqrt(1 + MAX_STEP**2 / 2)
-    return len(cloud) > 0 and bool(-cloud.normals[:, 2].max() < least)
+@compiled
+def _on_grid(
+    cells: Ints, points: Floats, normals: Floats, rows: int, columns: int
+) -> tuple[Bytes, Floats, float]:
+    """Put a cloud on its grid, a place wider each way: 1 where a point is, and its depth.
+
+    Gives also how little a point is turned to the camera at least (cosine).
+    """
+    there = np.zeros((rows + 2, columns + 2), np.uint8)
+    depth = np.zeros((rows + 2, columns + 2), np.float32)
+    least = np.float32(1)
+    for i in range(len(cells)):
+        row, column = np.uint32(cells[i, 0] + 1), np.uint32(cells[i, 1] + 1)
+        there[row, column] = 1
+        depth[row, column] = points[i, 2]
+        least = min(least, -normals[i, 2])
+    return there, depth, least
 
 
-def _torn(depth: Floats, limit: float) -> Bools:
-    """Say which blocks of 2x2 places are too far apart in depth: (rows - 1, columns - 1)."""
-    block = np.ones((2, 2), np.uint8)
-    return np.asarray((cv2.dilate(depth, block) - cv2.erode(depth, block) > limit)[1:, 1:])
+@compiled
+def _torn(there: Bytes, depth: Floats, limit: float) -> tuple[int, Bools]:
+    """Say which blocks of 2x2 places have points too far apart in depth: (rows - 1, columns - 1).
+
+    Those of one or two points, of which no triangle is, are none. Gives also how many there are.
+    """
+    rows, columns = there.shape
+    torn, count = np.zeros((rows - 1, columns - 1), np.bool_), 0
+    for i in range(rows - 1):
+        for j in range(columns - 1):
+            if there[i, j] + there[i, j + 1] + there[i + 1, j] + there[i + 1, j + 1] < _CORNERS:
+                continue
+            low, high = np.float32(1e30), np.float32(-1e30)
+            for row in range(i, i + 2):
+                for column in range(j, j + 2):
+                    if there[row, column]:
+                        low = min(low, depth[row, column])
+                        high = max(high, depth[row, column])
+            if high - low > limit:
+                torn[i, j] = True
+                count += 1
+    return count, torn
 
 
 def _uncovered(there: Bytes, torn: Bools | None) -> Bools:

@@ -54,6 +54,8 @@ _FEW_SEEDS = 2000
 """With fewer seeds, the report warns."""
 _MOST_MM = 1000.0
 """Seeds farther apart, along x or y, are not on a face."""
+_READINGS = 10_000
+"""So many around a face, at least, tell in which steps depth comes."""
 _TRIES = 3
 """So many boxes are shaped, at most, until one is a face for sure."""
 _DOUBTFUL = "a face, perhaps"
@@ -166,7 +168,9 @@ def _shape(settings: Settings, clock: "_Stopwatch", found: Found) -> Face:
         settings = settings.model_copy(update={"shading": False})
     focal_px = frame.calibration.color.fx
     registered = register(frame, *box_window(found.overview, box))
-    coarse = check_steps(registered.points[registered.valid][:, 2], found.detection.depth_mm)
+    read = np.flatnonzero(registered.valid)
+    some = read[::max(1, len(read) // _READINGS)]
+    coarse = check_steps(registered.points.reshape(-1, 3)[some, 2], found.detection.depth_mm)
     clock.lap("registration")
     seeds = segment_face(registered, box, focal_px)
     _check_seeds(seeds.points)
@@ -224,7 +228,7 @@ def _check_seeds(points: Floats) -> None:
     if len(points) < MIN_SEEDS:
         raise TooLittleDepthError(
             f"{len(points)} depth readings on the face, a fit needs at least {MIN_SEEDS}")
-    width, height, _ = np.ptp(points, axis=0)
+    width, height = np.ptp(np.ascontiguousarray(points[:, :2].T), axis=1)
     if not max(width, height) <= _MOST_MM:
         raise ImpossibleFrameError(f"the readings on the face are {width:.6g} x {height:.6g} mm "
                                    "across: is the calibration right?")

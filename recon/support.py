@@ -157,8 +157,12 @@ class Support:
 
         Returns xs, ys, (columns,), (rows,) float64, mm, and the support, (rows, columns) bool.
         """
-        xs, ys = _axes((self.xs[0], self.xs[-1]), (self.ys[0], self.ys[-1]), step)
+        xs, ys = self.axes(step)
         return xs, ys, self.sampled(xs, ys)
+
+    def axes(self, step: float) -> tuple[Doubles, Doubles]:
+        """Give x and y, mm, of the columns and rows of another grid over the same region."""
+        return _axes((self.xs[0], self.xs[-1]), (self.ys[0], self.ys[-1]), step)
 
     def sampled(self, xs: Doubles, ys: Doubles) -> Bools:
         """Say which points of a grid are supported: (k,), (m,) mm, to (m, k)."""

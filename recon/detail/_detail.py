@@ -21,8 +21,9 @@ from denseface.recon.detail._shading import shading_detail
 from denseface.recon.detail._symmetry import symmetry_correction
 from denseface.recon.intermediate import ColorSampler, SurfaceGrid
 from denseface.recon.noise import Risk
-from denseface.recon.numerics.bilinear import add_resampled
+from denseface.recon.numerics.bilinear import add_resampled, multiply_resampled
 from denseface.recon.numerics.filters import blurred, downsampled, upsampled
+from denseface.recon.numerics.morphology import select_values
 from denseface.recon.numerics.normalized_convolution import normalized_convolution
 from denseface.recon.numerics.percentile import percentile
 from denseface.recon.numerics.scatter import BILINEAR_VARIANCE, interpolate, splat
@@ -80,7 +81,7 @@ def add_detail(
     gain, noise = _wiener_gain(
         field.planes[..., 3], inner * (1 - hole[_COARSE]), rim.broad_weight < _NARROW, spacing)
     kept = gain * detail[_COARSE]
-    detail *= _add_upsampled(np.zeros_like(detail), gain)
+    multiply_resampled(detail, gain, *_halves(detail.shape))
     more = np.zeros_like(shown)
     plane = find_plane(field) if symmetry else None
     if plane is not None:
@@ -182,7 +183,8 @@ def _wiener_gain(detail: Floats, inner: Floats, narrow: Bools, step: float) -> t
     """
     local, = normalized_convolution(inner, _WINDOW_MM / (2 * step), detail * detail)
     local = upsampled(local, detail.shape)
-    seen = local[(inner > 0) & narrow] if narrow.any() else local[inner > 0]
+    face = inner > 0
+    seen = select_values(local, face & narrow if narrow.any() else face)
     noise = percentile(seen, _NOISE_PERCENTILE) if seen.size else 0.0
     gain = 1 - np.float32(noise) / np.maximum(local, np.float32(max(noise, 1e-12)))
     return np.asarray(gain, np.float32), noise
@@ -190,6 +192,11 @@ def _wiener_gain(detail: Floats, inner: Floats, narrow: Bools, step: float) -> t
 
 def _add_upsampled(image: Floats, coarse: Floats) -> Floats:
     """Add in place what is known at every second point each way, bilinear; give the image."""
-    rows, columns = ((np.arange(side) / 2).astype(np.float32) for side in image.shape)
-    add_resampled(image, coarse, rows, columns)
+    add_resampled(image, coarse, *_halves(image.shape))
     return image
+
+
+def _halves(shape: tuple[int, ...]) -> tuple[Floats, Floats]:
+    """Give where rows and columns are on a grid of every second of them."""
+    rows, columns = ((np.arange(side) / 2).astype(np.float32) for side in shape)
+    return rows, columns

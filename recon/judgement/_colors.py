@@ -1,11 +1,15 @@
 """Whether colour lies where the relief has eyes, brows, nose and mouth."""
 
+import math
 from functools import cache
 
 import numpy as np
 
 from denseface.recon.arrays import Bytes, Doubles, Floats
+from denseface.recon.judgement._mould_kernels import in_mould
 from denseface.recon.judgement._placing import mean_face, mean_face_data
+from denseface.recon.numerics.jit import compiled
+from denseface.recon.numerics.linear_solve import solve_small
 
 __all__ = ["LEAST_COLOR_LIKENESS", "color_likeness"]
 
@@ -42,26 +46,58 @@ def color_likeness(placement: Doubles, points: Floats, colors: Bytes) -> float |
     -------
     from -1 to 1; None where too little of a face is there
     """
-    some = np.s_[::-(-len(points) // _MOST) or 1]
-    x, y, z = ((points[some] - placement[9:12]) @ placement[:9].reshape(3, 3) / placement[12]).T
-    around = np.arctan2(x, mean_face().axis_z - z) * _RADIUS_MM
-    columns, rows = (np.rint((along - low) / _CELL_MM).astype(np.intp)
-                     for along, low in ((around, -_HALF_WIDTH_MM), (y, _HIGHEST_MM)))
-    expected = _mean_brightness()
-    height, width = expected.shape
-    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-    cells = rows[inside] * width + columns[inside]
-    brightness = np.log(colors[some][inside].mean(axis=1) + _DARK)
-    counts = np.bincount(cells, minlength=height * width)
-    sums = np.bincount(cells, brightness, minlength=height * width)
-    seen = np.flatnonzero(counts)
-    if len(seen) < _FEWEST:
-        return None
-    v, u = np.divmod(seen, width) * np.array(_CELL_MM / _RADIUS_MM)
-    terms = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=1)
-    both = np.stack([sums[seen] / counts[seen], expected.ravel()[seen]], axis=1)
-    own, mean = (both - terms @ np.linalg.lstsq(terms, both, rcond=None)[0]).T
-    return float(own @ mean / max(np.sqrt((own @ own) * (mean @ mean)), 1e-9))
+    found = _correlation(placement, points, colors, max(1, -(-len(points) // _MOST)),
+                         mean_face().axis_z, _mean_brightness())
+    return None if found < -1 else float(found)
+
+
+@compiled
+def _correlation(
+    placement: Doubles, points: Floats, colors: Bytes, every: int, axis_z: float, expected: Doubles
+) -> float:
+    """Correlate, by every so many of the points, as `color_likeness` says; -2 where there are few.
+
+    axis_z : of the mean face; expected : (rows, columns), logarithms of its cells' brightness
+    """
+    rows, columns = expected.shape
+    sums, counts = np.zeros((rows, columns)), np.zeros((rows, columns), np.int32)
+    for i in range(0, len(points), every):
+        x, y, z = in_mould(points[i], placement)
+        column = math.floor((math.atan2(x, axis_z - z) * _RADIUS_MM + _HALF_WIDTH_MM) / _CELL_MM
+                            + 0.5)
+        row = math.floor((y - _HIGHEST_MM) / _CELL_MM + 0.5)
+        if 0 <= row < rows and 0 <= column < columns:
+            gray = (float(colors[i, 0]) + float(colors[i, 1]) + float(colors[i, 2])) / 3
+            sums[row, column] += math.log(gray + _DARK)
+            counts[row, column] += 1
+    matrix, right, term = np.zeros((6, 6)), np.zeros((2, 6)), np.ones(6)
+    own_square = mean_square = both = 0.0
+    seen = 0
+    for row in range(rows):
+        for column in range(columns):
+            if counts[row, column] == 0:
+                continue
+            seen += 1
+            own, mean = sums[row, column] / counts[row, column], expected[row, column]
+            u, v = _CELL_MM / _RADIUS_MM * column, _CELL_MM / _RADIUS_MM * row
+            term[1], term[2], term[3], term[4], term[5] = u, v, u * u, u * v, v * v
+            own_square += own * own
+            mean_square += mean * mean
+            both += own * mean
+            for j in range(6):
+                right[0, j] += term[j] * own
+                right[1, j] += term[j] * mean
+                for k in range(6):
+                    matrix[j, k] += term[j] * term[k]
+    if seen < _FEWEST:
+        return -2.0
+    fit = solve_small(matrix.copy(), right[0].copy())
+    mean_fit = solve_small(matrix.copy(), right[1].copy())
+    for j in range(6):
+        both -= right[0, j] * mean_fit[j]
+        own_square -= right[0, j] * fit[j]
+        mean_square -= right[1, j] * mean_fit[j]
+    return both / max(math.sqrt(max(own_square, 0.0) * max(mean_square, 0.0)), 1e-9)
 
 
 @cache

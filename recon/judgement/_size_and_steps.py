@@ -58,7 +58,7 @@ def check_steps(z: Floats, middle_mm: float) -> str:
     values = np.unique(near)
     if len(near) < _FEWEST_READINGS or len(values) < 2:
         return ""
-    step = float(np.percentile(np.diff(values), _LOW_STEPS))
+    step = percentile(np.diff(values), _LOW_STEPS)
     if step < max(_COARSE_MM, _TIMES_ITS_OWN * _STEP_AT_1_M * (middle_mm / 1000) ** 2):
         return ""
     found = f"depth comes in steps of {step:.0f} mm at {middle_mm:.0f} mm"

@@ -53,10 +53,11 @@ def mean_square_differences(heights: Floats, gentle: Bytes, every: int) -> Doubl
     every : of the rows (for differences along them) and columns, so many
     """
     out = np.zeros((2, len(LAGS)))
+    turned, counted = np.ascontiguousarray(heights.T), np.ascontiguousarray(gentle.T)
     for i in range(len(LAGS)):
         counts, sums = np.zeros((2, _BINS), np.int32), np.zeros((2, _BINS))
         _collect(heights, gentle, every, LAGS[i], counts, sums)
-        _collect(heights.T, gentle.T, every, LAGS[i], counts, sums)
+        _collect(turned, counted, every, LAGS[i], counts, sums)
         for k in range(2):
             out[k, i] = _trimmed(counts[k], sums[k])
     return out
@@ -69,20 +70,28 @@ def _collect(
     """Add the differences along rows to the histograms."""
     scales = np.float32(1) / np.sqrt(_NORMS).astype(np.float32)
     per_bin = np.float32(1 / _BIN_MM)
+    columns = np.uint64(heights.shape[1])
+    second, known = np.empty(columns, np.float32), np.empty(columns, np.bool_)
+    one, two, three = np.uint64(lag), np.uint64(2 * lag), np.uint64(3 * lag)
     for row in range(0, heights.shape[0], every):
         line, counted = heights[row], gentle[row]
-        for j in range(len(line) - 2 * lag):
-            a, b, c = line[j], line[j + lag], line[j + 2 * lag]
-            if a == 0 or b == 0 or c == 0 or counted[j + lag] == 0:
+        ends = max(heights.shape[1] - 2 * lag, 0)
+        # The differences of a whole row at once, then which of them count.
+        for j in range(np.uint64(ends)):
+            a, b, c = line[j], line[j + one], line[j + two]
+            second[j] = a - b - (b - c)
+            known[j] = ((a != 0) & (b != 0) & (c != 0)) & (counted[j + one] != 0)
+        for j in range(np.uint64(ends)):
+            if not known[j]:
                 continue
-            second = a - b - (b - c)
-            value = abs(second) * scales[0]
-            index = min(int(value * per_bin), _BINS - 1)
+            value = abs(second[j]) * scales[0]
+            index = np.uint32(min(value * per_bin, np.float32(_BINS - 1)))
             counts[0, index] += 1
             sums[0, index] += value * value
-            if j + 3 * lag < len(line) and line[j + 3 * lag] > 0 and counted[j + 2 * lag]:
-                value = abs(b - c - (c - line[j + 3 * lag]) - second) * scales[1]
-                index = min(int(value * per_bin), _BINS - 1)
+            if j + three < columns and line[j + three] > 0 and counted[j + two]:
+                b, c = line[j + one], line[j + two]
+                value = abs(b - c - (c - line[j + three]) - second[j]) * scales[1]
+                index = np.uint32(min(value * per_bin, np.float32(_BINS - 1)))
                 counts[1, index] += 1
                 sums[1, index] += value * value
 

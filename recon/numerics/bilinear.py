@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from denseface.recon.arrays import Bools, Floats
 from denseface.recon.numerics.jit import compiled
 
-__all__ = ["add_resampled", "column_positions", "exceeds"]
+__all__ = ["add_resampled", "column_positions", "exceeds", "multiply_resampled"]
 
 _1 = np.uint64(1)
 """Unsigned: an index that might be negative costs a check at each access."""
@@ -32,11 +32,38 @@ def add_resampled(image: Floats, coarse: Floats, rows: Floats, columns: Floats) 
             own[j] += upper[j] + down * (lower[j] - upper[j])
 
 
+@compiled
 def exceeds(coarse: Floats, rows: Floats, columns: Floats, level: float) -> Bools:
     """Say where a resampled image is above a level, (m, k)."""
-    image = np.zeros((len(rows), len(columns)), np.float32)
-    add_resampled(image, coarse, rows, columns)
-    return image > np.float32(level)
+    found = np.empty((len(rows), len(columns)), np.bool_)
+    left, part = column_positions(columns, coarse.shape[1])
+    lines, known, least = np.empty((2, len(columns)), np.float32), -2, np.float32(level)
+    for i in range(len(rows)):
+        above = min(int(rows[i]), coarse.shape[0] - 2)
+        if above != known:
+            _read_rows(coarse, above, known, left, part, lines)
+            known = above
+        upper, lower, down = lines[above & 1], lines[1 - (above & 1)], rows[i] - np.float32(above)
+        own = found[i]
+        for j in range(len(columns)):
+            own[j] = upper[j] + down * (lower[j] - upper[j]) > least
+    return found
+
+
+@compiled
+def multiply_resampled(image: Floats, coarse: Floats, rows: Floats, columns: Floats) -> None:
+    """Multiply an image, (m, k), by a resampled one."""
+    left, part = column_positions(columns, coarse.shape[1])
+    lines, known = np.empty((2, len(columns)), np.float32), -2
+    for i in range(len(rows)):
+        above = min(int(rows[i]), coarse.shape[0] - 2)
+        if above != known:
+            _read_rows(coarse, above, known, left, part, lines)
+            known = above
+        upper, lower, down = lines[above & 1], lines[1 - (above & 1)], rows[i] - np.float32(above)
+        own = image[i]
+        for j in range(len(columns)):
+            own[j] *= upper[j] + down * (lower[j] - upper[j])
 
 
 @compiled

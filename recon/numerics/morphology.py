@@ -1,6 +1,7 @@
 """Binary morphology: discs, holes, openings; the pixels of an image under a mask."""
 
 import math
+from functools import lru_cache
 from typing import TypeVar
 
 import cv2
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from denseface.recon.arrays import Bools, Bytes, Ints
 
 __all__ = ["binary_fill_holes", "dilated", "disc", "enclosed_parts", "eroded",
-           "large_components", "opened", "select_pixels"]
+           "large_components", "opened", "select_pixels", "select_values"]
 
 _CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 _Kind = TypeVar("_Kind", bound=np.generic)
@@ -21,11 +22,23 @@ def select_pixels(image: NDArray[_Kind], mask: Bools) -> NDArray[_Kind]:
     return image.reshape(-1, image.shape[2]).take(np.flatnonzero(mask), axis=0)
 
 
+def select_values(image: NDArray[_Kind], mask: Bools) -> NDArray[_Kind]:
+    """Give `image[mask]`, (H, W) to (n,), three times as fast."""
+    return image.reshape(-1).take(np.flatnonzero(mask))
+
+
 def disc(radius: float) -> Bytes:
     """Give the pixels within a radius of the middle one, (k, k) uint8, for OpenCV's morphology."""
+    return _disc(float(radius))
+
+
+@lru_cache(maxsize=64)
+def _disc(radius: float) -> Bytes:
     reach = int(radius)
     steps = np.arange(-reach, reach + 1)
-    return (steps[:, None] ** 2 + steps**2 <= radius * radius).astype(np.uint8)
+    found = (steps[:, None] ** 2 + steps**2 <= radius * radius).astype(np.uint8)
+    found.flags.writeable = False
+    return found
 
 
 def dilated(image: Bytes, radius: int) -> Bytes:
@@ -96,6 +109,8 @@ def opened(image: Bytes, radius: float) -> Bytes:
 
 def large_components(image: Bools, least: float) -> Bools:
     """Keep the components, connected at sides or corners, of at least so many pixels."""
+    if np.count_nonzero(image) < least:
+        return np.zeros_like(image)
     _, labels = cv2.connectedComponents(image.view(np.uint8), connectivity=8)
     large: Bools = np.bincount(labels.ravel()) >= least
     large[0] = False  # the background

@@ -24,34 +24,36 @@ _STEEPEST = 14.0
 
 
 def without_bridges(
-    surface: SurfaceGrid, inside: Bools, axes: tuple[Doubles, Doubles], spacing: float
+    surface: SurfaceGrid, axes: tuple[Doubles, Doubles], spacing: float
 ) -> Bools:
-    """Take bridges from what is to have points, but for those that close a hole in a surface.
+    """Say where points are wanted: on the support without bridges, but for those that close a hole.
 
     Parameters
     ----------
     surface : the fit, with its support
-    inside : (rows, columns) where the support is sampled
-    axes : x of its columns and y of its rows, mm
+    axes : x of the columns and y of the rows at which it is asked, mm
     spacing : mean spacing of the seeds, mm
+
+    Gives (rows, columns).
     """
     support = surface.support
     _, dz_dx, dz_dy = surface.values
     slope2 = dz_dx * dz_dx + dz_dy * dz_dy
     bridge = slope2 > np.float32(_STEEP**2)
     if not bridge.any():
-        return inside
+        return support.sampled(*axes)
     bridge &= support.near_seeds(_UNREAD * spacing) == 0
     # A surface riddled with pinholes is worse than a bridge.
     kernel = np.ones((_SPECK_PX, _SPECK_PX), np.uint8)
     opened = cv2.dilate(cv2.erode(bridge.view(np.uint8), kernel), kernel, anchor=(0, 0))
     if not opened.any():
-        return inside
+        return support.sampled(*axes)
     kept = support.cut(np.asarray(opened > 0)).sampled(*axes)
     labels, parts = enclosed_parts(~kept)
     for label, left, top, width, height in parts.tolist():
         box = np.s_[top:top + height, left:left + width]
-        rows, columns = np.nonzero((labels[box] == label) & inside[box])
+        inside = support.sampled(axes[0][box[1]], axes[1][box[0]])
+        rows, columns = np.nonzero((labels[box] == label) & inside)
         rows, columns = rows + top, columns + left
         x, y = support.coordinates(axes[0][columns], axes[1][rows])
         places = np.rint(y).astype(np.intp), np.rint(x).astype(np.intp)

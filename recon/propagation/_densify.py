@@ -44,8 +44,8 @@ def densify(
     """
     step = float(np.sqrt(surface.support.area / (ratio * len(seeds.points))))
     support = surface.support
-    xs, ys, inside = support.on_grid(step)
-    inside = without_bridges(surface, inside, (xs, ys), spacing)
+    xs, ys = support.axes(step)
+    inside = without_bridges(surface, (xs, ys), spacing)
     origin = float(xs[0]), float(ys[0])
 
     components = variance_components(

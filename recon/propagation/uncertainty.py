@@ -24,7 +24,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from denseface.recon.arrays import Bools, Floats
+from denseface.recon.arrays import Bools, Doubles, Floats
 from denseface.recon.noise import Risk
 from denseface.recon.numerics.filters import filtered, gaussian_taps
 from denseface.recon.numerics.jit import compiled
@@ -98,40 +98,82 @@ def variance_components(
     node = every * step / spacing
     nodes = node_statistics(points, support, surface, origin, step, every)
     far = cv2.distanceTransform((nodes[..., 2] == 0).astype(np.uint8), cv2.DIST_L2, 5)
-    seeds, squares = nodes[..., 2].sum(dtype=np.float64), nodes[..., 3].sum(dtype=np.float64)
-    jitter = np.float32(_squared_jitter(nodes, spacing))
-    covered, slope, count, square = cv2.split(filtered(nodes, gaussian_taps(_WINDOW / node)))
-    prior = np.float32(_PRIOR * node**2)
-    noise = (square + prior * np.float32(squares / max(seeds, 1.0))) / (count + prior)
-    deep = np.float32(spacing) * np.maximum(np.float32(node) * far - 1, np.float32(0))
-    slope /= np.maximum(covered, np.float32(1e-3))
-    area = np.float32(spacing**2)
-    edge = slope * np.clip(2 - 2 * covered, np.float32(0), np.float32(1))
-    return VarianceComponents(
-        noise=np.asarray(noise, np.float32), hole=np.asarray(deep * deep * (1 + slope), np.float32),
-        slope=np.asarray(jitter * area * slope * slope, np.float32),
-        rim=np.asarray(area * edge, np.float32), rim_jitter=np.asarray(jitter * edge, np.float32),
-        every=every)
+    levels = _by_slope(nodes)
+    _, _, seeds, squares = levels[2]
+    jitter = _squared_jitter(levels, spacing)
+    prior = _PRIOR * node**2
+    parts = _components(filtered(nodes, gaussian_taps(_WINDOW / node)), far, prior,
+                        prior * squares / max(seeds, 1.0), node, spacing, jitter)
+    return VarianceComponents(*parts, every=every)
 
 
-def _squared_jitter(nodes: Floats, spacing: float) -> float:
+def _squared_jitter(levels: Doubles, spacing: float) -> float:
     """Tell j^2, mm^2, by the squared residuals of seeds where it is steep and where it is not.
 
-    nodes : of `node_statistics`; spacing : h, mm
+    levels : of `_by_slope`; spacing : h, mm
     """
-    _, slope, count, square = (nodes[..., k] for k in range(4))
-    levels = []
-    for chosen in (slope > _STEEP, slope < _FLAT):
-        seeds = float(count[chosen].sum())
-        levels.append((seeds, float((count[chosen] * slope[chosen]).sum()) / max(seeds, 1.0),
-                       float(square[chosen].sum()) / max(seeds, 1.0)))
-    (some, steep, residual), (others, flat, least) = levels
+    (_, steep, some, residual), (_, flat, others, least), _ = levels.tolist()
+    steep, residual = steep / max(some, 1.0), residual / max(some, 1.0)
+    flat, least = flat / max(others, 1.0), least / max(others, 1.0)
     usual = _USUAL_JITTER * spacing**2
     seeds = min(some, others)
     if seeds == 0:
         return usual
     found = max(residual - least, 0.0) / (steep - flat)
     return (seeds * found + _JITTER_SEEDS * usual) / (seeds + _JITTER_SEEDS)
+
+
+@compiled
+def _by_slope(nodes: Floats) -> Doubles:
+    """Sum nodes of `node_statistics` where it is steep, where it is not, and everywhere, (3, 4).
+
+    Of each: their number, their seeds times slope^2, their seeds, those' squared residuals.
+    """
+    sums = np.zeros((3, 4))
+    for i in range(nodes.shape[0]):
+        for j in range(nodes.shape[1]):
+            slope, count, square = nodes[i, j, 1], nodes[i, j, 2], nodes[i, j, 3]
+            if count == 0:
+                continue
+            kind = 0 if slope > _STEEP else 1 if slope < _FLAT else 2
+            sums[kind, 0] += 1
+            sums[kind, 1] += count * slope
+            sums[kind, 2] += count
+            sums[kind, 3] += square
+    for k in range(4):
+        sums[2, k] += sums[0, k] + sums[1, k]
+    return sums
+
+
+@compiled
+def _components(
+    local: Floats, far: Floats, prior: float, prior_square: float, node: float, spacing: float,
+    jitter: float,
+) -> Floats:
+    """Give the components of the variance, (5, rows, columns).
+
+    local : (rows, columns, 4), `node_statistics`, blurred
+    far : (rows, columns), from each node to the nearest with a seed, nodes
+    prior, prior_square : weight of the whole face's residuals, and that times their mean square
+    node : from node to node, spacings; spacing : mm; jitter : j^2, mm^2
+    """
+    rows, columns = far.shape
+    out = np.empty((5, rows, columns), np.float32)
+    one, two, zero = np.float32(1), np.float32(2), np.float32(0)
+    weight, more, least = np.float32(prior), np.float32(prior_square), np.float32(1e-3)
+    h, side, j2 = np.float32(spacing), np.float32(node), np.float32(jitter)
+    for i in range(rows):
+        for j in range(columns):
+            covered = local[i, j, 0]
+            slope = local[i, j, 1] / max(covered, least)
+            deep = h * max(side * far[i, j] - one, zero)
+            edge = slope * min(max(two - two * covered, zero), one)
+            out[0, i, j] = (local[i, j, 3] + more) / (local[i, j, 2] + weight)
+            out[1, i, j] = deep * deep * (one + slope)
+            out[2, i, j] = j2 * h * h * slope * slope
+            out[3, i, j] = h * h * edge
+            out[4, i, j] = j2 * edge
+    return out
 
 
 @compiled
@@ -159,10 +201,13 @@ def node_statistics(
                 dx, dy = slopes_x[row, column], slopes_y[row, column]
                 out[i, j, 0] = 1
                 out[i, j, 1] = dx * dx + dy * dy
+    per_step = 1 / step
     for k in range(len(points)):
-        x, y = (points[k, 0] - origin[0]) / step, (points[k, 1] - origin[1]) / step
-        row, column = int(np.floor(y + 0.5)), int(np.floor(x + 0.5))
-        if 0 <= row < rows and 0 <= column < columns and support[row, column]:
+        x, y = (points[k, 0] - origin[0]) * per_step, (points[k, 1] - origin[1]) * per_step
+        if not (-0.5 <= y < rows - 0.5 and -0.5 <= x < columns - 0.5):
+            continue
+        row, column = np.uint32(y + 0.5), np.uint32(x + 0.5)
+        if support[row, column]:
             rest = points[k, 2] - heights[row, column] - step * (
                 slopes_x[row, column] * (x - column) + slopes_y[row, column] * (y - row))
             i = min((row + every // 2) // every, out.shape[0] - 1)

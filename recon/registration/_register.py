@@ -1,9 +1,11 @@
 """Stage 1: every depth pixel as a 3D point, and where the colour camera sees it."""
 
+from functools import lru_cache
+
 import cv2
 import numpy as np
 
-from denseface.capture.calibration import CameraModel
+from denseface.capture.calibration import CameraModel, DepthToColor
 from denseface.capture.frame import RgbdFrame
 from denseface.recon.arrays import Bools, Bytes, Doubles, Floats
 from denseface.recon.errors import NoDepthError
@@ -100,6 +102,11 @@ def _rays(camera: CameraModel) -> tuple[Doubles, Doubles]:
     if any(camera.distortion):
         rays = camera.rays()
         return rays[..., 0], rays[..., 1]
+    return _straight_rays(camera)
+
+
+@lru_cache(maxsize=8)
+def _straight_rays(camera: CameraModel) -> tuple[Doubles, Doubles]:
     columns, rows = np.arange(camera.width), np.arange(camera.height)
     x = camera.back_project(np.stack([columns, np.zeros_like(columns)], axis=-1), 1.0)[:, 0]
     y = camera.back_project(np.stack([np.zeros_like(rows), rows], axis=-1), 1.0)[:, 1:2]
@@ -108,7 +115,11 @@ def _rays(camera: CameraModel) -> tuple[Doubles, Doubles]:
 
 
 def _color_camera(frame: RgbdFrame) -> ColorCamera:
-    camera, pose = frame.calibration.color, frame.depth_to_color
+    return _posed(frame.calibration.color, frame.depth_to_color)
+
+
+@lru_cache(maxsize=8)
+def _posed(camera: CameraModel, pose: DepthToColor) -> ColorCamera:
     return ColorCamera(
         tuple(float(number) for row in pose.rotation for number in row),
         tuple(map(float, pose.translation_mm)), (float(camera.width), float(camera.height)),

@@ -12,7 +12,7 @@ from denseface.recon.arrays import Bools, Floats
 from denseface.recon.errors import FaceWithoutDepthError
 from denseface.recon.face import Box, Seeds
 from denseface.recon.intermediate import Registration
-from denseface.recon.numerics.morphology import large_components
+from denseface.recon.numerics.morphology import large_components, select_values
 from denseface.recon.numerics.percentile import percentile
 from denseface.recon.segmentation._depth_kmeans import split_depths
 from denseface.recon.segmentation._edge_colors import seed_colors
@@ -167,8 +167,8 @@ def cluster_depths(registered: Registration, crop: Bools, box: Box) -> Bools:
     the face it cuts the face itself. So clusters with no empty depth between them are joined
     before the one in the middle of the box is kept.
     """
-    z = registered.points[..., 2]
-    clusters = split_depths(z[crop])
+    z = np.ascontiguousarray(registered.points[..., 2])
+    clusters = split_depths(select_values(z, crop))
     middle = round(float(z[_central_pixel(registered, crop, box)]))
     first = last = sum(cluster.last < middle for cluster in clusters)
     while first > 0 and clusters[first].low - clusters[first - 1].high < _CLUSTER_GAP_MM:
@@ -203,10 +203,11 @@ def grow_face(registered: Registration, cluster: Bools, box: Box, focal_px: floa
         face = priority_flood(upright, candidates, occluders, start, limits)
     inner = square_mask(face, registered.pixels, center, _FRONT_PART * width)
     inner = inner if inner.any() else face
-    front = percentile(z[inner], 2)
+    front = percentile(select_values(z, inner), 2)
     box_mm = width * front / focal_px
     trim_beside_rise(face, z, start, round(_SIDE * box_mm * px_per_mm), _SIDE_RISE_MM)
-    axis = principal_axis(face & (upright < percentile(upright[inner], 2) + np.float32(_OVAL_MM)))
+    axis = principal_axis(face & (upright < percentile(select_values(upright, inner), 2)
+                                     + np.float32(_OVAL_MM)))
     trim_below_drop(face, z, start, round(_CHIN * box_mm * px_per_mm), _CHIN_DROP_MM,
                     max(round(_CHIN_GAP_MM * px_per_mm), _GAP_PX))
     trim_to_profile(
@@ -246,7 +247,7 @@ def _glasses(z: Floats, cluster: Bools, px_per_mm: float) -> Bools:
 
 def _hand(z: Floats, valid: Bools, face: Bools, px_per_mm: float) -> Bools:
     """A hand, or what else stands before the face, and its shadow in which nothing is measured."""
-    nearer = (valid & ~face & (z < percentile(z[face], 50))).view(np.uint8)
+    nearer = (valid & ~face & (z < percentile(select_values(z, face), 50))).view(np.uint8)
     side = 2 * round(_FINGER_MM * px_per_mm / 2) + 1
     hand = cv2.morphologyEx(nearer, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
     side = 2 * round(_SHADOW_MM * px_per_mm) + 1
