@@ -9,7 +9,7 @@ import numpy as np
 
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.rotation import ROTATIONS, rotate_frame
-from denseface.recon.arrays import Floats
+from denseface.recon.arrays import Bools, Floats
 from denseface.recon.detection import Detection, detect_by_depth, detect_face, turned_by
 from denseface.recon.errors import (
     FaceWithoutDepthError,
@@ -19,6 +19,7 @@ from denseface.recon.errors import (
 )
 from denseface.recon.face import Box, FaceCandidate
 from denseface.recon.intermediate import Registration
+from denseface.recon.judgement import score_quickly
 from denseface.recon.registration import register, with_shaded_depth, without_color
 from denseface.recon.segmentation import box_window
 
@@ -30,6 +31,9 @@ _SPARSE = 4
 _DARK, _DARK_SHARE = 48.0, 0.02
 """Grey below which a picture is dark, and share of the readings that must be so for a second look
 by depth. A face in a hundredth of a room's light has 13, in a tenth 57."""
+_DARK_PLACE, _AROUND = 0.3, 17
+"""Share of the readings around the middle of a face that must be so, too, in a square of so many
+samples: of a face of which the picture tells nothing, half and more are."""
 _LEAST_CONTRAST, _LEAST_TO_NOISE = 16.0, 60.0
 """A darker picture tells nothing of what is there if it has less contrast, in grey levels, or less
 by what is left of the noise where both are smoothed. Of 240 pictures of faces in 0.005 to 0.05 of a
@@ -98,7 +102,8 @@ def _find(frame: RgbdFrame, overview: Registration, rejected: tuple[Box, ...]) -
     if frame.color is None:
         return _find_by_depth(frame, overview, rejected, _NO_CAMERA)
     try:
-        found = detect_face(frame.rgb, overview, frame.calibration.color.fx, rejected)
+        found = detect_face(frame.rgb, overview, frame.calibration.color.fx, rejected,
+                            score_quickly)
     except (NoFaceError, FaceWithoutDepthError):
         in_the_dark = _find_in_the_dark(frame, overview)
         if in_the_dark is None:
@@ -108,9 +113,10 @@ def _find(frame: RgbdFrame, overview: Registration, rejected: tuple[Box, ...]) -
 
 
 def _find_by_depth(
-    frame: RgbdFrame, overview: Registration, rejected: tuple[Box, ...], why: str
+    frame: RgbdFrame, overview: Registration, rejected: tuple[Box, ...], why: str,
+    places: Bools | None = None,
 ) -> Found:
-    found = detect_by_depth(frame, overview, rejected)
+    found = detect_by_depth(frame, overview, rejected, score=score_quickly, places=places)
     shaded = with_shaded_depth(frame, box_window(overview, found.box))
     return Found(shaded, overview, found, False, why)
 
@@ -119,11 +125,19 @@ def _find_in_the_dark(frame: RgbdFrame, overview: Registration) -> Found | None:
     """Find a face by depth where the picture is too dark to show one."""
     gray = np.asarray(cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2GRAY), np.float32)
     u, v = overview.pixels[overview.visible].astype(np.intp).T
-    if not len(u) or np.mean(gray[v, u] < _DARK) < _DARK_SHARE:
+    dark = gray[v, u] < _DARK
+    if not len(u) or np.mean(dark) < _DARK_SHARE:
+        return None
+    known = overview.visible.astype(np.float32)
+    unlit = np.zeros_like(known)
+    unlit[overview.visible] = dark
+    around, all_around = (cv2.blur(one, (_AROUND, _AROUND)) for one in (unlit, known))
+    places = np.asarray(around >= np.float32(_DARK_PLACE) * all_around)
+    if not places.any():
         return None
     alone = without_color(frame)
     try:
-        found = _find_by_depth(alone, _overview(alone), (), _TOO_DARK)
+        found = _find_by_depth(alone, _overview(alone), (), _TOO_DARK, places)
     except ReconstructionError:
         return None
     return found if _tells_nothing(gray, _in_color(found, overview)) else None

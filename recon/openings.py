@@ -28,16 +28,13 @@ class Openings(NamedTuple):
 def openings(cloud: DenseCloud) -> Openings:
     """Find holes: points all around, and inside none, or some that are a step apart in depth."""
     none = Openings(0, (0.0, 0.0))
-    there, depth, least_facing = _on_grid(cloud.cells, cloud.points, cloud.normals,
-                                          *cloud.grid_shape)
-    torn = None
-    # Slopes that make such a step, along a diagonal.
-    if least_facing < 1 / np.sqrt(1 + MAX_STEP**2 / 2):
-        some, blocks = _torn(there, depth, MAX_STEP * cloud.grid_step_mm)
-        torn = blocks if some else None
-    if torn is None and not (binary_fill_holes(there) != there).any():
+    # Only slopes that make such a step, along a diagonal, tear a surface.
+    there, torn_blocks, torn = _on_grid(
+        cloud.cells, cloud.points, cloud.normals, *cloud.grid_shape,
+        MAX_STEP * cloud.grid_step_mm, float(1 / np.sqrt(1 + MAX_STEP**2 / 2)))
+    if not torn_blocks and not (binary_fill_holes(there) != there).any():
         return none
-    _, parts = enclosed_parts(_uncovered(there, torn))
+    _, parts = enclosed_parts(_uncovered(there, torn if torn_blocks else None))
     if not len(parts):
         return none
     # From point to point: places and what lies between count two to a step.
@@ -48,11 +45,16 @@ def openings(cloud: DenseCloud) -> Openings:
 
 @compiled
 def _on_grid(
-    cells: Ints, points: Floats, normals: Floats, rows: int, columns: int
-) -> tuple[Bytes, Floats, float]:
-    """Put a cloud on its grid, a place wider each way: 1 where a point is, and its depth.
+    cells: Ints, points: Floats, normals: Floats, rows: int, columns: int, limit: float,
+    steep: float,
+) -> tuple[Bytes, int, Bools]:
+    """Put a cloud on its grid, a place wider each way: 1 where a point is.
 
-    Gives also how little a point is turned to the camera at least (cosine).
+    limit : blocks of 2x2 places whose points are farther apart in depth are torn, mm
+    steep : there are none where all points are turned to the camera by more (cosine)
+
+    Gives also how many are torn, and which. Blocks of one or two points, of which no triangle is,
+    never are.
     """
     there = np.zeros((rows + 2, columns + 2), np.uint8)
     depth = np.zeros((rows + 2, columns + 2), np.float32)
@@ -62,19 +64,11 @@ def _on_grid(
         there[row, column] = 1
         depth[row, column] = points[i, 2]
         least = min(least, -normals[i, 2])
-    return there, depth, least
-
-
-@compiled
-def _torn(there: Bytes, depth: Floats, limit: float) -> tuple[int, Bools]:
-    """Say which blocks of 2x2 places have points too far apart in depth: (rows - 1, columns - 1).
-
-    Those of one or two points, of which no triangle is, are none. Gives also how many there are.
-    """
-    rows, columns = there.shape
-    torn, count = np.zeros((rows - 1, columns - 1), np.bool_), 0
-    for i in range(rows - 1):
-        for j in range(columns - 1):
+    torn, count = np.zeros((rows + 1, columns + 1), np.bool_), 0
+    if least >= steep:
+        return there, count, torn
+    for i in range(rows + 1):
+        for j in range(columns + 1):
             if there[i, j] + there[i, j + 1] + there[i + 1, j] + there[i + 1, j + 1] < _CORNERS:
                 continue
             low, high = np.float32(1e30), np.float32(-1e30)
@@ -86,7 +80,7 @@ def _torn(there: Bytes, depth: Floats, limit: float) -> tuple[int, Bools]:
             if high - low > limit:
                 torn[i, j] = True
                 count += 1
-    return count, torn
+    return there, count, torn
 
 
 def _uncovered(there: Bytes, torn: Bools | None) -> Bools:

@@ -249,8 +249,11 @@ def _depths_at(frame: RgbdFrame, points: Floats) -> Floats:
     height, width = frame.depth.shape
     inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
     found = np.zeros(len(points), np.float32)
-    found[inside] = frame.depth[rows[inside].astype(np.intp), columns[inside].astype(np.intp)]
-    return found * np.float32(frame.depth_meaning.unit_um / 1000)
+    counts = frame.depth[rows[inside].astype(np.intp), columns[inside].astype(np.intp)]
+    meaning = frame.depth_meaning
+    z = counts * np.float32(meaning.unit_um / 1000) + np.float32(meaning.offset_mm)
+    found[inside] = np.where((counts > 0) & (counts <= meaning.max_count), z, 0)
+    return found
 
 
 def _warnings(

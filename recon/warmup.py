@@ -10,10 +10,11 @@ from denseface.capture.frame import RgbdFrame
 from denseface.recon.detection import detect_by_depth, detect_face, judge_box
 from denseface.recon.errors import NoFaceError
 from denseface.recon.fitting import plan_fit, surface_of
-from denseface.recon.judgement import color_likeness, judge_shape
+from denseface.recon.judgement import color_likeness, judge_shape, score_quickly
 from denseface.recon.noise import measure_noise
 from denseface.recon.numerics.compilation.progress import compiling
 from denseface.recon.numerics.malloc import keep_freed_memory
+from denseface.recon.openings import openings
 from denseface.recon.prior import Heights, fit_face, mean_face
 from denseface.recon.propagation import densify
 from denseface.recon.registration import register, sample_colors
@@ -49,9 +50,9 @@ def _run_every_stage() -> None:
     frame = _ball()
     registered = register(frame)
     with suppress(NoFaceError):  # not even OpenCV sees one
-        detect_face(frame.rgb, registered, _FOCAL_PX)
+        detect_face(frame.rgb, registered, _FOCAL_PX, score=score_quickly)
     with suppress(NoFaceError):
-        detect_by_depth(frame, registered)
+        detect_by_depth(frame, registered, score=score_quickly)
     judge_box(_BOX, registered, _FOCAL_PX)
     seeds = segment_face(registered, _BOX, _FOCAL_PX)
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
@@ -61,7 +62,7 @@ def _run_every_stage() -> None:
     placement = judge_shape(surface).placement
     if placement is not None:
         color_likeness(placement, seeds.points, seeds.colors)
-    densify(seeds, surface, spacing, settings.ratio, plan, sampler)
+    openings(densify(seeds, surface, spacing, settings.ratio, plan, sampler))
     heights, known = mean_face(_NEAREST_MM).heights((-90.0, -90.0), 4.0, (45, 45))
     fit_face(Heights(heights, known.astype(np.float32), (-90.0, -90.0), 4.0))
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from denseface.capture.calibration import CameraModel
 from denseface.capture.frame import RgbdFrame
-from denseface.recon.arrays import Floats
+from denseface.recon.arrays import Bools, Floats
 from denseface.recon.detection._cascades import CascadePass, CenterMask, run_pass
 from denseface.recon.detection._detect import (
     FACE_WIDTH_MM,
@@ -19,6 +19,7 @@ from denseface.recon.detection._detect import (
     judge_new,
     why_none,
 )
+from denseface.recon.detection._likely import MAYBE, HeadScore, likeness
 from denseface.recon.detection._passes import FRONTAL, PROFILE
 from denseface.recon.detection._regions import (
     CELLS,
@@ -55,6 +56,9 @@ _LOOKS = (
     _Look(yaw=40.0), _Look(yaw=-40.0), _Look(yaw=-15.0, cascade_pass=_PROFILE),
     _Look(yaw=15.0, cascade_pass=_PROFILE._replace(mirrored=True)))
 """In turn, until there is a face."""
+_EVERYWHERE = 3
+"""So many of them look wherever a head can be, the others where it is likely: lifted and lowered
+faces look least like the mean face."""
 _BESIDE_MM, _ABOVE_MM, _DEEPER_MM = 140.0, 200.0, 50.0
 """So far beside a face's middle, both ways, and above it, there is nothing, or something so much
 deeper, or a shadow."""
@@ -71,7 +75,7 @@ class _Hit(NamedTuple):
 
 def detect_by_depth(
     frame: RgbdFrame, registered: Registration, rejected: tuple[Box, ...] = (), *,
-    ahead_only: bool = False,
+    ahead_only: bool = False, score: HeadScore | None = None, places: Bools | None = None,
 ) -> Detection:
     """Find the nearest face by the shape of depth.
 
@@ -83,6 +87,8 @@ def detect_by_depth(
     registered : its depth tied to the depth camera itself; every k-th pixel is enough
     rejected : as of `detect_face`
     ahead_only : look for upright faces that look ahead, and no others
+    score : tells where more than the first looks are worth it; None: wherever a head can be
+    places : of any size, which parts of the depth image the middle of a face may be in; None: all
 
     Raises
     ------
@@ -95,13 +101,19 @@ def detect_by_depth(
     shape = camera.height, camera.width
     nearest = nearest_by_cell(registered, shape)
     free = _standing_free(regions_by_depth(registered, shape, camera.fx), nearest, camera)
+    if places is not None:
+        free = _within(free, places)
     regions = _without_small(without_flat(free, nearest, shape, camera.fx), camera)
     search = _Search(_depth_mm(frame), camera, regions, partial(
         judge_new, registered=registered, focal_px=camera.fx, rejected=rejected))
     hit: _Hit | None = None
-    for look in _LOOKS[:1] if ahead_only else _LOOKS:
+    for number, look in enumerate(_LOOKS[:1] if ahead_only else _LOOKS):
         # What a later view finds nearer wins.
-        hit = search.nearest_face(look, len(regions) if hit is None else hit.region) or hit
+        count = len(regions) if hit is None else hit.region
+        if number == _EVERYWHERE and score is not None:
+            search.skipped = {which for which in range(count) if not _is_likely(
+                regions[which], nearest, registered, camera, score)}
+        hit = search.nearest_face(look, count) or hit
     if hit is None:
         raise why_none(search.candidates, "by the depth's shape")
     return detection_of(hit.face, [c for c in search.candidates if c is not hit.face])
@@ -123,6 +135,8 @@ class _Search:
         judge: Callable[[Box], FaceCandidate],
     ) -> None:
         self.candidates: list[FaceCandidate] = []
+        self.skipped: set[int] = set()
+        """Regions that are not looked at any more, by their number."""
         self._depth_mm = depth_mm
         self._camera = camera
         self._regions = regions
@@ -132,6 +146,8 @@ class _Search:
     def nearest_face(self, look: _Look, count: int) -> _Hit | None:
         """Give the nearest face of the nearest of the first `count` regions that has any."""
         for number, region in enumerate(self._regions[:count]):
+            if number in self.skipped:
+                continue
             if number not in self._layers:
                 self._layers[number] = Layer(self._depth_mm, self._camera, region)
             found = [self._judge(box) for box in _boxes(self._layers[number], look, self._camera)]
@@ -181,6 +197,18 @@ def _standing_free(
     return remaining
 
 
+def _within(regions: list[Region], places: Bools) -> list[Region]:
+    """Keep only centres in some places."""
+    remaining = []
+    for region in regions:
+        allowed = cv2.resize(places.view(np.uint8), region.centers.shape[::-1],
+                             interpolation=cv2.INTER_NEAREST).view(np.bool_)
+        centers = region.centers & allowed
+        if centers.any():
+            remaining.append(region._replace(centers=centers))
+    return remaining
+
+
 def _without_small(regions: list[Region], camera: CameraModel) -> list[Region]:
     """Keep only centres in pieces large enough for a face's middle."""
     remaining = []
@@ -192,6 +220,23 @@ def _without_small(regions: list[Region], camera: CameraModel) -> list[Region]:
         if large.any():
             remaining.append(region._replace(centers=large[pieces]))
     return remaining
+
+
+def _is_likely(
+    region: Region, nearest: Floats, registered: Registration, camera: CameraModel,
+    score: HeadScore,
+) -> bool:
+    """Say whether a piece of a region's centres may be a face's by its score."""
+    count, pieces = cv2.connectedComponents(region.centers.view(np.uint8), connectivity=8)
+    for piece in range(1, count):
+        centers = pieces == piece
+        depths = nearest[centers]
+        range_mm = (max(region.near_mm, float(depths.min())),
+                    min(region.far_mm, float(depths.max())))
+        if likeness(registered, centers, range_mm, camera.width / CELLS, camera.fx,
+                    score) >= MAYBE:
+            return True
+    return False
 
 
 def _cell_mm(region: Region, camera: CameraModel) -> float:

@@ -10,8 +10,9 @@ import numpy as np
 from denseface.recon.arrays import Bytes
 from denseface.recon.detection._cascades import CascadePass, CenterMask, run_pass
 from denseface.recon.detection._contrast import equalize_contrast, lift_shadows
-from denseface.recon.detection._head_regions import depth_cells, head_regions, largest
+from denseface.recon.detection._head_regions import DEEPER_MM, depth_cells, head_regions, largest
 from denseface.recon.detection._kernels import depths_in_box
+from denseface.recon.detection._likely import LIKELY, MAYBE, HeadScore, likeness
 from denseface.recon.detection._passes import (
     EQUALIZED_RUNGS,
     LIFTED_RUNGS,
@@ -86,7 +87,8 @@ class Detection:
 
 
 def detect_face(
-    color: Bytes, registered: Registration, focal_px: float, rejected: tuple[Box, ...] = ()
+    color: Bytes, registered: Registration, focal_px: float, rejected: tuple[Box, ...] = (),
+    score: HeadScore | None = None,
 ) -> Detection:
     """Find the nearest face whose size and shape fit its depth.
 
@@ -100,6 +102,7 @@ def detect_face(
     focal_px : focal length of the colour camera, pixels
     rejected : boxes of what was found before and turned out to be no face: the search goes on to
         the next
+    score : tells where all passes but the first are worth it; None: everywhere
 
     Raises
     ------
@@ -110,11 +113,15 @@ def detect_face(
     NoDepthError
         Where nothing measured lies before the colour camera.
     """
-    search = Search(color, registered, focal_px, rejected)
-    for picture, rungs, regions in (
-            (search.as_taken, RUNGS, search.regions),
-            (search.equalized, EQUALIZED_RUNGS, search.regions),
-            (search.lifted, LIFTED_RUNGS, largest(search.regions, _LAST_PLACES))):
+    search = Search(color, registered, focal_px, rejected, score)
+    for picture, rungs, least, most in (
+            (search.as_taken, RUNGS[:1], 0.0, None),
+            (search.as_taken, RUNGS[1:], MAYBE, None),
+            (search.equalized, EQUALIZED_RUNGS, MAYBE, None),
+            (search.lifted, LIFTED_RUNGS, LIKELY, _LAST_PLACES)):
+        regions = search.likely(search.regions, least)
+        if most is not None:
+            regions = largest(regions, most)
         for rung in rungs:
             hit = search.nearest_face(rung, regions, picture)
             if hit:
@@ -170,9 +177,11 @@ class Search:
 
     def __init__(
         self, color: Bytes, registered: Registration, focal_px: float,
-        rejected: tuple[Box, ...] = (),
+        rejected: tuple[Box, ...] = (), score: HeadScore | None = None,
     ) -> None:
         self.rejected = rejected
+        self._score = score
+        self._scores: dict[tuple[Box, float, float, float], float] = {}
         self.registered = registered
         self.focal_px = focal_px
         self.candidates: list[FaceCandidate] = []
@@ -189,6 +198,26 @@ class Search:
         self.regions = head_regions(self.cells)
         self._lifted: Bytes | None = None
         self._equalized: dict[tuple[Box, float, float], Bytes | None] = {}
+
+    def likely(
+        self, regions: list[Region], least: float, nearer_than_mm: float = np.inf
+    ) -> list[Region]:
+        """Keep the places of which at least a score says that they are a face's.
+
+        nearer_than_mm : only what is so near counts
+        """
+        if self._score is None or least <= 0:
+            return regions
+        return [one for one in regions if self._likeness(one, nearer_than_mm) >= least]
+
+    def _likeness(self, region: Region, nearer_than_mm: float) -> float:
+        key = (region.roi, region.near_mm, region.far_mm, nearer_than_mm)
+        if key not in self._scores and self._score is not None:
+            middles = region.near_mm, min(region.far_mm - DEEPER_MM, nearer_than_mm)
+            self._scores[key] = likeness(
+                self.registered, region.centers, middles, self.cells.cell_px, self.focal_px,
+                self._score)
+        return self._scores[key]
 
     def nearest_face(
         self, rung: Rung, regions: Iterable[Region], picture: _Picture
@@ -241,6 +270,7 @@ class Search:
                 centers[bottom:, max(round(x - w / 2), 0):round(x + 1.5 * w)] = False
             if centers.any():
                 nearer.append(region._replace(centers=centers))
+        nearer = self.likely(nearer, MAYBE, _depth(found) - _NEARER_MM)
         for picture, rungs in ((self.as_taken, NEARER_RUNGS), (self.equalized, EQUALIZED_RUNGS)):
             for rung in rungs if nearer else ():
                 hit = self.nearest_face(rung, nearer, picture)

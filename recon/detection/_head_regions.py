@@ -23,7 +23,7 @@ _MIN_RADIUS_MM = 35.0
 """Head-like places that hang together are at least as large as a circle of that radius."""
 _AROUND_MM = 20.0
 """How far about a head-like place the middle of a cascade's box may be."""
-_DEEPER_MM = 50.0
+DEEPER_MM = 50.0
 """How far a face's middle may lie behind the nearest reading of its cell."""
 _MOST_CELLS = 1e6
 """Cells to a millimetre at a distance of 1 mm; a Kinect has 72."""
@@ -90,7 +90,7 @@ def head_regions(cells: DepthCells, nearer_than_mm: float = FARTHEST_MM) -> list
         centers = cv2.dilate(middles.view(np.uint8), np.ones((grown, grown), np.uint8))
         margin = int(np.ceil(HALF_WIDEST_MM * focal_px / near / cell))
         roi = padded(cv2.boundingRect(centers), margin, cell, shape)
-        regions.append(Region(roi, near, far + _DEEPER_MM, centers.view(np.bool_)))
+        regions.append(Region(roi, near, far + DEEPER_MM, centers.view(np.bool_)))
     return sorted(regions, key=lambda region: region.near_mm)
 
 

@@ -47,8 +47,7 @@ class Region(NamedTuple):
 
 
 def regions_by_depth(
-    registered: Registration, shape: tuple[int, int], focal_px: float,
-    nearer_than_mm: float = FARTHEST_MM,
+    registered: Registration, shape: tuple[int, int], focal_px: float
 ) -> list[Region]:
     """Cut the scene into layers of depth, and each layer into connected pieces of the image.
 
@@ -57,7 +56,6 @@ def regions_by_depth(
     registered : the depth tied to the colour image; every k-th pixel is enough
     shape : rows and columns of the colour image
     focal_px : its focal length, pixels
-    nearer_than_mm : what is farther is left out
 
     Raises
     ------
@@ -65,12 +63,11 @@ def regions_by_depth(
         Where nothing measured lies before the colour camera.
     """
     _check_measured(registered)
-    edges = np.append(_EDGES[nearer_than_mm > _EDGES], min(nearer_than_mm, FARTHEST_MM))
     cell = shape[1] / CELLS
-    filled = np.zeros((len(edges) - 1, int(np.ceil(shape[0] / cell)), CELLS), np.uint8)
-    fill_layers(registered.pixels, registered.color_depth, registered.visible, edges, cell, filled)
+    filled = np.zeros((_LAYERS, int(np.ceil(shape[0] / cell)), CELLS), np.uint8)
+    fill_layers(registered.pixels, registered.color_depth, registered.visible, _EDGES, cell, filled)
     regions = []
-    for near, far, layer in zip(edges[:-1].tolist(), edges[1:].tolist(), filled, strict=True):
+    for near, far, layer in zip(_EDGES[:-1].tolist(), _EDGES[1:].tolist(), filled, strict=True):
         min_side = _MIN_SIDE_MM * focal_px / far / cell
         if min_side > CELLS or not layer.any():
             continue

@@ -7,9 +7,11 @@ from denseface.recon.judgement._judge import (
     Judgement,
     judge_points,
     judge_shape,
+    score_quickly,
 )
 from denseface.recon.judgement._likeness import Likeness
 from denseface.recon.judgement._size_and_steps import check_face, check_steps
 
 __all__ = ["LEAST_COLOR_LIKENESS", "LEAST_SCORE", "SURE_SCORE", "Judgement", "Likeness",
-           "check_face", "check_steps", "color_likeness", "judge_points", "judge_shape"]
+           "check_face", "check_steps", "color_likeness", "judge_points", "judge_shape",
+           "score_quickly"]

@@ -8,10 +8,11 @@ import numpy as np
 from denseface.recon.arrays import Doubles
 from denseface.recon.intermediate import SurfaceGrid
 from denseface.recon.judgement._likeness import Likeness, likenesses
+from denseface.recon.judgement._placing import quick_placements
 from denseface.recon.prior import HeadPose
 
 __all__ = ["LEAST_SCORE", "SURE_SCORE", "Judgement", "judge_points", "judge_shape", "score_of",
-           "surface_points"]
+           "score_quickly", "surface_points"]
 
 _STEP_MM = 4.0
 """Distance of the points that are judged: the relief of a face is broader."""
@@ -82,6 +83,21 @@ def judge_points(points: Doubles) -> Judgement:
         if best >= SURE_SCORE:
             break
     return Judgement(best, "" if best >= LEAST_SCORE else _what_it_is(points), placement)
+
+
+def score_quickly(points: Doubles) -> float:
+    """Say how sure it is that raw points are of a face, (n, 3) mm, about a head's middle: 0-1.
+
+    By fewer placements than `judge_shape`, and none once `LEAST_SCORE` is reached: as a first test,
+    of which a low threshold means something, on the readings of a part of a frame.
+    """
+    best = 0.0
+    if len(points) >= _FEWEST_POINTS:
+        for likeness in likenesses(points, quick_placements):
+            best = max(best, score_of(likeness))
+            if best >= LEAST_SCORE:
+                break
+    return best
 
 
 def surface_points(surface: SurfaceGrid) -> Doubles:

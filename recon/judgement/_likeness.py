@@ -1,7 +1,7 @@
 """What a surface has in common with the mean face: the figures that a result is judged by."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -57,9 +57,11 @@ class Likeness(NamedTuple):
             max(0.0, abs(self.tilt_deg) - _FREE_TILT_DEG) / 30])
 
 
-def likenesses(points: Doubles) -> Iterator[Likeness]:
+def likenesses(
+    points: Doubles, ways: Callable[[Doubles], Iterator[Doubles]] = placements
+) -> Iterator[Likeness]:
     """Lay the mean face on points, (n, 3) mm, in some ways, the most likely first."""
-    for placement in placements(points):
+    for placement in ways(points):
         face, middle, nose, (distance, _, _) = compare(
             mean_face(), points, placement, _WINDOWS_MM, FAR_MM)
         yield Likeness(

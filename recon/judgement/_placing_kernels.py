@@ -34,13 +34,14 @@ def refine(mould: Mould, points: Doubles, placements: Doubles, steps: int, far_m
 
     Gives (k,), mean robust costs, 0-1; a point beside the mean face costs 1.
     """
-    matrix, right, row = np.empty((7, 7)), np.empty(7), np.empty(7)
+    matrix, right = np.empty((7, 7)), np.empty(7)
+    rows, weighted = np.empty((8, len(points))), np.empty(len(points))
+    weights = np.empty(len(points))
     costs, squared = np.empty(len(placements)), far_mm * far_mm
     for k in range(len(placements)):
         placement = placements[k]
         for step in range(steps + 1):
-            matrix[:], right[:] = 0, 0
-            cost = 0.0
+            cost, count = 0.0, 0
             for i in range(len(points)):
                 x, y, z = in_mould(points[i], placement)
                 e, nx, ny, nz, _, _ = over_mould(mould, x, y, z)
@@ -51,16 +52,27 @@ def refine(mould: Mould, points: Doubles, placements: Doubles, steps: int, far_m
                 cost += 1 - weight
                 if step == steps:
                     continue
-                weight *= weight
-                row[0], row[1], row[2] = y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
-                row[3], row[4], row[5] = nx, ny, nz
-                row[6] = x * nx + y * ny + z * nz
-                for a in range(7):
-                    right[a] += weight * row[a] * e
-                    for b in range(a + 1):
-                        matrix[b, a] += weight * row[a] * row[b]
+                weights[count] = weight * weight
+                rows[0, count], rows[1, count] = y * nz - z * ny, z * nx - x * nz
+                rows[2, count] = x * ny - y * nx
+                rows[3, count], rows[4, count], rows[5, count] = nx, ny, nz
+                rows[6, count], rows[7, count] = x * nx + y * ny + z * nz, e
+                count += 1
             costs[k] = cost / len(points)
             if step < steps:
+                # Sums over all points at once are vectorised, a point's own products are not.
+                for a in range(7):
+                    one = rows[a]
+                    for i in range(count):
+                        weighted[i] = weights[i] * one[i]
+                    for b in range(a, 8):
+                        other, total = rows[b], 0.0
+                        for i in range(count):
+                            total += weighted[i] * other[i]
+                        if b < 7:
+                            matrix[a, b] = total
+                        else:
+                            right[a] = total
                 _stiffen(matrix, right, len(points), placement[12])
                 _move(placement, solve_small(matrix, right))
     return costs

@@ -76,11 +76,6 @@ class FittedFace:
     rms_mm: float
     met: float
 
-    @property
-    def mahalanobis(self) -> float:
-        """How unusual the face is: the weights' norm over what is usual, sqrt(k)."""
-        return float(np.linalg.norm(self.weights) / np.sqrt(len(self.weights)))
-
     def heights(
         self, origin: tuple[float, float], step: float, shape: tuple[int, int]
     ) -> tuple[Floats, Bools]:

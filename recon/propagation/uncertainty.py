@@ -104,7 +104,8 @@ def variance_components(
     prior = _PRIOR * node**2
     parts = _components(filtered(nodes, gaussian_taps(_WINDOW / node)), far, prior,
                         prior * squares / max(seeds, 1.0), node, spacing, jitter)
-    return VarianceComponents(*parts, every=every)
+    noise, hole, slope, rim, rim_jitter = parts
+    return VarianceComponents(noise, hole, slope, rim, rim_jitter, every)
 
 
 def _squared_jitter(levels: Doubles, spacing: float) -> float:
@@ -112,7 +113,8 @@ def _squared_jitter(levels: Doubles, spacing: float) -> float:
 
     levels : of `_by_slope`; spacing : h, mm
     """
-    (_, steep, some, residual), (_, flat, others, least), _ = levels.tolist()
+    steep, some, residual = (float(one) for one in levels[0, 1:])
+    flat, others, least = (float(one) for one in levels[1, 1:])
     steep, residual = steep / max(some, 1.0), residual / max(some, 1.0)
     flat, least = flat / max(others, 1.0), least / max(others, 1.0)
     usual = _USUAL_JITTER * spacing**2
@@ -206,7 +208,7 @@ def node_statistics(
         x, y = (points[k, 0] - origin[0]) * per_step, (points[k, 1] - origin[1]) * per_step
         if not (-0.5 <= y < rows - 0.5 and -0.5 <= x < columns - 0.5):
             continue
-        row, column = np.uint32(y + 0.5), np.uint32(x + 0.5)
+        row, column = int(y + 0.5), int(x + 0.5)
         if support[row, column]:
             rest = points[k, 2] - heights[row, column] - step * (
                 slopes_x[row, column] * (x - column) + slopes_y[row, column] * (y - row))

@@ -24,8 +24,8 @@ def registration(depth, every=1):
     return register(shown, part, part)
 
 
-def regions(depth, every=1, **limit):
-    return regions_by_depth(registration(depth, every), SIZE, FOCAL_PX, **limit)
+def regions(depth, every=1):
+    return regions_by_depth(registration(depth, every), SIZE, FOCAL_PX)
 
 
 def bulging(depth, every=4):
@@ -110,14 +110,6 @@ def test_a_center_of_a_face_is_where_a_thing_is(two, every):
         assert columns.max() <= right / side + out
         assert rows.min() >= top / side - out
         assert rows.max() <= bottom / side + out
-
-
-def test_what_is_farther_than_asked_is_left_out(two):
-    near, = regions(two, nearer_than_mm=1290)
-    assert near.near_mm <= 700 < near.far_mm
-    assert [r.far_mm for r in regions(two, nearer_than_mm=1310)] == [near.far_mm, 1310]
-    assert regions(two, nearer_than_mm=690) == []
-    assert regions(two, nearer_than_mm=100) == []
 
 
 @pytest.mark.parametrize("every", [1, 4])
