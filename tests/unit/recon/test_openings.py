@@ -54,6 +54,18 @@ def test_a_step_within_the_surface_is_a_hole_though_no_point_is_missing():
     assert openings(torn).holes == mesh_faults(points, triangulate(torn)).holes == 1
 
 
+def test_a_corner_at_a_hole_is_no_step_where_the_surface_is_torn_elsewhere():
+    cloud = small_face(40, 30, step=0.5).dense
+    row, column = cloud.cells.T
+    points, normals = cloud.points.copy(), cloud.normals.copy()
+    points[row > 30, 2] += 3 * MAX_STEP * cloud.grid_step_mm
+    normals[row == 30] = (1, 0, 0)
+    torn = without(replace(cloud, points=points, normals=normals), (row == 15) & (column == 12))
+    assert openings(torn).holes == mesh_faults(torn.points, triangulate(torn)).holes == 1
+    assert openings(torn).largest_mm == openings(
+        without(cloud, (row == 15) & (column == 12))).largest_mm
+
+
 @settings(deadline=None, max_examples=40)
 @given(seed=st.integers(0, 999), share=st.floats(0, 0.5))
 def test_the_count_is_that_of_the_triangles(seed, share):
