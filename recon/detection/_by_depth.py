@@ -19,7 +19,7 @@ from denseface.recon.detection._detect import (
     judge_new,
     why_none,
 )
-from denseface.recon.detection._likely import MAYBE, HeadScore, likeness
+from denseface.recon.detection._head_regions import MAYBE, HeadScore, likeness
 from denseface.recon.detection._passes import FRONTAL, PROFILE
 from denseface.recon.detection._regions import (
     CELLS,

@@ -10,9 +10,16 @@ import numpy as np
 from denseface.recon.arrays import Bytes
 from denseface.recon.detection._cascades import CascadePass, CenterMask, run_pass
 from denseface.recon.detection._contrast import equalize_contrast, lift_shadows
-from denseface.recon.detection._head_regions import DEEPER_MM, depth_cells, head_regions, largest
+from denseface.recon.detection._head_regions import (
+    LIKELY,
+    MAYBE,
+    HeadScore,
+    Likely,
+    depth_cells,
+    head_regions,
+    largest,
+)
 from denseface.recon.detection._kernels import depths_in_box
-from denseface.recon.detection._likely import LIKELY, MAYBE, HeadScore, likeness
 from denseface.recon.detection._passes import (
     EQUALIZED_RUNGS,
     LIFTED_RUNGS,
@@ -23,7 +30,7 @@ from denseface.recon.detection._passes import (
     WHOLE_SHRINK,
     Rung,
 )
-from denseface.recon.detection._regions import CELLS, Region
+from denseface.recon.detection._regions import CELLS, Region, resized, scaled
 from denseface.recon.detection._relief import bulge_mm
 from denseface.recon.errors import FaceWithoutDepthError, NoFaceError
 from denseface.recon.face import Box, FaceCandidate
@@ -119,7 +126,7 @@ def detect_face(
             (search.as_taken, RUNGS[1:], MAYBE, None),
             (search.equalized, EQUALIZED_RUNGS, MAYBE, None),
             (search.lifted, LIFTED_RUNGS, LIKELY, _LAST_PLACES)):
-        regions = search.likely(search.regions, least)
+        regions = search.likely.of(search.regions, least)
         if most is not None:
             regions = largest(regions, most)
         for rung in rungs:
@@ -180,8 +187,6 @@ class Search:
         rejected: tuple[Box, ...] = (), score: HeadScore | None = None,
     ) -> None:
         self.rejected = rejected
-        self._score = score
-        self._scores: dict[tuple[Box, float, float, float], float] = {}
         self.registered = registered
         self.focal_px = focal_px
         self.candidates: list[FaceCandidate] = []
@@ -196,28 +201,9 @@ class Search:
         self.shape = color.shape[:2]
         self.cells = depth_cells(registered, self.shape, focal_px)
         self.regions = head_regions(self.cells)
+        self.likely = Likely(registered, self.cells, score)
         self._lifted: Bytes | None = None
         self._equalized: dict[tuple[Box, float, float], Bytes | None] = {}
-
-    def likely(
-        self, regions: list[Region], least: float, nearer_than_mm: float = np.inf
-    ) -> list[Region]:
-        """Keep the places of which at least a score says that they are a face's.
-
-        nearer_than_mm : only what is so near counts
-        """
-        if self._score is None or least <= 0:
-            return regions
-        return [one for one in regions if self._likeness(one, nearer_than_mm) >= least]
-
-    def _likeness(self, region: Region, nearer_than_mm: float) -> float:
-        key = (region.roi, region.near_mm, region.far_mm, nearer_than_mm)
-        if key not in self._scores and self._score is not None:
-            middles = region.near_mm, min(region.far_mm - DEEPER_MM, nearer_than_mm)
-            self._scores[key] = likeness(
-                self.registered, region.centers, middles, self.cells.cell_px, self.focal_px,
-                self._score)
-        return self._scores[key]
 
     def nearest_face(
         self, rung: Rung, regions: Iterable[Region], picture: _Picture
@@ -270,7 +256,7 @@ class Search:
                 centers[bottom:, max(round(x - w / 2), 0):round(x + 1.5 * w)] = False
             if centers.any():
                 nearer.append(region._replace(centers=centers))
-        nearer = self.likely(nearer, MAYBE, _depth(found) - _NEARER_MM)
+        nearer = self.likely.of(nearer, MAYBE, _depth(found) - _NEARER_MM)
         for picture, rungs in ((self.as_taken, NEARER_RUNGS), (self.equalized, EQUALIZED_RUNGS)):
             for rung in rungs if nearer else ():
                 hit = self.nearest_face(rung, nearer, picture)
@@ -330,7 +316,7 @@ class Search:
         """Give the image with a dark region's contrast equalised by what lies at its depth."""
         key = (region.roi, region.near_mm, region.far_mm)
         if key not in self._equalized:
-            x, y, w, h = roi = _scaled(region.roi, 1 / self.to_color)
+            x, y, w, h = roi = scaled(region.roi, 1 / self.to_color)
             rows, columns = np.ogrid[y:y + h:_SAMPLE_STEP, x:x + w:_SAMPLE_STEP]
             cell = self.gray.shape[1] / CELLS
             depth = self.cells.nearest[(rows / cell).astype(np.intp),
@@ -350,10 +336,10 @@ class Search:
         roi, typical, sizes : pixels of `color`
         """
         shrink = 1 / self.to_color
-        boxes = run_pass(gray, _scaled(roi, shrink), cascade_pass, typical * shrink,
+        boxes = run_pass(gray, scaled(roi, shrink), cascade_pass, typical * shrink,
                          (sizes[0] * shrink, sizes[1] * shrink), centers)
         narrower = 1 / _PROFILE_WIDER if cascade_pass.cascade == PROFILE else 1.0
-        return [(self._judge(_resized(_scaled(box, self.to_color), narrower)), windows)
+        return [(self._judge(resized(scaled(box, self.to_color), narrower)), windows)
                 for box, windows in boxes]
 
     def _judge(self, box: Box) -> FaceCandidate:
@@ -412,15 +398,3 @@ def _same_thing(box: Box, rejected: Box) -> bool:
 
 def _depth(candidate: FaceCandidate) -> float:
     return np.inf if candidate.depth_mm is None else candidate.depth_mm
-
-
-def _scaled(box: Box, factor: float) -> Box:
-    x, y, w, h = (round(side * factor) for side in box)
-    return x, y, w, h
-
-
-def _resized(box: Box, factor: float) -> Box:
-    """Make a box wider or narrower about its centre."""
-    x, y, w, h = box
-    width, height = round(w * factor), round(h * factor)
-    return x + round((w - width) / 2), y + round((h - height) / 2), width, height

@@ -141,3 +141,16 @@ def padded(cells: Sequence[int], margin: int, cell: float, shape: tuple[int, int
     right = min(round((x + w + margin) * cell), shape[1])
     bottom = min(round((y + h + margin) * cell), shape[0])
     return left, top, right - left, bottom - top
+
+
+def scaled(box: Box, factor: float) -> Box:
+    """Give a box in pixels of another size."""
+    x, y, w, h = (round(side * factor) for side in box)
+    return x, y, w, h
+
+
+def resized(box: Box, factor: float) -> Box:
+    """Make a box wider or narrower about its centre."""
+    x, y, w, h = box
+    width, height = round(w * factor), round(h * factor)
+    return x + round((w - width) / 2), y + round((h - height) / 2), width, height

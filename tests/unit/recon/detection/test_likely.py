@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from denseface.recon.detection import _detect, detect_face
-from denseface.recon.detection._likely import LIKELY, MAYBE, likeness
+from denseface.recon.detection._head_regions import LIKELY, MAYBE, likeness
 from denseface.recon.detection._passes import STRAIGHT
 from denseface.recon.errors import NoFaceError
 from denseface.recon.finding import find_face
