@@ -60,9 +60,9 @@ def _on_grid(
     depth = np.zeros((rows + 2, columns + 2), np.float32)
     least = np.float32(1)
     for i in range(len(cells)):
-        row, column = np.uint32(cells[i, 0] + 1), np.uint32(cells[i, 1] + 1)
-        there[row, column] = 1
-        depth[row, column] = points[i, 2]
+        down, right = np.uint32(cells[i, 0] + 1), np.uint32(cells[i, 1] + 1)
+        there[down, right] = 1
+        depth[down, right] = points[i, 2]
         least = min(least, -normals[i, 2])
     torn, count = np.zeros((rows + 1, columns + 1), np.bool_), 0
     if least >= steep:
