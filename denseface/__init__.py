@@ -71,6 +71,7 @@ if TYPE_CHECKING:
         UsageError,
     )
     from denseface.service.export import ExportOptions, load_face, save_face
+    from denseface.service.export.printing import Printing
     from denseface.service.export.refusal import draw_refusal
     from denseface.service.export.render import render
     from denseface.service.protocol.message_base import CaptureSummary, DeadLetter
@@ -87,7 +88,7 @@ __all__ = [
     "FrameError", "FrameOrigin", "ImpossibleFrameError", "ImpossibleSettingsError", "KeyFileError",
     "KeyRefusedError", "Length", "LocalProtocolError", "Measurements", "MismatchedFrameError",
     "MissingPackageError", "Neighbors", "NoDepthError", "NoFaceError", "Operator", "PointCloud",
-    "Preset", "PressRefusedError", "ProtocolError", "Published", "PublishedFace",
+    "Preset", "PressRefusedError", "Printing", "ProtocolError", "Published", "PublishedFace",
     "PublishedFailure", "PublishedHint", "PublishedPreview", "ReconstructionError",
     "RemoteProtocolError", "Report", "RequestFailedError", "RgbdFrame", "SensorError",
     "SensorTimeoutError", "ServiceError", "Settings", "SettingsError", "Source", "Status",
@@ -123,6 +124,7 @@ _NAMES = {
                       "RequestFailedError ServiceError SettingsError UnknownCaptureError "
                       "UsageError",
     "service.export": "ExportOptions load_face save_face",
+    "service.export.printing": "Printing",
     "service.export.refusal": "draw_refusal",
     "service.export.render": "render",
     "service.protocol.message_base": "CaptureSummary DeadLetter",

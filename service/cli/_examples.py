@@ -24,6 +24,7 @@ EXAMPLES = {
                  "-o sensor.calibration.json",
     "live": "live --source openni2: --seconds 30",
     "record": "record take.oni --seconds 10",
+    "export": "export face.npz -o face.3mf --solid mask --height 80",
     "info": "info face.ply recording.oni",
     "up": "up --source openni2: --workers 2 --retention 7d",
     "press": "press --save face.ply --report report.json",

@@ -31,7 +31,7 @@ from denseface.service.runtime.terminal import (
 
 _FAILED, _CTRL_C, _BROKEN_PIPE = 1, 130, 141
 """Exit statuses; above 128, 128 and the number of the signal, as a shell has it."""
-_BRIEF = {"reconstruct", "press", "get", "info", "list", "status", "worker"}
+_BRIEF = {"reconstruct", "press", "export", "get", "info", "list", "status", "worker"}
 """Commands that end soon, or say themselves when they have started."""
 _EXTRAS = {"capture": "capture", "hub": "hub", "kiosk": "kiosk", "worker": "worker",
            "warm": "worker", "up": "all", "calibrate": "capture", "doctor": "capture",

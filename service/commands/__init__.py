@@ -18,6 +18,7 @@ COMMANDS = {
     "calibrate": "find both cameras and their pose by a board that they see",
     "live": "reconstruct a source frame after frame and show the times",
     "record": "record a sensor, or any source, to a file or folder",
+    "export": "write a face in another format, also for 3D printing",
     "info": "say what a file is: a face, a frame, a recording, a calibration",
     "up": "run the whole service on this machine",
     "press": "take a frame now and wait for its face",
@@ -40,7 +41,7 @@ COMMANDS = {
 
 _SUBROOMS = (dict.fromkeys(("calibrate", "doctor", "record"), "sensor")
              | dict.fromkeys(("get", "list"), "captures")
-             | dict.fromkeys(("info",), "files")
+             | dict.fromkeys(("export", "info"), "files")
              | dict.fromkeys(("compare", "evaluate"), "comparing")
              | dict.fromkeys(("bench", "completion", "warm"), "machine"))
 """Where a command's module is, if not here."""

@@ -28,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frames", type=_options.burst, default=1, metavar="N",
                         help="make one of N consecutive frames, at most 32 (default: 1)")
     _options.add_outputs(parser, "--save")
+    _options.add_printing(parser)
     _options.add_mode(parser)
 
 
@@ -37,7 +38,8 @@ def run(args: argparse.Namespace) -> int:
     from denseface.service.export.written import describe
     from denseface.service.tools.fetch import fetch_face
 
-    files = FaceFiles(args.output, args.report, args.rendering, args.mode)
+    files = FaceFiles(args.output, args.report, args.rendering, args.mode,
+                      _options.export_options(args))
     with _options.client(args, _options.CONNECT_S) as client:
         capture_id = client.press(
             args.capture_id, timeout=args.timeout, sensor=args.sensor, gate=args.gate,

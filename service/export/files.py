@@ -10,6 +10,7 @@ from denseface.files import check_place, write_whole
 from denseface.service.errors import StoreError, UsageError, reason_of
 from denseface.service.export.formats import beside, check_options, save_face
 from denseface.service.export.options import PLAIN, ExportOptions
+from denseface.service.export.printing import check_printable
 
 if TYPE_CHECKING:
     from denseface.capture.frame import RgbdFrame
@@ -87,6 +88,7 @@ class FaceFiles:
         asked = self.options.asked | ({"texture"} if self.textured else set())
         if self.output:
             check_options(self.output, asked)
+            check_printable(self.output.suffix.lower(), self.options.printing)
         elif asked:
             raise UsageError(f"{' and '.join(sorted(asked))}: expected with a file of the face, "
                              "and none is asked for")

@@ -97,7 +97,8 @@ def check_options(path: str | Path, asked: Collection[str]) -> None:
     ending = check_ending(path)
     for name in sorted({*asked} - _OPTIONS.get(ending, frozenset())):
         able = " or ".join(one for one, names in _OPTIONS.items() if name in names)
-        raise UsageError(f"{path}: {name} is for {able}, not {ending}")
+        what = "printing (solid, wall, height)" if name == "printing" else name
+        raise UsageError(f"{path}: {what} is for {able}, not {ending}")
 
 
 def load_face(path: str | Path) -> "Face":
@@ -139,7 +140,8 @@ _WHOLE = ".npz"
 _OPTIONS = {
     ".glb": frozenset({"holes", "texture", "compact", "copyright"}),
     ".obj": frozenset({"holes", "texture"}),
-    ".stl": frozenset({"holes"}),
+    ".stl": frozenset({"holes", "printing"}),
+    ".3mf": frozenset({"printing"}),
 }
 """What each format can have of `ExportOptions`; its function takes them then."""
 _BESIDE = {".obj"}
@@ -151,13 +153,18 @@ FORMATS = {
     ".npz": "_npz:to_npz",
     ".obj": "models.obj:to_obj",
     ".glb": "models.glb:to_glb",
-    ".stl": "mesh:to_stl",
+    ".stl": "printing.stl:to_stl",
+    ".3mf": "printing.threemf:to_3mf",
+    ".png": "render:render",
+    ".webp": "turning.animation:to_webp",
+    ".mp4": "turning.animation:to_mp4",
 }
 """Which function of which module of `service.export` makes a face's bytes, by a file's ending.
 
 `.ply`, `.pcd`: the dense cloud, binary, mm, camera frame: x y z, nx ny nz (float), red green blue
 (uchar), sigma (float: standard error along the viewing ray). `.npz`: the whole face, read back by
-`load_face`. `.obj`, `.stl`: the dense mesh, mm, camera frame. `.glb`: the same as glTF 2.0: metres,
-y up. What is in each, and what reads it: `docs/files.md`. Each says where the face comes from, as
-far as it can (`service.export.provenance`).
+`load_face`. `.obj`: the dense mesh, mm, camera frame. `.glb`: the same as glTF 2.0: metres, y up.
+`.stl`, `.3mf`: a solid to be printed, mm, z up from the bed. `.png`: a picture. `.webp`, `.mp4`:
+the face turning to and fro. What is in each, and what reads it: `docs/files.md`. Each says where
+the face comes from, as far as it can (`service.export.provenance`).
 """

@@ -1,10 +1,11 @@
 """What may be asked of a face's file, beside its format."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Union, cast, get_args
 
-from denseface.arguments import describe
+from denseface.arguments import describe, expect
 from denseface.service.errors import UsageError
+from denseface.service.export.printing import Printing
 
 if TYPE_CHECKING:
     from denseface.capture.frame import RgbdFrame
@@ -35,6 +36,7 @@ class ExportOptions:
     compact : of `.glb`: a tenth of the size, by EXT_meshopt_compression; points are rounded to a
         seventh of a grid step, 0.03 mm off at most at 0.7 m, and colours become a JPEG
     copyright : of `.glb`: who has the rights, `asset.copyright`
+    printing : of `.stl` and `.3mf`: which solid, how thick, how large
 
     Raises
     ------
@@ -46,6 +48,7 @@ class ExportOptions:
     texture: "Texture | None" = None
     compact: bool = False
     copyright: str = LIKENESS
+    printing: Printing = field(default_factory=Printing)
 
     def __post_init__(self) -> None:
         if self.holes not in HOLES:
@@ -55,7 +58,6 @@ class ExportOptions:
             raise UsageError(f"copyright: expected a line of at most {_MAX_COPYRIGHT} characters, "
                              f"found {describe(text)}")
         if self.texture not in (None, "points"):
-            from denseface.arguments import expect
             from denseface.capture.frame import RgbdFrame
 
             expect("texture", self.texture, RgbdFrame)
@@ -65,7 +67,7 @@ class ExportOptions:
     @property
     def asked(self) -> set[str]:
         """What differs from `PLAIN`."""
-        return {name for name in ("holes", "texture", "compact", "copyright")
+        return {name for name in ("holes", "texture", "compact", "copyright", "printing")
                 if getattr(self, name) != getattr(PLAIN, name)}
 
 

@@ -4,6 +4,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from denseface.service.export.files import FaceFiles
+from denseface.service.export.options import ExportOptions
+from denseface.service.export.printing.choice import ENDINGS as PRINTED
 
 if TYPE_CHECKING:
     from denseface.recon.face import Face
@@ -19,13 +21,19 @@ _VIEWERS = {
     ".npz": "load_face() of denseface reads it, and so does numpy.load()",
     ".obj": "MeshLab and Blender open it",
     ".glb": "Blender, MeshLab and Windows 3D Viewer open it",
-    ".stl": "MeshLab, Blender and slicers for 3D printing open it",
+    ".stl": "slicers for 3D printing, MeshLab and Blender open it",
+    ".3mf": "slicers for 3D printing and Windows 3D Viewer open it, in colour",
+    ".webp": "any browser shows it",
+    ".mp4": "browsers and video players show it",
     ".png": "any browser or image viewer opens it",
     ".json": "",
     ".csv": "any spreadsheet opens it",
 }
 """By a file's ending, where it is known: with what to look at it."""
 _MESHES = {".obj", ".glb", ".stl"}
+_PICTURES = {".png": "picture of the face", ".webp": "the face, turning to and fro",
+             ".mp4": "the face, turning to and fro"}
+_SOLIDS = {"plate": "relief on a plate", "mask": "hollow mask"}
 _COMPACT = "pages with three.js or Babylon.js open it, few other programs do"
 _BESIDE = {".mtl": "its material", ".jpg": "its texture"}
 
@@ -34,18 +42,32 @@ def describe(files: FaceFiles, face: "Face") -> list[str]:
     """Say of each file of a face what it is, a line each; nothing where nothing was asked for."""
     lines = []
     if files.output:
-        what = f"{len(face.dense):,} points"
-        if files.output.suffix.lower() in _MESHES:
-            from denseface.service.export.mesh import face_mesh
-
-            what = f"mesh of {len(face_mesh(face.dense, files.options).points):,} points"
-        lines.append(describe_file(files.output, what, compact=files.options.compact))
+        lines.append(describe_file(files.output, _what(files.output, files.options, face),
+                                   compact=files.options.compact))
     lines += [describe_file(path, _BESIDE.get(path.suffix.lower(), "")) for path in files.beside]
     if files.report:
         lines.append(describe_file(files.report, "report"))
     if files.rendering:
         lines.append(describe_file(files.rendering, "picture of the face"))
     return lines
+
+
+def _what(path: Path, options: ExportOptions, face: "Face") -> str:
+    ending, solid = path.suffix.lower(), options.printing.solid
+    if ending in _PICTURES:
+        return _PICTURES[ending]
+    if ending in PRINTED and solid != "open":
+        import numpy as np
+
+        height = options.printing.height_mm
+        rows = np.ptp(face.dense.points[:, 1]) if len(face.dense) else 0.0
+        return (f"{_SOLIDS[solid]}, the face {height or rows:.0f} mm high"
+                + ("" if height else ", life size"))
+    if ending in _MESHES:
+        from denseface.service.export.mesh import face_mesh
+
+        return f"mesh of {len(face_mesh(face.dense, options).points):,} points"
+    return f"{len(face.dense):,} points"
 
 
 class WrittenFiles:

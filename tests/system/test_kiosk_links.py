@@ -123,10 +123,14 @@ def _check_files(files: dict[str, Path], dense_points: int) -> None:
     assert cloud.has_colors()
     z = np.asarray(cloud.points)[:, 2]
     assert 600 < np.median(z) < 800, "millimetres from the camera"
-    for kind, to_mm in (("glb", 1000.0), ("stl", 1.0)):
-        mesh = open3d.io.read_triangle_mesh(str(files[kind]))
-        assert len(mesh.triangles) > dense_points
-        extent = np.ptp(np.asarray(mesh.vertices), axis=0) * to_mm
-        assert (np.abs(extent - np.ptp(np.asarray(cloud.points), axis=0)) < 1.0).all()
+    mesh = open3d.io.read_triangle_mesh(str(files["glb"]))
+    assert len(mesh.triangles) > dense_points
+    extent = np.ptp(np.asarray(cloud.points), axis=0)
+    assert (np.abs(np.ptp(np.asarray(mesh.vertices), axis=0) * 1000 - extent) < 1.0).all()
+    solid = open3d.io.read_triangle_mesh(str(files["stl"]))
+    solid.remove_duplicated_vertices()
+    assert solid.is_watertight()
+    beyond = np.ptp(np.asarray(solid.vertices), axis=0) - extent
+    assert (np.abs(beyond - [10, 10, 3]) < 4).all(), "a plate of 2 mm, 5 mm around the face"
     picture = cv2.imread(str(files["png"]))
     assert picture.shape == (1200, 1200, 3)

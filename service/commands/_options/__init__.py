@@ -15,19 +15,22 @@ from denseface.service.commands._options.values import (
     file_mode,
     millimetres,
     percent,
+    print_height,
     seconds,
     sensor_name,
     timestamp,
+    wall,
     whole,
 )
 from denseface.service.export import FORMATS, ExportOptions
 from denseface.service.export.options import HOLES, PLAIN
+from denseface.service.export.printing.choice import SOLIDS, Printing
 
 __all__ = [
     "add_client", "add_export", "add_hub", "add_keys", "add_log", "add_mode", "add_outputs",
-    "add_recon", "add_rotation", "add_source", "burst", "client", "count", "export_options",
-    "file_mode", "millimetres", "operator", "percent", "recon_settings", "repeated", "seconds",
-    "sensor_name", "service_settings", "timestamp", "warn", "whole",
+    "add_printing", "add_recon", "add_rotation", "add_source", "burst", "client", "count",
+    "export_options", "file_mode", "millimetres", "operator", "percent", "recon_settings",
+    "repeated", "seconds", "sensor_name", "service_settings", "timestamp", "warn", "whole",
 ]
 
 if TYPE_CHECKING:
@@ -126,7 +129,7 @@ def add_outputs(parser: argparse.ArgumentParser, *flags: str) -> None:
 
 
 def add_export(parser: argparse.ArgumentParser) -> None:
-    """Add `--textured`, `--compact`, `--holes` and `--copyright`, of a face's mesh."""
+    """Add `--textured`, `--compact`, `--holes` and `--copyright`, of a mesh, and `add_printing`."""
     parser.add_argument("--textured", action="store_true",
                         help="take the mesh's colours from the colour image, at full resolution: "
                              ".glb or .obj")
@@ -136,11 +139,28 @@ def add_export(parser: argparse.ArgumentParser) -> None:
                         help="of a mesh: leave them open, or close them (default: leave)")
     parser.add_argument("--copyright", metavar="TEXT", default=PLAIN.copyright,
                         help="who has the rights in a .glb")
+    add_printing(parser)
+
+
+def add_printing(parser: argparse.ArgumentParser) -> None:
+    """Add `--solid`, `--wall` and `--height`, of a face that is to be printed."""
+    parser.add_argument("--solid", choices=SOLIDS, default=PLAIN.printing.solid,
+                        help="of an .stl or .3mf, which are for 3D printing: the face on a plate, "
+                             "as a hollow mask, or, of an .stl, the open surface as the camera saw "
+                             "it (default: plate)")
+    parser.add_argument("--wall", type=wall, metavar="MM",
+                        default=PLAIN.printing.wall_mm,
+                        help="thickness of that plate, or of the mask's wall (default: 2)")
+    parser.add_argument("--height", type=print_height, metavar="MM",
+                        help="of the face, as it is printed (default: life size)")
 
 
 def export_options(args: argparse.Namespace) -> ExportOptions:
-    """Read what `add_export` added, but for `--textured`; raises `UsageError`."""
-    return ExportOptions(args.holes, None, args.compact, args.copyright)
+    """Read what `add_export` or `add_printing` added, but for `--textured`; raises `UsageError`."""
+    printing = Printing(args.solid, args.wall, args.height)
+    if not hasattr(args, "holes"):
+        return ExportOptions(printing=printing)
+    return ExportOptions(args.holes, None, args.compact, args.copyright, printing)
 
 
 def add_mode(parser: argparse.ArgumentParser) -> None:

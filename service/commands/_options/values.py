@@ -8,8 +8,8 @@ from datetime import datetime
 
 from denseface.validation import PEER_NAME, TEXT_OF_PATTERN
 
-__all__ = ["burst", "count", "file_mode", "millimetres", "percent", "seconds", "sensor_name",
-           "timestamp", "wanted", "whole"]
+__all__ = ["burst", "count", "file_mode", "millimetres", "percent", "print_height", "seconds",
+           "sensor_name", "timestamp", "wall", "wanted", "whole"]
 
 _MOST = 10**12
 """Largest whole number that anything takes."""
@@ -61,6 +61,20 @@ def percent(text: str) -> float:
 def millimetres(text: str) -> float:
     """Read a length on a face."""
     return _between(text, 0.01, 100.0, "millimetres, 0.01 to 100")
+
+
+def wall(text: str) -> float:
+    """Read a thickness as `Printing` takes it."""
+    from denseface.service.export.printing.choice import WALL_MM
+
+    return _between(text, *WALL_MM, "millimetres from {:g} to {:g}".format(*WALL_MM))
+
+
+def print_height(text: str) -> float:
+    """Read a height as `Printing` takes it."""
+    from denseface.service.export.printing.choice import HEIGHT_MM
+
+    return _between(text, *HEIGHT_MM, "millimetres from {:g} to {:g}".format(*HEIGHT_MM))
 
 
 def _between(text: str, least: float, most: float, expected: str) -> float:

@@ -6,22 +6,22 @@ import numpy as np
 
 from denseface.recon.face import Face
 from denseface.service.export.mesh import to_stl as to_open_stl
-from denseface.service.export.printing.choice import Printing
-from denseface.service.export.printing.solid import make_solid
+from denseface.service.export.options import PLAIN, ExportOptions
 from denseface.service.export.provenance import stl_header
 
 __all__ = ["to_stl"]
 
 
-def to_stl(face: Face, printing: Printing | None = None) -> bytes:
-    """Give the bytes of a binary `.stl` file: mm, z up from the bed; a plate where none is chosen.
+def to_stl(face: Face, options: ExportOptions = PLAIN) -> bytes:
+    """Give the bytes of a binary `.stl` file: mm, z up from the bed, unless `open` is chosen.
 
     FormatError where no part of the face is wide enough to be printed.
     """
-    chosen = printing or Printing()
-    if chosen.solid == "open":
-        return to_open_stl(face)
-    solid = make_solid(face.dense, chosen)
+    if options.printing.solid == "open":
+        return to_open_stl(face, options)
+    from denseface.service.export.printing.solid import make_solid  # which needs OpenCV
+
+    solid = make_solid(face.dense, options.printing)
     corners = solid.points[solid.triangles]
     table = np.zeros(len(corners), [
         ("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])

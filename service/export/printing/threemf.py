@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.recon.face import Face
-from denseface.service.export.printing.choice import Printing, check_printable
+from denseface.service.export.options import PLAIN, ExportOptions
+from denseface.service.export.printing.choice import check_printable
 from denseface.service.export.printing.solid import Solid, make_solid
 from denseface.service.export.provenance import provenance
 
@@ -50,8 +51,8 @@ Type="{_PACKAGE}/relationships/metadata/thumbnail"/>
 """
 
 
-def to_3mf(face: Face, printing: Printing | None = None) -> bytes:
-    """Give the bytes of a `.3mf` file: mm, z up from the bed; a plate where none is chosen.
+def to_3mf(face: Face, options: ExportOptions = PLAIN) -> bytes:
+    """Give the bytes of a `.3mf` file: mm, z up from the bed.
 
     Colours are sRGB at the corners of triangles (a colour group).
 
@@ -64,9 +65,8 @@ def to_3mf(face: Face, printing: Printing | None = None) -> bytes:
     """
     from denseface.service.export.render import portrait
 
-    chosen = printing or Printing()
-    check_printable(".3mf", chosen)
-    model = _model(make_solid(face.dense, chosen), provenance(face.report))
+    check_printable(".3mf", options.printing)
+    model = _model(make_solid(face.dense, options.printing), provenance(face.report))
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, data in (("[Content_Types].xml", _TYPES.encode()),

@@ -1,5 +1,6 @@
 """A face that turns, as `.webp` (an animated picture) and as `.mp4` (a video)."""
 
+import errno
 import os
 import struct
 import tempfile
@@ -67,7 +68,7 @@ def to_mp4(face: Face) -> bytes:
         cv2.utils.logging.setLogLevel(level)
     # Its last box: a file that was cut short would have none.
     if b"moov" not in data:
-        raise OSError(f"{tempfile.gettempdir()}: the video could not be written there whole")
+        raise OSError(errno.EIO, "The video could not be written whole", tempfile.gettempdir())
     packet = _xmp(face)
     return data + struct.pack(">I4s", 24 + len(packet), b"uuid") + _XMP_BOX + packet
 

@@ -71,7 +71,8 @@ WRITERS = {
 
 @pytest.fixture
 def faults(tmp_path, monkeypatch):
-    monkeypatch.setattr("denseface.service.export.render.render", lambda _: b"a picture" * 99)
+    for drawn in ("render.render", "turning.animation.to_webp", "turning.animation.to_mp4"):
+        monkeypatch.setattr(f"denseface.service.export.{drawn}", lambda _: b"a picture" * 99)
     tmp_path.chmod(0o700)
     return Faults(tmp_path, monkeypatch)
 

@@ -85,7 +85,8 @@ WRONG = [
     (lambda: d.save_face(FACE, 5), NO_PATH + "int 5"),
     (lambda: d.save_face(FACE, b"f.ply"), NO_PATH + "bytes b'f.ply'"),
     (lambda: d.save_face(FACE, "f.jpg"),
-     "f.jpg: ending .jpg, expected one of .ply .pcd .npz .obj .glb .stl"),
+     "f.jpg: ending .jpg, expected one of .ply .pcd .npz .obj .glb .stl .3mf "
+     ".png .webp .mp4"),
     (lambda: d.save_frame("f.npz", FRAME),
      "frame: expected RgbdFrame, found str 'f.npz': save_frame(frame, path)"),
     (lambda: d.save_frame(FACE, "f.npz"),

@@ -122,4 +122,6 @@ def test_comments_are_lines_that_every_reader_takes():
 
 
 def test_every_format_is_looked_at_here():
-    assert set(FORMATS) == {".ply", ".pcd", ".npz", ".obj", ".glb", ".stl"}
+    assert set(FORMATS) == {
+        ".ply", ".pcd", ".npz", ".obj", ".glb", ".stl",
+        ".3mf", ".png", ".webp", ".mp4"}  # these by `denseface info`, in its own test

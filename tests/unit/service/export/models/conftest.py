@@ -21,6 +21,7 @@ from denseface.service.export.models.meshopt import (
     encode_triangles,
     strip_order,
 )
+from denseface.service.export.printing import Printing
 from tests.face_grid_reader import read_face_grid
 from tests.simulator.sample_face import SAMPLE
 from tests.unit.frames import calibration, camera, frame
@@ -131,7 +132,8 @@ def written(tmp_path_factory) -> Written:
         "plain.glb": ExportOptions(), "textured.glb": photo,
         "compact.glb": ExportOptions(compact=True, copyright="Anna B."),
         "both.glb": replace(photo, compact=True), "closed.glb": ExportOptions(holes="close"),
-        "plain.obj": ExportOptions(), "textured.obj": photo, "plain.stl": ExportOptions(),
+        "plain.obj": ExportOptions(), "textured.obj": photo,
+        "plain.stl": ExportOptions(printing=Printing(solid="open")),
         "cloud.ply": ExportOptions(), "cloud.pcd": ExportOptions(),
     }.items():
         save_face(face, folder / name, options=options)

@@ -12,6 +12,7 @@ from PIL import Image
 
 from denseface.recon.face import Face
 from denseface.service.errors import UsageError
+from denseface.service.export.options import ExportOptions
 from denseface.service.export.printing import Printing
 from denseface.service.export.printing.solid import make_solid
 from denseface.service.export.printing.stl import to_stl
@@ -31,7 +32,7 @@ def printing(request) -> Printing:
 
 
 def test_stl_is_the_solid_with_its_unit_and_where_it_comes_from(printing):
-    data = to_stl(face(source="take.oni#3"), printing)
+    data = to_stl(face(source="take.oni#3"), ExportOptions(printing=printing))
     assert data.startswith(b"by denseface, mm; take.oni#3")
     mesh = trimesh.load(io.BytesIO(data), file_type="stl")
     solid = make_solid(face().dense, printing)
@@ -48,7 +49,8 @@ def test_stl_is_the_solid_with_its_unit_and_where_it_comes_from(printing):
 
 
 def test_stl_may_be_the_open_surface_of_the_camera():
-    mesh = trimesh.load(io.BytesIO(to_stl(face(), Printing(solid="open"))), file_type="stl")
+    data = to_stl(face(), ExportOptions(printing=Printing(solid="open")))
+    mesh = trimesh.load(io.BytesIO(data), file_type="stl")
     assert not mesh.is_watertight
     assert mesh.bounds == pytest.approx(np.array(
         [face().dense.points.min(axis=0), face().dense.points.max(axis=0)]), abs=2.1)
@@ -58,7 +60,7 @@ def test_3mf_is_read_in_strict_mode_without_a_warning(printing, tmp_path):
     made = face(source="take.oni#3", sensor='"A" & <B>\n\x07\ud800é', capture_id="visit-7")
     made = replace(made, report=made.report.model_copy(update={"sensor": '"A" & <B>\x07 é'}))
     path = tmp_path / "face.3mf"
-    path.write_bytes(to_3mf(made, printing))
+    path.write_bytes(to_3mf(made, ExportOptions(printing=printing)))
     model = lib3mf.get_wrapper().CreateModel()
     reader = model.QueryReader("3mf")
     reader.SetStrictModeActive(True)
@@ -105,7 +107,8 @@ def test_3mf_has_the_same_bytes_each_time_and_a_picture():
 
 
 def test_3mf_is_read_by_trimesh_too(printing):
-    scene = trimesh.load(io.BytesIO(to_3mf(face(), printing)), file_type="3mf")
+    data = to_3mf(face(), ExportOptions(printing=printing))
+    scene = trimesh.load(io.BytesIO(data), file_type="3mf")
     mesh, = scene.geometry.values()
     assert mesh.is_watertight
     assert mesh.volume > 0
@@ -114,4 +117,4 @@ def test_3mf_is_read_by_trimesh_too(printing):
 
 def test_3mf_holds_no_open_surface():
     with pytest.raises(UsageError, match="solid: expected plate or mask, found open"):
-        to_3mf(face(), Printing(solid="open"))
+        to_3mf(face(), ExportOptions(printing=Printing(solid="open")))

@@ -21,11 +21,8 @@ FACE = replace(FACE, report=FACE.report.model_copy(update={"source": 'a "take"&.
 
 
 @pytest.fixture(autouse=True)
-def _small(monkeypatch):
+def _whole_loop(_short_loops, monkeypatch):
     monkeypatch.setattr(views, "_FRAMES", FRAMES)
-    for module in (views, animation):
-        monkeypatch.setattr(module, "WIDTH", WIDTH)
-        monkeypatch.setattr(module, "HEIGHT", HEIGHT)
 
 
 def covered(frame: np.ndarray) -> np.ndarray:
@@ -106,3 +103,9 @@ def test_a_machine_without_an_encoder_is_told_of_the_other_format(monkeypatch, c
     with pytest.raises(FormatError, match=r"no encoder for video .*; \.webp holds the same"):
         animation.to_mp4(FACE)
     assert not any(capfd.readouterr())
+
+
+def test_a_video_that_the_disk_does_not_take_is_said(monkeypatch):
+    monkeypatch.setattr(animation, "_encode", lambda _, path: path.write_bytes(b"ftyp mdat"))
+    with pytest.raises(OSError, match="The video could not be written whole"):
+        animation.to_mp4(FACE)
