@@ -18,14 +18,14 @@ __all__ = ["Alignment", "align"]
 
 _COARSE = ((30.0, 6), (12.0, 8), (6.0, 8))
 """Largest distances that count, mm, and steps with them."""
-_STEPS = 60
+_STEPS = 30
 """With Tukey's weights, at most."""
 _TUKEY = 4.685
 """Standard deviations at which its weight is zero: 95 % efficient for normal errors."""
 _LEAST_SCALE_MM = 0.15
 _LEAST_COSINE = 0.6
 """Normals that differ by more belong to different parts."""
-_STILL_RAD, _STILL_MM = 1e-6, 1e-4
+_STILL_RAD, _STILL_MM = 1e-5, 1e-3
 """Smaller steps end it."""
 _STEP_MM = 3.0
 """Distance of the points that are laid on the other surface."""

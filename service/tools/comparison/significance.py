@@ -32,7 +32,7 @@ _SCALES_MM = (5.0, 8.0, 12.0)
 """Of the averages: changes 12 to 30 mm wide are seen best."""
 _LENGTH_MM = (2.5, 9.0)
 """Bounds of the length over which noise is alike, standard deviation."""
-_TAIL, _SINGLE_TAIL = 1.25, 1.4
+_TAIL, _SINGLE_TAIL = 1.4, 1.55
 """By how much repeats exceed what Gaussian noise would: factors of the threshold, where the scatter
 of several captures tells how steady each place is, and where it does not."""
 _SEVERAL = 4
