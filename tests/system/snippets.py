@@ -24,7 +24,7 @@ HOW_TOS = tuple(page for page, changes in _HOW_TOS.items() if changes)
 PAGES = ("README.md", "CONTRIBUTING.md", "docs/kiosk.md", "docs/operating.md",
          *(page for page, changes in _HOW_TOS.items() if not changes))
 """Run as shell and Python, by `test_pages`."""
-CONSOLES = ("docs/first-hour.md",)
+CONSOLES = ("docs/first-hour.md", "docs/tutorial.md")
 """Typed, and compared with what they show, by `test_first_hour`."""
 SESSION = "docs/python.md"
 """Run as one notebook, by `test_service`."""
