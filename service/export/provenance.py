@@ -4,11 +4,14 @@ from denseface.capture.frame import RgbdFrame
 from denseface.recon.face import Report
 from denseface.version import VERSION
 
-__all__ = ["comments", "frame_provenance", "provenance", "stl_header"]
+__all__ = ["PRINTED", "comments", "frame_provenance", "provenance", "stl_header"]
 
 _MAX_COMMENT = 400
 """Characters of a value in a comment: readers of PLY take lines of up to 1023 (rply), 512 (VCG)."""
 _STL_HEADER_BYTES = 80
+
+PRINTED = "by denseface, mm, z up"
+"""How the header of an STL begins that stands on a printer's bed."""
 
 
 def provenance(report: Report) -> dict[str, str]:
@@ -43,12 +46,12 @@ def comments(report: Report) -> list[str]:
             for name, text in provenance(report).items()]
 
 
-def stl_header(report: Report) -> bytes:
-    """Give the 80 bytes at the start of a binary STL: unit, and as much of the rest as they take.
+def stl_header(report: Report, begin: str = "by denseface, mm") -> bytes:
+    """Give the 80 bytes at the start of a binary STL: `begin`, and of the rest what they take.
 
     It never begins with `solid`, by which readers know an STL that is text.
     """
-    header = "by denseface, mm"
+    header = begin
     told = provenance(report)
     for name in ("captured_at", "source", "sensor", "capture_id"):
         if name in told and len(longer := f"{header}; {_ascii(told[name])}") <= _STL_HEADER_BYTES:

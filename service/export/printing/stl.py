@@ -7,7 +7,7 @@ import numpy as np
 from denseface.recon.face import Face
 from denseface.service.export.mesh import to_stl as to_open_stl
 from denseface.service.export.options import PLAIN, ExportOptions
-from denseface.service.export.provenance import stl_header
+from denseface.service.export.provenance import PRINTED, stl_header
 
 __all__ = ["to_stl"]
 
@@ -29,4 +29,4 @@ def to_stl(face: Face, options: ExportOptions = PLAIN) -> bytes:
     normals = np.cross(exact[:, 1] - exact[:, 0], exact[:, 2] - exact[:, 0])
     table["normal"] = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     table["corners"] = corners
-    return stl_header(face.report) + struct.pack("<I", len(table)) + table.tobytes()
+    return stl_header(face.report, PRINTED) + struct.pack("<I", len(table)) + table.tobytes()

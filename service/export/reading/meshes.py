@@ -62,7 +62,8 @@ def read_mesh(path: str | Path) -> Mesh:
     """Read a mesh or a cloud: `.ply` `.pcd` `.obj` `.stl` `.glb`, or `.npz` of `save_face`.
 
     Lengths are taken for millimetres in the depth camera's frame, as files of this program have
-    them; a `.glb`, which is in metres and y up by its format, is turned back. Polygons become
+    them; a `.glb`, which is in metres and y up by its format, is turned back, and so is an `.stl`
+    that was made for printing. Polygons become
     triangles that fan out from their first corner, the corners of an `.stl` that are in one place
     one point. Points of a `.pcd` that are not finite are left out: they stand for none.
 

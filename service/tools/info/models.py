@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.files import open_regular
+from denseface.service.export.provenance import PRINTED
 from denseface.service.export.reading import read_mesh
 from denseface.service.tools.info.inspection import Info
 
@@ -59,10 +60,18 @@ def of_stl(path: Path) -> Info:
     found = _model(path, "STL", [])
     if header and not header.startswith("solid"):
         found["header"] = printable(header)
-    if header.startswith(_OURS):
-        solid = {"kind": "solid for 3D printing", "frame": PRINTER}
-        found |= solid if found["closed"] else {"frame": CAMERA}
+    if header.startswith(PRINTED):
+        found |= {"kind": "solid for 3D printing", "frame": PRINTER} | _on_bed(found)
+    elif header.startswith(_OURS):
+        found["frame"] = CAMERA
     return found
+
+
+def _on_bed(found: Info) -> Info:
+    """Give the place of a solid as it is printed, which `read_mesh` gives in a camera's frame."""
+    x, y, z = zip(found["lowest_mm"], found["highest_mm"], strict=True)
+    return {"lowest_mm": [x[0], 0.0 - y[1], 0.0 - z[1]],
+            "highest_mm": [x[1], 0.0 - y[0], 0.0 - z[0]]}
 
 
 def of_glb(path: Path) -> Info:

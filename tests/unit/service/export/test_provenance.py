@@ -88,7 +88,7 @@ def test_npz_has_the_whole_report(saved):
 
 def test_stl_says_what_fits_into_its_80_bytes(saved):
     header = saved(".stl").read_bytes()[:80].rstrip(b"\0").decode()
-    assert header == "by denseface, mm; 2026-11-29T12:00:00.033+00:00; take.oni#12; A00365; visit-7"
+    assert header == "by denseface, mm, z up; 2026-11-29T12:00:00.033+00:00; take.oni#12; A00365"
     for length in range(200):
         long = stl_header(face(source="s" * length, sensor="ä" * 20).report)
         assert len(long) == 80

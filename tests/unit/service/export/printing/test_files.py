@@ -12,12 +12,14 @@ from PIL import Image
 
 from denseface.recon.face import Face
 from denseface.service.errors import UsageError
+from denseface.service.export import save_face
 from denseface.service.export.options import ExportOptions
 from denseface.service.export.printing import Printing
 from denseface.service.export.printing.solid import make_solid
 from denseface.service.export.printing.stl import to_stl
 from denseface.service.export.printing.threemf import NAMESPACE, to_3mf
 from denseface.service.export.provenance import provenance
+from denseface.service.export.reading import read_mesh
 from tests.unit.service.faces import small_face
 
 
@@ -33,7 +35,7 @@ def printing(request) -> Printing:
 
 def test_stl_is_the_solid_with_its_unit_and_where_it_comes_from(printing):
     data = to_stl(face(source="take.oni#3"), ExportOptions(printing=printing))
-    assert data.startswith(b"by denseface, mm; take.oni#3")
+    assert data.startswith(b"by denseface, mm, z up; take.oni#3")
     mesh = trimesh.load(io.BytesIO(data), file_type="stl")
     solid = make_solid(face().dense, printing)
     assert mesh.is_watertight
@@ -46,6 +48,16 @@ def test_stl_is_the_solid_with_its_unit_and_where_it_comes_from(printing):
     a, b, c = np.moveaxis(solid.points[solid.triangles].astype(float), 1, 0)
     normals = np.cross(b - a, c - a)
     assert (stored * normals).sum(axis=1) == pytest.approx(np.linalg.norm(normals, axis=1))
+
+
+@pytest.mark.parametrize("solid", ["plate", "mask"])
+def test_a_printed_stl_is_read_back_upright_and_from_the_front(solid, tmp_path):
+    made = face()
+    save_face(made, tmp_path / "a.stl", options=ExportOptions(printing=Printing(solid)))
+    read = read_mesh(tmp_path / "a.stl").points
+    stands = make_solid(made.dense, Printing(solid)).points
+    assert np.unique(read, axis=0) == pytest.approx(
+        np.unique(stands * np.float32([1, -1, -1]), axis=0), abs=1e-4)
 
 
 def test_stl_may_be_the_open_surface_of_the_camera():
