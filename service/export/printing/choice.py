@@ -28,7 +28,7 @@ class Printing:
     solid : `plate`, the face as a relief on a flat plate, which prints without supports; `mask`, a
         hollow mask; or `open`, no solid but the dense surface as it was measured, in the camera's
         frame, of `.stl` alone
-    wall_mm : thickness of the mask's wall, everywhere at least this, or of the plate, as printed
+    wall_mm : thickness of the mask's wall, nowhere below 0.93 of this, or of the plate, as printed
     height_mm : from the face's lowest to its highest point, as printed; None for life size
 
     Raises
