@@ -30,7 +30,7 @@ from denseface.service.kiosk.visit.options import VisitOptions
 from denseface.service.kiosk.web.app import kiosk_app, kiosk_files
 from denseface.service.kiosk.web.files import Files
 from denseface.service.kiosk.web.guard import origins_of
-from denseface.service.kiosk.web.server import bind, serve, url_of
+from denseface.service.kiosk.web.server import bind, serve, stop_signal, url_of
 from denseface.service.runtime.supervisor_link import SupervisorLink
 from denseface.service.settings import ServiceSettings
 from denseface.version import VERSION
@@ -77,7 +77,7 @@ def visit_options(settings: KioskSettings) -> VisitOptions:
 async def _run(service: ServiceSettings, settings: KioskSettings, options: VisitOptions,
                kept: KeptWithdrawals, tls: ssl.SSLContext | None,
                supervisor: SupervisorLink) -> int:
-    stopped = _stop_signal()
+    stopped = stop_signal()
     files = kiosk_files()
     hello = Hello(languages=settings.languages, sound=settings.sound, speech=settings.speech,
                   version=f"{VERSION}-{files.digest[:12]}")
@@ -136,21 +136,6 @@ async def _beat(supervisor: SupervisorLink) -> None:
     while True:
         supervisor.beat()
         await asyncio.sleep(_BEAT_S)
-
-
-def _stop_signal() -> "asyncio.Future[signal.Signals]":
-    """Give what is done when this process is told to stop."""
-    loop = asyncio.get_running_loop()
-    stopped: asyncio.Future[signal.Signals] = loop.create_future()
-
-    def stop(number: signal.Signals) -> None:
-        if not stopped.done():
-            stopped.set_result(number)
-
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            loop.add_signal_handler(number, stop, number)
-    return stopped
 
 
 def _utc() -> str:

@@ -3,7 +3,6 @@
 import asyncio
 import os
 import secrets
-import signal
 import socket
 import sys
 import threading
@@ -13,7 +12,7 @@ from typing import Any, NamedTuple
 
 from denseface.service.errors import UsageError, reason_of
 from denseface.service.kiosk.web.guard import origins_of
-from denseface.service.kiosk.web.server import serve
+from denseface.service.kiosk.web.server import serve, stop_signal
 from denseface.service.runtime.terminal import complain, say
 from denseface.service.view.app import view_app
 from denseface.service.view.items import Item
@@ -53,7 +52,7 @@ def serve_page(items: Sequence[Item], options: PageOptions) -> int:
 
 
 async def _serve(items: Sequence[Item], options: PageOptions, bound: socket.socket) -> int:
-    stopped = _stop_signal()
+    stopped = stop_signal()
     pages = Pages()
     token = secrets.token_urlsafe(_TOKEN_BYTES)
     port = bound.getsockname()[1]
@@ -107,18 +106,3 @@ def _open(url: str) -> bool:
     # Some wait until they are closed.
     threading.Thread(target=browser.open, args=(url,), daemon=True).start()
     return True
-
-
-def _stop_signal() -> "asyncio.Future[signal.Signals]":
-    """Give what is done when this process is told to stop."""
-    loop = asyncio.get_running_loop()
-    stopped: asyncio.Future[signal.Signals] = loop.create_future()
-
-    def stop(number: signal.Signals) -> None:
-        if not stopped.done():
-            stopped.set_result(number)
-
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            loop.add_signal_handler(number, stop, number)
-    return stopped

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import errno
 import logging
+import signal
 import socket
 import ssl
 from collections.abc import Iterator
@@ -21,7 +22,7 @@ from denseface.service.kiosk.web.connections import (
     BoundedWebSocket,
 )
 
-__all__ = ["bind", "serve", "url_of"]
+__all__ = ["bind", "serve", "stop_signal", "url_of"]
 
 _RETRY_S = 2.0
 """Time between two tries to have a port that another program has, seconds."""
@@ -113,3 +114,18 @@ class _Server(uvicorn.Server):
     def capture_signals(self) -> Iterator[None]:
         """Leave signals alone."""
         yield
+
+
+def stop_signal() -> "asyncio.Future[signal.Signals]":
+    """Give what is done when this process is told to stop."""
+    loop = asyncio.get_running_loop()
+    stopped: asyncio.Future[signal.Signals] = loop.create_future()
+
+    def stop(number: signal.Signals) -> None:
+        if not stopped.done():
+            stopped.set_result(number)
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            loop.add_signal_handler(number, stop, number)
+    return stopped
