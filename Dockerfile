@@ -11,7 +11,7 @@ RUN python3 -m venv /build \
     && /build/bin/pip wheel --no-cache-dir --require-hashes --no-build-isolation --use-pep517 \
         --wheel-dir /wheels -r requirements/run.txt
 COPY . .
-RUN /build/bin/pip wheel --no-deps --no-build-isolation --wheel-dir /wheels . ./whole \
+RUN /build/bin/pip wheel --no-deps --no-build-isolation --wheel-dir /wheels . \
     && python3 -m venv /opt/denseface \
     && /opt/denseface/bin/pip install --no-index --no-deps /wheels/*.whl
 

@@ -12,8 +12,9 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-CORE = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
-WHOLE = tomllib.loads((REPOSITORY / "whole" / "pyproject.toml").read_text())["project"]
+CHECKOUT, CORE, WHOLE = (
+    tomllib.loads((REPOSITORY / folder / "pyproject.toml").read_text())["project"]
+    for folder in ("", "distributions/core", "distributions/whole"))
 
 
 def required(*extras: str) -> set[str]:

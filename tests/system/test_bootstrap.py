@@ -41,7 +41,7 @@ def bootstrap(tmp_path):
     shutil.copytree(REPOSITORY / "requirements", checkout / "requirements")
     (checkout / "script").mkdir()
     (checkout / "whole").mkdir()
-    for name in ("script/bootstrap", "pyproject.toml", "whole/pyproject.toml"):
+    for name in ("script/bootstrap", "pyproject.toml"):
         shutil.copy(REPOSITORY / name, checkout / name)
     tools = tmp_path / "tools"
     tools.mkdir()

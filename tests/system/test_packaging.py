@@ -78,6 +78,13 @@ def test_the_wheel_of_the_sdist_is_that_of_the_checkout_and_needs_no_node(
     assert _contents(_build("wheel", unpacked, tmp_path / "wheel")) == _contents(wheel)
 
 
+def test_the_core_has_the_same_code(wheel, tmp_path):
+    core = _contents(_build("wheel", REPOSITORY / "distributions" / "core", tmp_path))
+    there, here = ({name: content for name, content in contents.items()
+                    if name.startswith("denseface/")} for contents in (core, _contents(wheel)))
+    assert there == here
+
+
 def test_a_front_end_that_cannot_be_built_fails_the_wheel(sdist, tmp_path):
     unpacked = _unpack(sdist, tmp_path / "unpacked")
     (unpacked / _KIOSK / "static" / "kiosk.js").unlink()
@@ -106,7 +113,7 @@ def test_the_front_end_is_in_the_wheel_as_built_and_in_the_sdist_with_its_source
 
 def test_the_wheel_holds_the_package_alone_and_all_of_it(wheel):
     names = _contents(wheel).keys()
-    about = f"denseface_core-{denseface.__version__}.dist-info"
+    about = f"denseface-{denseface.__version__}.dist-info"
     assert {PurePosixPath(name).parts[0] for name in names} == {"denseface", about}
     assert f"{about}/licenses/LICENSE" in names
     assert [name for name in names if name.endswith("py.typed")] == ["denseface/py.typed"]

@@ -1,6 +1,7 @@
 """denseface-core and its extras, denseface, and a client that has three packages."""
 
 import json
+import runpy
 
 import pytest
 from packaging.requirements import Requirement
@@ -9,7 +10,7 @@ import denseface
 from denseface.errors import MissingPackageError
 from denseface.missing import EXTRAS, explained
 from denseface.service.export import FORMATS
-from tests.distributions import CORE, WHOLE, required, run_with, top_modules
+from tests.distributions import CHECKOUT, CORE, REPOSITORY, WHOLE, required, run_with, top_modules
 from tests.unit.service.faces import jpeg
 from tests.unit.service.fake_hub import fake_hub
 from tests.waiting import LIMIT_S
@@ -29,6 +30,23 @@ def test_the_whole_is_all_of_the_core_of_the_same_version():
     assert WHOLE["requires-python"] == CORE["requires-python"]
     every, = map(Requirement, CORE["optional-dependencies"]["all"])
     assert every.extras == PARTS - {"client"}
+
+
+def test_the_core_is_made_of_the_checkout():
+    script = runpy.run_path(str(REPOSITORY / "script/core_project.py"))
+    made = script["core_project"]((REPOSITORY / "pyproject.toml").read_text())
+    assert made == (REPOSITORY / "distributions/core/pyproject.toml").read_text(), "script/lock"
+
+
+def test_a_checkout_is_the_whole():
+    def parts(*extras):
+        named = map(Requirement, (one for extra in extras
+                                  for one in CHECKOUT["optional-dependencies"][extra]))
+        return {one for each in named for one in (
+            parts(*each.extras) if each.name == "denseface" else {str(each)})}
+
+    assert {str(Requirement(one)) for one in CHECKOUT["dependencies"]} == {
+        str(Requirement(one)) for one in CORE["dependencies"]} | parts("all")
 
 
 def test_a_client_asks_for_three_packages():
