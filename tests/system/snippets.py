@@ -40,7 +40,7 @@ denseface() {
     esac
     command denseface "$@"
 }
-trap 'kill $(jobs -p) 2>/dev/null || :; wait' EXIT
+trap 'for job in $(jobs -p); do kill -- "-$job" 2>/dev/null || :; done; wait' EXIT
 """
 """Whoever reads ends `subscribe` by Ctrl-C and answers `purge`; nobody reads here."""
 

@@ -66,10 +66,11 @@ def test_a_how_to_does_what_it_says(page, sensor, tmp_path):
         assert done.returncode == 0, f"{page} leaves: {done.stderr}{done.stdout}"
 
 
-def test_a_failing_block_is_named(tmp_path):
-    blocks = [Snippet("sh", "true\n", 3), Snippet("python", "raise SystemExit(5)\n", 8),
-              Snippet("sh", "touch never\n", 12)]
+def test_a_failing_block_is_named_and_ends_what_runs(tmp_path):
+    blocks = [Snippet("sh", "long() { sleep 600; }\nlong &\n", 3),
+              Snippet("python", "raise SystemExit(5)\n", 8), Snippet("sh", "touch never\n", 12)]
     done = run_all(blocks, tmp_path, dict(os.environ), _TIMEOUT_S)
     assert done.returncode == 5
-    assert done.stderr.splitlines()[-1] == "line 8"
+    lines = [line for line in done.stderr.splitlines() if line.startswith("line ")]
+    assert lines == ["line 3", "line 8"]
     assert not (tmp_path / "never").exists()
