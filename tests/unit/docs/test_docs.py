@@ -59,10 +59,9 @@ def test_a_decision_has_number_status_and_date(path):
                         r"Date: \d{4}-\d\d-\d\d\.", status)
 
 
-def test_no_two_decisions_have_one_number():
-    """Gaps are those of numbers that were given out, and not needed in the end."""
-    numbers = [path.name[:4] for path in DECISIONS]
-    assert len({*numbers}) == len(numbers)
+def test_decisions_are_numbered_without_gaps():
+    assert [path.name[:4] for path in DECISIONS] == [
+        f"{number:04}" for number in range(1, len(DECISIONS) + 1)]
 
 
 @cache
