@@ -66,12 +66,23 @@ class Served:
         return re.findall(r"accepted +capture_id=(\w+)", self.up.log.read_text())
 
     def previews(self) -> float:
-        """Give how many pictures were asked of the sensor so far."""
+        """Give how many pictures were asked of the sensor so far.
+
+        Figures are those of the hub's last heartbeat, so one that comes after this call is waited
+        for: it has another number of the sensor's frames. By the second, what was under way came.
+        """
         *_, url = re.findall(r"http://\S+/metrics", self.up.log.read_text())
-        with urlopen(url, timeout=LIMIT_S) as answer:  # noqa: S310 - this machine
-            text = answer.read().decode()
-        counted = re.findall(r"^denseface_previews_total\S* (\S+)$", text, re.MULTILINE)
-        return sum(map(float, counted))
+
+        def figure(name: str) -> float:
+            with urlopen(url, timeout=LIMIT_S) as answer:  # noqa: S310 - this machine
+                text = answer.read().decode()
+            counted = re.findall(rf"^denseface_{name}_total\S* (\S+)$", text, re.MULTILINE)
+            return sum(map(float, counted))
+
+        for _ in range(2):
+            frames = figure("sensor_frames")
+            until(lambda before=frames: figure("sensor_frames") != before)
+        return figure("previews")
 
     def holds(self, capture_id: str) -> bool:
         """Say whether a file of the data folder has a capture's id in its name or its bytes."""
