@@ -78,8 +78,9 @@ class PageLinks(SphinxPostTransform):
                 there = self.app.builder.get_relative_uri(here, page)
                 node.replace_self(
                     nodes.reference("", "", *node.children, refuri=there, internal=True))
-            elif any((base / target).is_dir()
-                     for base in (_ROOT, Path(self.env.srcdir, here).parent)):
+            elif target not in self.env.found_docs and any(
+                    (base / target).is_dir()
+                    for base in (_ROOT, Path(self.env.srcdir, here).parent)):
                 node.replace_self(nodes.inline("", "", *node.children))
 
 
