@@ -40,8 +40,6 @@ _BASE, _CHANGED, _DRAWS = 12, 6, 3
 _NULLS, _PAIRS = 8, 3
 """Pairs for each setting: of repeats, for each head; of each change."""
 _NEAR_MM = 15.0
-_SKIN_MM = 4.0
-"""The foremost vertex of a head within so much of a place, along x and y, is its skin."""
 _CUT_PX, _CUT_COLOR_PX = 300, 400
 """Images are cut to the head: what is beside it costs time and changes nothing."""
 
@@ -104,10 +102,18 @@ def _captures(
 
 def _place(head: str, bump: Raised, person: Person) -> NDArray[np.float64]:
     """Give where the middle of a bump is in the camera's frame of a pose, (3,) mm."""
-    vertices = load_head(head).vertices
-    # Scans have vertices behind the skin, too.
-    near = vertices[np.hypot(vertices[:, 0] - bump.x, vertices[:, 1] - bump.y) < _SKIN_MM]
-    return np.asarray(person.rotation @ near[near[:, 2].argmin()] + person.shift, np.float64)
+    # The foremost surface there: scans have others behind the skin, and few vertices on cheeks.
+    shape, middle = load_head(head), np.array([bump.x, bump.y])
+    corners = shape.vertices[shape.faces].astype(float)
+    a, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
+    across, flat = middle - a[:, :2], np.abs(area) < 1e-9
+    area = np.where(flat, 1.0, area)
+    v = (across[:, 0] * ac[:, 1] - across[:, 1] * ac[:, 0]) / area
+    w = (ab[:, 0] * across[:, 1] - ab[:, 1] * across[:, 0]) / area
+    within = ~flat & (v >= 0) & (w >= 0) & (v + w <= 1)
+    z = (a[:, 2] + v * ab[:, 2] + w * ac[:, 2])[within].min()
+    return np.asarray(person.rotation @ np.array([*middle, z]) + person.shift, np.float64)
 
 
 @dataclass
