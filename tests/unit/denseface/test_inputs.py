@@ -77,6 +77,16 @@ KINDS = {
 }
 
 
+@pytest.fixture(scope="module")
+def _imported(tmp_path_factory):
+    """What the first recording imports is no memory of a reader's."""
+    path = tmp_path_factory.mktemp("first") / "empty.oni"
+    nothing(path)
+    with pytest.raises(CaptureError):
+        open_source(path)
+
+
+@pytest.mark.usefixtures("_imported")
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", READERS)
 def test_what_is_no_input_is_named_at_once(tmp_path, name, kind):
