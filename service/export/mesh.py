@@ -1,17 +1,15 @@
-"""Triangles between neighbouring points of a dense cloud, and files of nothing else."""
+"""Triangles between neighbouring points of a dense cloud."""
 
-import struct
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from denseface.recon.face import MAX_STEP, DenseCloud, Face
+from denseface.recon.face import MAX_STEP, DenseCloud
 from denseface.service.errors import UsageError
 from denseface.service.export.options import PLAIN, ExportOptions
-from denseface.service.export.provenance import stl_header
 
-__all__ = ["LONGEST_EDGE", "FaceMesh", "face_mesh", "local_spacing", "to_stl", "triangulate"]
+__all__ = ["LONGEST_EDGE", "FaceMesh", "face_mesh", "local_spacing", "triangulate"]
 
 LONGEST_EDGE = 2.0
 """Of a triangle, in local spacings; along a diagonal of an even slope it is the square root of 2.
@@ -123,15 +121,3 @@ def triangulate(cloud: DenseCloud) -> NDArray[np.int32]:
                      np.where(along_bc, bc & cd & bd, ad & bd & ab)], axis=1)
     joint: NDArray[np.int32] = triangles[kept]
     return joint
-
-
-def to_stl(face: Face, options: ExportOptions = PLAIN) -> bytes:
-    """Give the bytes of a binary `.stl` file: mm, camera frame, with the triangles' normals."""
-    mesh = face_mesh(face.dense, options)
-    corners = mesh.points[mesh.triangles]
-    table = np.zeros(len(corners), [
-        ("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    table["normal"] = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    table["corners"] = corners
-    return stl_header(face.report) + struct.pack("<I", len(table)) + table.tobytes()
