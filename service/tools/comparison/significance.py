@@ -217,12 +217,7 @@ class _Places:
         for sign in (1, -1):
             beyond = np.flatnonzero(self.known & (sign * self.score >= 1))
             if len(beyond):
-                pairs = cKDTree(self.given.points[beyond]).query_pairs(
-                    _JOINED_MM, output_type="ndarray")
-                graph = sparse.coo_array(
-                    (np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])),
-                    shape=(len(beyond), len(beyond)))
-                count, labels = connected_components(graph, directed=False)
+                count, labels = self._parts(beyond)
                 found += [beyond[labels == k] for k in range(count)]
         return found
 
@@ -246,8 +241,13 @@ class _Places:
     def _around(self, top: int, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Give the chosen places that hang together with one of them."""
         rows = np.flatnonzero(chosen & self.known)
+        _, labels = self._parts(rows)
+        return np.asarray(rows[labels == labels[np.searchsorted(rows, top)]], np.int64)
+
+    def _parts(self, rows: NDArray[np.int64]) -> tuple[int, NDArray[np.int32]]:
+        """Give how many parts some places fall into, and which one each is of."""
         pairs = cKDTree(self.given.points[rows]).query_pairs(_JOINED_MM, output_type="ndarray")
         graph = sparse.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])),
                                  shape=(len(rows), len(rows)))
-        _, labels = connected_components(graph, directed=False)
-        return np.asarray(rows[labels == labels[np.searchsorted(rows, top)]], np.int64)
+        count, labels = connected_components(graph, directed=False)
+        return count, labels
