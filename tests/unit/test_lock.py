@@ -79,7 +79,7 @@ def _of(*extras: str) -> list[str]:
 
 
 _RUN = _PROJECT["project"]["dependencies"] + _of("all", "kiosk")
-_DEV = _of("dev", "notebook", "rerun", "docs")
+_DEV = _of("dev", "batch", "notebook", "rerun", "docs")
 _BUILD = [*_PROJECT["build-system"]["requires"], *_lines("build.in")]
 
 
