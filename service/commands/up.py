@@ -33,8 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from denseface.service.daemons.startup import start_process
 
-    start_process("up", args.log)
-    from denseface.service.daemons.service_manager import ServiceManager
+    link = start_process("up", args.log)
     from denseface.service.daemons.supervisor import Supervisor, check_settings, process_table
 
     settings = _options.service_settings(args)
@@ -47,8 +46,9 @@ def run(args: argparse.Namespace) -> int:
                               "preset", "set"),
         captures=_captures(args.source or ["openni2:"], args.calibration or [], args.rotate or []),
         kiosk=(kiosk := _kiosk(args)))
-    with ServiceManager(os.environ) as manager, _welcome(args, settings.address, kiosk):
-        return Supervisor(table, max(settings.hang_timeout_s, settings.silence_s), manager).run()
+    with link, _welcome(args, settings.address, kiosk):
+        silence_s = max(settings.hang_timeout_s, settings.silence_s)
+        return Supervisor(table, silence_s, link.manager).run()
 
 
 def _welcome(

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from denseface.service.runtime.signals import PARENT_VARIABLE
-from denseface.service.runtime.supervisor_link import LINK_VARIABLE, Beat, ProcessLink
+from denseface.service.runtime.watching.supervisor_link import LINK_VARIABLE, Beat, ProcessLink
 
 __all__ = ["AttendedClock", "End", "ProcessSpec", "WatchedProcess"]
 

@@ -31,7 +31,7 @@ from denseface.service.protocol.wire import Packet
 from denseface.service.runtime.background import Background
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.signals import StopSignal
-from denseface.service.runtime.supervisor_link import SupervisorLink
+from denseface.service.runtime.watching.supervisor_link import SupervisorLink
 from denseface.service.settings import ServiceSettings, check_frame_size
 from denseface.service.transport.hub_connection import HubConnection
 
@@ -136,6 +136,7 @@ class _Capture:
                     case Hinted(hint):
                         self.connection.send(messages.QualityHint(hint=hint))
             self._tell_state()
+            self.supervisor.manager.ready()
             self.sender.send_due()
 
     def _receive(self, packet: Packet) -> None:
@@ -167,6 +168,8 @@ class _Capture:
         sent = self.connection.send(messages.SensorState(
             name=self.name or sensor_name(self.uri, state.identity), state=state.state,
             reason=state.reason, identity=state.identity, figures=state.figures))
+        if changed and sent:
+            self.supervisor.manager.status(f"{state.state}{state.reason and f': {state.reason}'}")
         if changed and (state.state, state.reason) not in self.logged:
             if state.state == "streaming":
                 self.logged.clear()

@@ -18,6 +18,7 @@ from denseface.service.daemons.opening import Opening
 from denseface.service.errors import LocalProtocolError, RemoteProtocolError
 from denseface.service.hub import Hub
 from denseface.service.monitoring import Observer, Rejections
+from denseface.service.monitoring.observer import Snapshot
 from denseface.service.protocol import messages
 from denseface.service.protocol.message_base import BaseMessage
 from denseface.service.protocol.outgoing import Output, Publish, send, steps
@@ -26,7 +27,7 @@ from denseface.service.protocol.topics import Topic
 from denseface.service.protocol.wire import Buffer, Packet, encode
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.signals import StopSignal
-from denseface.service.runtime.supervisor_link import SupervisorLink
+from denseface.service.runtime.watching.supervisor_link import SupervisorLink
 from denseface.service.security.permissions import OF_ITS_OWN, missing_role
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage import OpeningStore, WriterThreads, kept_bytes
@@ -122,6 +123,7 @@ class _EventLoop:
             if self.writer.has_results():
                 self._send_all(self.hub.written(time.monotonic()))
             stop.drain()
+        self.supervisor.manager.stopping()
         # Writes under way are finished and acknowledged; the sockets linger for that.
         self._send_all(self.hub.written(time.monotonic(), wait=True))
 
@@ -140,6 +142,7 @@ class _EventLoop:
         self.hub.status_subscribers(subscriptions[Topic.STATUS])
         outputs = self.hub.tick(now)
         self.observer.record_tick(now, outputs, subscriptions, self.listeners.unreachable())
+        self.supervisor.manager.ready(_in_short(self.observer.latest()))
         self._send_all(outputs)
         return now + _TICK_S
 
@@ -193,6 +196,14 @@ class _EventLoop:
             self.observer.figures.counters.add("drops", topic)
         if topic is Topic.FACES:
             failpoint("hub.outcome.published")
+
+
+def _in_short(snapshot: Snapshot | None) -> str:
+    """Say in one line who is there."""
+    if snapshot is None:
+        return "listens"
+    status = snapshot.status
+    return f"sensors: {len(status.sensors)}, workers: {len(status.workers)}"
 
 
 def _denied(incoming: Incoming, message: BaseMessage, missing: str) -> Output:

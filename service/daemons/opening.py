@@ -10,7 +10,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.wire import Packet, encode
 from denseface.service.runtime.bounded_dict import BoundedDict
 from denseface.service.runtime.signals import StopSignal
-from denseface.service.runtime.supervisor_link import SupervisorLink
+from denseface.service.runtime.watching.supervisor_link import SupervisorLink
 from denseface.service.security.permissions import missing_role
 from denseface.service.security.refusals import Refusals
 from denseface.service.storage import FolderStore, OpeningStore
@@ -61,6 +61,7 @@ class Opening:
             if (now := time.monotonic()) >= due:
                 due = now + _TICK_S
                 self._supervisor.beat()
+                self._say_how_far()
                 self._listeners.tick()
             if self._progress.files and now - said >= _LOG_S:
                 said = now
@@ -82,6 +83,13 @@ class Opening:
         if answer := self._refusals.answer(
                 incoming.key or incoming.peer, incoming.parts, error):
             self._listeners.send(incoming.peer, encode(Packet(answer)))
+
+    def _say_how_far(self) -> None:
+        """Tell the service manager: whoever asks while files are read gets that answer."""
+        if files := self._progress.files:
+            self._supervisor.manager.ready(f"reads its files, {self._progress.read} of {files}")
+        else:
+            self._supervisor.manager.status("opens the data folder")
 
     def _receive(self, incoming: Incoming) -> None:
         try:

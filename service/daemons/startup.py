@@ -9,7 +9,7 @@ from denseface.service.log.kernels import KernelEvents, tell_of_kernels
 from denseface.service.runtime import failpoints
 from denseface.service.runtime.process import name_process
 from denseface.service.runtime.signals import die_with_parent
-from denseface.service.runtime.supervisor_link import SupervisorLink
+from denseface.service.runtime.watching.supervisor_link import SupervisorLink
 
 __all__ = ["ONE_THREAD", "start_process", "use_one_thread"]
 

@@ -15,10 +15,10 @@ from denseface.service.daemons._watched_process import (
     ProcessSpec,
     WatchedProcess,
 )
-from denseface.service.daemons.service_manager import ServiceManager
 from denseface.service.daemons.startup import ONE_THREAD
 from denseface.service.errors import AddressError
 from denseface.service.runtime.signals import StopSignal
+from denseface.service.runtime.watching.service_manager import ServiceManager
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage import check_folder
 from denseface.service.transport.addresses import check_bindable, is_local
@@ -96,8 +96,6 @@ class Supervisor:
         self._clock = AttendedClock(self._look_s)
         self._told = False
         """Whether the hub that runs knows the counts of restarts."""
-        self._ready = False
-        """Whether there was a hub that ran."""
         self._log = structlog.get_logger("supervisor")
 
     def run(self) -> int:
@@ -110,7 +108,7 @@ class Supervisor:
             try:
                 return self._watch(stop)
             finally:
-                self._manager.say("STOPPING=1")
+                self._manager.stopping()
                 self._stop_all()
 
     def _watch(self, stop: StopSignal) -> int:
@@ -153,10 +151,9 @@ class Supervisor:
                 for process in self._processes if process.counts})
 
     def _tell_manager(self) -> None:
-        self._manager.say("WATCHDOG=1")
-        if not self._ready and self._processes[0].started:
-            self._ready = True
-            self._manager.say("READY=1")
+        self._manager.alive()
+        if self._processes[0].started:
+            self._manager.ready("watches hub, sensors and workers")
 
     def _kill_hung(self) -> None:
         attended = self._clock.look()

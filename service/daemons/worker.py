@@ -25,7 +25,7 @@ from denseface.service.runtime.background import Background
 from denseface.service.runtime.collection import collect_from_now_on
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.signals import StopSignal
-from denseface.service.runtime.supervisor_link import Beat, SupervisorLink
+from denseface.service.runtime.watching.supervisor_link import Beat, SupervisorLink
 from denseface.service.settings import ServiceSettings, check_frame_size
 from denseface.service.transport.addresses import check_connectable
 from denseface.service.transport.connection import Credentials
@@ -35,6 +35,8 @@ __all__ = ["run", "warm"]
 
 _FINISH_S = 3.0
 """Time to finish the job under way when the process stops, seconds; below the supervisor's 5."""
+_KERNEL_S = 300.0
+"""Longest time from one compiled kernel to the next, seconds."""
 _log = structlog.get_logger("worker")
 
 
@@ -95,7 +97,9 @@ class _Worker:
                 collect_from_now_on()
                 _log.info("warm", seconds=round(time.monotonic() - begun, 2))
                 self._send_ready()
+                self.supervisor.manager.ready()
                 return True
+            self._say_how_far()
         return False
 
     def serve(self, stop: StopSignal) -> None:
@@ -147,8 +151,17 @@ class _Worker:
         return messages.Heartbeat(compiling=messages.Compiling(
             name=self.name, done=progress.done, total=progress.total))
 
+    def _say_how_far(self) -> None:
+        """Tell the service manager what the start waits for; it is to end where that gets stuck."""
+        if (progress := compiling.progress) is None:
+            self.supervisor.manager.status("loads its kernels")
+        else:
+            how_far = f"compiles its kernels, {progress.done} of {progress.total}"
+            self.supervisor.manager.step(how_far, _KERNEL_S)
+
     def _send_ready(self) -> None:
-        self.connection.send(messages.WorkerReady(name=self.name, credit=self.credit))
+        if self.connection.send(messages.WorkerReady(name=self.name, credit=self.credit)):
+            self.supervisor.manager.status("takes frames")
 
     def _receive(self, packet: Packet) -> None:
         match packet.message:

@@ -31,7 +31,8 @@ from denseface.service.kiosk.web.app import kiosk_app, kiosk_files
 from denseface.service.kiosk.web.files import Files
 from denseface.service.kiosk.web.guard import origins_of
 from denseface.service.kiosk.web.server import bind, serve, stop_signal, url_of
-from denseface.service.runtime.supervisor_link import SupervisorLink
+from denseface.service.runtime.watching.service_manager import ServiceManager
+from denseface.service.runtime.watching.supervisor_link import SupervisorLink
 from denseface.service.settings import ServiceSettings
 from denseface.version import VERSION
 
@@ -98,11 +99,12 @@ async def _run(service: ServiceSettings, settings: KioskSettings, options: Visit
         working: list[asyncio.Future[Any]] = [asyncio.create_task(work) for work in (
             _beat(supervisor),
             watch_hub(hub, settings.sensor, conductor.service_is),
-            _serve_page(settings, conductor, files, routes, tls),
+            _serve_page(settings, conductor, files, routes, tls, supervisor.manager),
             *([links.serve()] if links else []), *button)]
         try:
             await asyncio.wait([stopped, *working], return_when=asyncio.FIRST_COMPLETED)
         finally:
+            supervisor.manager.stopping()
             for task in (*working, *also):
                 task.cancel()
             results = await asyncio.gather(*working, *also, return_exceptions=True)
@@ -116,16 +118,17 @@ async def _run(service: ServiceSettings, settings: KioskSettings, options: Visit
 
 async def _serve_page(
     settings: KioskSettings, conductor: Conductor, files: Files, routes: Sequence[Route],
-    tls: ssl.SSLContext | None,
+    tls: ssl.SSLContext | None, manager: ServiceManager,
 ) -> None:
     """Serve the page until cancelled."""
+    manager.status("waits for its port")
     bound = await bind(settings.address, "--kiosk-address")
     host, port = bound.getsockname()[:2]
     origins = origins_of(settings.scheme, host, port, settings.proxy)
-    _log.info("the page for visitors",
-              url=" ".join([url_of(settings.scheme, bound), *settings.proxy]))
+    url = " ".join([url_of(settings.scheme, bound), *settings.proxy])
+    _log.info("the page for visitors", url=url)
     await serve(kiosk_app(conductor.page, origins, files, routes, asks_consent=settings.consent),
-                bound, tls)
+                bound, tls, served=lambda: manager.ready(f"serves the page at {url}"))
 
 
 async def _no_links(_: str) -> None:
@@ -133,6 +136,7 @@ async def _no_links(_: str) -> None:
 
 
 async def _beat(supervisor: SupervisorLink) -> None:
+    supervisor.manager.need(3 * _BEAT_S)
     while True:
         supervisor.beat()
         await asyncio.sleep(_BEAT_S)

@@ -14,8 +14,8 @@ from denseface.service.protocol.messages import Denied, Goodbye, Heartbeat
 from denseface.service.protocol.payload import Arrays
 from denseface.service.protocol.wire import Packet, encode
 from denseface.service.runtime.signals import StopSignal
-from denseface.service.runtime.supervisor_link import Beat, SupervisorLink
 from denseface.service.runtime.wake_pipe import WakePipe
+from denseface.service.runtime.watching.supervisor_link import Beat, SupervisorLink
 from denseface.service.settings import ServiceSettings
 from denseface.service.transport.addresses import check_connectable
 from denseface.service.transport.connection import Credentials, connect, receive_packet
@@ -37,6 +37,7 @@ class HubConnection:
         keys = Credentials.of(settings)
         self._heartbeat_s = settings.heartbeat_s
         self._supervisor = supervisor or SupervisorLink()
+        self._supervisor.manager.need(settings.silence_s)  # it is as silent between heartbeats
         self._log = structlog.get_logger(name)
         self._context: Context = zmq.Context()
         self._socket, self._monitor = connect(self._context, zmq.DEALER, settings.address, keys)
@@ -95,6 +96,7 @@ class HubConnection:
             elif wake.fileno() in ready:
                 wake.drain()
                 yield None
+        self._supervisor.manager.stopping()
 
     def _log_connection(self, now: float) -> None:
         """Say once that the hub is waited for, and that it is there after that."""
@@ -106,6 +108,7 @@ class HubConnection:
             self._alone_since = now
         elif not self._said_alone and now - self._alone_since >= _SAY_ALONE_S:
             self._said_alone = True
+            self._supervisor.manager.status(f"waits for the hub at {self._address}")
             if not self._monitor.refused:  # that has been said
                 self._log.warning("waiting for the hub", address=self._address,
                                   reason=self._monitor.why_not())

@@ -7,7 +7,7 @@ import logging
 import signal
 import socket
 import ssl
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from ipaddress import ip_address
 
 import structlog
@@ -84,11 +84,11 @@ def _bound(address: Address) -> socket.socket:
 
 async def serve(
     app: App, bound: socket.socket, tls: ssl.SSLContext | None = None,
-    http: type[BoundedHttp] = BoundedHttp,
+    http: type[BoundedHttp] = BoundedHttp, served: Callable[[], object] = lambda: None,
 ) -> None:
-    """Serve an application on a bound socket until cancelled.
+    """Serve an application on a bound socket until cancelled; `served` is called when it is.
 
-    Then answers under way have two seconds, and pages are told that it ends.
+    When cancelled, answers under way have two seconds, and pages are told that it ends.
     """
     logging.getLogger("uvicorn.error").setLevel(logging.ERROR)  # not each malformed request
     server = _Server(uvicorn.Config(
@@ -98,7 +98,7 @@ async def serve(
         ssl_context_factory=(lambda *_: tls) if tls else None,
         ws_max_size=MAX_MESSAGE_BYTES,
         ws_per_message_deflate=False, ws_ping_interval=10.0, ws_ping_timeout=10.0,
-        timeout_keep_alive=10, timeout_graceful_shutdown=_STOP_S))
+        timeout_keep_alive=10, timeout_graceful_shutdown=_STOP_S), served)
     serving = asyncio.create_task(server.serve([bound]))
     try:
         await asyncio.shield(serving)
@@ -108,7 +108,17 @@ async def serve(
 
 
 class _Server(uvicorn.Server):
-    """Signals are others' affair."""
+    """Says when it serves; signals are others' affair."""
+
+    def __init__(self, config: uvicorn.Config, served: Callable[[], object]) -> None:
+        super().__init__(config)
+        self._served = served
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Listen, and say so."""
+        await super().startup(sockets)
+        if self.started:
+            self._served()
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:

@@ -23,8 +23,8 @@ from denseface.service.errors import RemoteProtocolError
 from denseface.service.hub import Hub
 from denseface.service.monitoring import Observer, Rejections
 from denseface.service.protocol.wire import MAX_PARTS, decode_from_hub, decode_to_hub
-from denseface.service.runtime.supervisor_link import SupervisorLink
 from denseface.service.runtime.wake_pipe import WakePipe
+from denseface.service.runtime.watching.supervisor_link import SupervisorLink
 from denseface.service.security.refusals import Refusals
 from denseface.service.settings import ServiceSettings
 from denseface.service.storage import InlineWriter, OpeningStore

@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from denseface.service.runtime.supervisor_link import (
+from denseface.service.runtime.watching.supervisor_link import (
     LINK_VARIABLE,
     Beat,
     ProcessLink,

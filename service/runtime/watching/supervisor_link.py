@@ -1,7 +1,8 @@
 """What a process and its supervisor tell each other: signs of life, why it ends, and restarts.
 
 They share a pair of SEQPACKET sockets: a record comes whole or not at all, nobody waits for the
-other, and what a process said last can still be read when it is dead.
+other, and what a process said last can still be read when it is dead. The signs of life also go to
+the service manager of a process that has one in place of a supervisor.
 """
 
 import json
@@ -12,6 +13,7 @@ from enum import Enum
 from typing import Any, Self
 
 from denseface.service.runtime.closing import Closing
+from denseface.service.runtime.watching.service_manager import ServiceManager
 
 __all__ = ["LINK_VARIABLE", "Beat", "ProcessLink", "SupervisorLink"]
 
@@ -38,22 +40,26 @@ class Beat(Enum):
 class SupervisorLink(Closing):
     """A process's end. Without a supervisor it says nothing and hears nothing."""
 
-    def __init__(self, end: socket.socket | None = None) -> None:
+    def __init__(self, end: socket.socket | None = None,
+                 manager: ServiceManager | None = None) -> None:
         self._end = end
+        self.manager = manager or ServiceManager({})
+        """Who started this process, if that was a service manager."""
 
     @classmethod
     def inherit(cls, environment: MutableMapping[str, str]) -> Self:
-        """Take the end that the supervisor left, and its variable from the environment."""
+        """Take the end that the supervisor left, and all variables from the environment."""
+        manager = ServiceManager(environment)
         descriptor = environment.pop(LINK_VARIABLE, "")
         if not descriptor.isdecimal():
-            return cls()
+            return cls(None, manager)
         try:
             end = socket.socket(fileno=int(descriptor))
         except OSError:  # the variable came from elsewhere
-            return cls()
+            return cls(None, manager)
         end.set_inheritable(False)
         end.setblocking(False)
-        return cls(end)
+        return cls(end, manager)
 
     @property
     def supervised(self) -> bool:
@@ -62,12 +68,14 @@ class SupervisorLink(Closing):
 
     def beat(self, beat: Beat = Beat.IDLE) -> None:
         """Say that this process makes progress: to be called from what must not hang."""
+        self.manager.alive()
         if self._end is not None:
             with suppress(OSError):  # full: the supervisor has enough to read; or it is dead
                 self._end.send(beat.value)
 
     def say_why(self, reason: str) -> None:
         """Say why this process is about to end."""
+        self.manager.status(reason)
         if self._end is not None:
             with suppress(OSError):
                 self._end.send(_WHY + reason.encode(errors="replace")[:_MAX_WHY])
@@ -81,6 +89,7 @@ class SupervisorLink(Closing):
 
     def close(self) -> None:
         """Close this end."""
+        self.manager.close()
         if self._end is not None:
             self._end.close()
 
