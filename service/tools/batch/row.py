@@ -12,7 +12,7 @@ from denseface.recon.face import Face
 from denseface.service.errors import FormatError
 
 __all__ = ["MAX_SOURCE", "MAX_THUMBNAIL_BYTES", "MAX_WARNINGS", "MAX_WHY", "STATES", "Row",
-           "RowKey", "State"]
+           "RowKey", "State", "told"]
 
 State = Literal["face", "no_face", "unreadable", "failed"]
 STATES: tuple[State, ...] = ("face", "no_face", "unreadable", "failed")
@@ -32,9 +32,13 @@ class RowKey(NamedTuple):
     frame: int | None
 
 
+def told(path: str) -> str:
+    """Give a path as a row has it: a file's name need not be UTF-8, a text in a table has to be."""
+    return path.encode("utf-8", "backslashreplace").decode()
+
+
 def _path(text: Any) -> Any:
-    """A file's name need not be UTF-8; a text in a table has to be."""
-    return text.encode("utf-8", "backslashreplace").decode() if isinstance(text, str) else text
+    return told(text) if isinstance(text, str) else text
 
 
 def _line(text: Any, most: int) -> Any:
