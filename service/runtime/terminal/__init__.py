@@ -11,10 +11,12 @@ from denseface.service.runtime.terminal._lines import (
     printable,
     reader_left,
     say,
+    stepping_aside,
     suggest,
 )
 
 __all__ = [
     "ask", "can_ask", "complain", "complain_of", "discard_unless_flushed",
-    "fill_standard_descriptors", "flush_stdout", "printable", "reader_left", "say", "suggest",
+    "fill_standard_descriptors", "flush_stdout", "printable", "reader_left", "say",
+    "stepping_aside", "suggest",
 ]

@@ -15,7 +15,7 @@ from typing import TextIO
 __all__ = [
     "ask", "can_ask", "complain", "complain_of", "discard_unless_flushed",
     "fill_standard_descriptors", "flush_stdout", "printable", "reader_left", "say", "step_aside_by",
-    "suggest",
+    "stepping_aside", "suggest",
 ]
 
 _aside: Callable[[], AbstractContextManager[object]] = nullcontext
@@ -26,6 +26,24 @@ def step_aside_by(aside: Callable[[], AbstractContextManager[object]]) -> None:
     """Print lines inside the `with` block that this gives, from now on."""
     global _aside
     _aside = aside
+
+
+@contextmanager
+def stepping_aside(aside: Callable[[], AbstractContextManager[object]]) -> Iterator[None]:
+    """Within the block, print lines inside the `with` block that `aside` gives, too."""
+    global _aside
+    before = _aside
+
+    @contextmanager
+    def both() -> Iterator[None]:
+        with before(), aside():
+            yield
+
+    _aside = both
+    try:
+        yield
+    finally:
+        _aside = before
 
 
 def printable(text: str) -> str:

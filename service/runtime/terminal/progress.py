@@ -16,7 +16,7 @@ from typing import Self, TextIO
 from denseface.service.runtime.terminal import _lines
 from denseface.service.runtime.terminal._lines import complain, printable
 
-__all__ = ["PLAIN_AFTER_S", "Progress"]
+__all__ = ["PLAIN_AFTER_S", "Progress", "can_move", "duration"]
 
 PLAIN_AFTER_S = 2.0
 """Time after which something takes long enough to be said where no line can move, seconds."""
@@ -63,7 +63,7 @@ class Progress:
         self._clock = clock
         self._begun_s = clock()
         self._stream = sys.stderr
-        self._moves = _can_move(self._stream)
+        self._moves = can_move(self._stream)
         self._first_s = _MOVE_AFTER_S if self._moves else plain_after_s
         self._width = 0
         """Columns that the line has now."""
@@ -196,7 +196,8 @@ _lines.step_aside_by(_aside)
 os.register_at_fork(after_in_child=_forget)
 
 
-def _can_move(stream: TextIO | None) -> bool:
+def can_move(stream: TextIO | None) -> bool:
+    """Say whether a line on a stream can be written over."""
     if stream is None or os.environ.get("TERM", "dumb") in {"", "dumb"}:
         return False
     try:
