@@ -92,7 +92,7 @@ class BatchProgress:
             self._opened.enter_context(stepping_aside(self._aside))
             self._live.start()
         elif sys.stderr is not None:
-            threading.Thread(target=self._tell_on, name="progress", daemon=True).start()
+            threading.Thread(target=self._tell_on, name="batch progress", daemon=True).start()
         return self
 
     def __exit__(self, *_: object) -> None:
