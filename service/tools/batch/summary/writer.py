@@ -18,10 +18,10 @@ from denseface.service.tools.batch.summary._merge import GONE, merged, only_last
 from denseface.service.tools.batch.summary._table import GROUP_ROWS, SummaryFile, write_table
 from denseface.service.tools.batch.summary.schema import KEY, to_batch
 
-__all__ = ["SUMMARY", "Known", "SummaryWriter"]
+__all__ = ["SUMMARY", "WORKSHOP", "Known", "SummaryWriter"]
 
 SUMMARY = "summary.parquet"
-_WORKSHOP = ".summary"
+WORKSHOP = ".summary"
 """Folder of what is not in the file yet; gone after a run."""
 _SHARE = 4
 """The file is written anew when what is not in it has a so many-th of its rows ..."""
@@ -69,7 +69,7 @@ class SummaryWriter:
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / SUMMARY
-        self._workshop = folder / _WORKSHOP
+        self._workshop = folder / WORKSHOP
         with named(self._workshop):
             make_folder(self._workshop)
         self._journal = Journal(self._workshop / "journal.arrows")
