@@ -41,8 +41,10 @@ class FrontendHook(BuildHookInterface[Any]):
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Build, or fail the build."""
-        del version, build_data
+        del version
         Frontend(Path(self.root)).build()
+        if self.target_name == "sdist":
+            _follow_links(Path(self.root), build_data["force_include"])
 
 
 class Frontend:
@@ -132,6 +134,14 @@ class Frontend:
             yield
         finally:
             os.close(descriptor)
+
+
+def _follow_links(root: Path, included: dict[str, str]) -> None:
+    """Have files packed where links to them would be, which would lead out of the archive."""
+    for path in root.iterdir():
+        if path.is_symlink() and path.is_file():
+            included.pop(str(path), None)
+            included[str(path.resolve())] = path.name
 
 
 def _node_folder() -> Path:

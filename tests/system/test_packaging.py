@@ -78,11 +78,33 @@ def test_the_wheel_of_the_sdist_is_that_of_the_checkout_and_needs_no_node(
     assert _contents(_build("wheel", unpacked, tmp_path / "wheel")) == _contents(wheel)
 
 
-def test_the_core_has_the_same_code(wheel, tmp_path):
-    core = _contents(_build("wheel", REPOSITORY / "distributions" / "core", tmp_path))
+@pytest.fixture(scope="module")
+def core(tmp_path_factory):
+    """Wheel and sdist of the core, by what their names end in."""
+    folder = tmp_path_factory.mktemp("core")
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-t", "sdist", "-d", folder],
+        cwd=REPOSITORY / "distributions" / "core", check=True, capture_output=True, timeout=LIMIT_S)
+    return {path.suffix: path for path in folder.iterdir()}
+
+
+def test_the_core_has_the_same_code(wheel, core):
     there, here = ({name: content for name, content in contents.items()
-                    if name.startswith("denseface/")} for contents in (core, _contents(wheel)))
+                    if name.startswith("denseface/")}
+                   for contents in (_contents(core[".whl"]), _contents(wheel)))
     assert there == here
+
+
+def test_the_wheel_of_the_cores_sdist_is_the_same_to_the_byte(core, tmp_path, monkeypatch):
+    with tarfile.open(core[".gz"]) as archive:
+        assert [member.name for member in archive if not member.isreg()] == []
+    unpacked = _unpack(core[".gz"], tmp_path / "unpacked")
+    monkeypatch.setenv("TZ", "XYZ-13:45")
+    subprocess.run(["chmod", "-R", "go=", unpacked], check=True)
+    again = _build("wheel", unpacked, tmp_path / "wheel")
+    assert again.read_bytes() == core[".whl"].read_bytes()
+    recording = unpacked / "fixtures" / "recorded_oni" / _RECORDING.name
+    assert recording.read_bytes() == _RECORDING.read_bytes()
 
 
 def test_a_front_end_that_cannot_be_built_fails_the_wheel(sdist, tmp_path):
