@@ -22,6 +22,7 @@ _LEXERS = {".py": "python", ".md": "markdown", ".ts": "typescript", ".js": "java
            "": "sh"}
 _FOLDER = "source"
 _PAGES = {"CHANGELOG.md": "changelog", "CONTRIBUTING.md": "contributing", "README.md": "index",
+          "SECURITY.md": "security",
           "decisions": "decisions", "docs/decisions": "decisions"}
 """Where pages and folders of the repository are on the site."""
 
