@@ -42,6 +42,7 @@ EXAMPLES = {
     "hub": "hub --listen tcp://0.0.0.0:5555 --metrics 9100",
     "capture": "capture --source openni2: --name entrance",
     "warm": "warm",
+    "install-units": "install-units --dry-run --workers 3",
     "bench": "bench --quick",
     "completion": "completion bash",
     "worker": "worker --address ipc:///run/denseface/hub",

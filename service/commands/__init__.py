@@ -33,6 +33,7 @@ COMMANDS = {
     "capture": "run a capture process alone",
     "worker": "run a reconstruction worker alone",
     "warm": "compile now what the first start would otherwise wait for",
+    "install-units": "have systemd start hub, sensor, workers and kiosk with this machine",
     "bench": "measure how fast this machine makes faces",
     "completion": "print what a shell needs to complete commands and flags",
     "kiosk": "run the page alone where visitors see their own face",
@@ -43,7 +44,7 @@ _SUBROOMS = (dict.fromkeys(("calibrate", "doctor", "record"), "sensor")
              | dict.fromkeys(("get", "list"), "captures")
              | dict.fromkeys(("export", "info"), "files")
              | dict.fromkeys(("compare", "evaluate"), "comparing")
-             | dict.fromkeys(("bench", "completion", "warm"), "machine"))
+             | dict.fromkeys(("bench", "completion", "install-units", "warm"), "machine"))
 """Where a command's module is, if not here."""
 
 
@@ -59,5 +60,7 @@ class Command(Protocol):
 
 def load(name: str) -> Command:
     """Import a command's module."""
-    module = f"{_SUBROOMS[name]}.{name}" if name in _SUBROOMS else name
+    module = name.replace("-", "_")
+    if name in _SUBROOMS:
+        module = f"{_SUBROOMS[name]}.{module}"
     return cast("Command", import_module(f"denseface.service.commands.{module}"))

@@ -160,8 +160,8 @@ class _Worker:
             self.supervisor.manager.step(how_far, _KERNEL_S)
 
     def _send_ready(self) -> None:
-        if self.connection.send(messages.WorkerReady(name=self.name, credit=self.credit)):
-            self.supervisor.manager.status("takes frames")
+        sent = self.connection.send(messages.WorkerReady(name=self.name, credit=self.credit))
+        self.supervisor.manager.status("takes frames" if sent else "waits for the hub")
 
     def _receive(self, packet: Packet) -> None:
         match packet.message:
