@@ -9,7 +9,7 @@ from denseface.folders import user_folder
 from denseface.service.errors import UsageError, reason_of
 from denseface.service.runtime.terminal import complain, say, suggest
 from denseface.service.tools.units import files
-from denseface.service.tools.units.program import find_program
+from denseface.service.tools.units.program import Program, find_program
 from denseface.service.tools.units.rendering import INSTANCES, TARGET, Choice, render
 
 __all__ = ["install", "show", "uninstall"]
@@ -72,7 +72,7 @@ def uninstall(choice: Choice, folder: Path | None, *, force: bool) -> int:
         Where a file was changed, is not ours, or cannot be removed.
     """
     place = folder or _own_folder(user=choice.user)
-    paths = [place / name for name in render(choice, find_program(sandboxed=False))]
+    paths = [place / name for name in render(choice, Program(""))]
     if not force:
         files.check_ours(paths)
     enabled = [name for name in (TARGET, *INSTANCES) if (place / name).exists()]
