@@ -10,14 +10,19 @@ __all__ = ["BASE", "EXTRAS", "explained", "missing"]
 BASE = "numpy", "pydantic", "pyzmq"
 """Packages that are always there."""
 EXTRAS = {
+    "cryptography": ("cryptography", "batch"),
     "cv2": ("opencv-python-headless", "worker"),
+    "dask": ("dask", "batch"),
+    "distributed": ("distributed", "batch"),
     "matplotlib": ("matplotlib", "notebook"),
     "numba": ("numba", "worker"),
     "open3d": ("open3d", "open3d"),
     "primesense": ("primesense", "capture"),
     "prometheus_client": ("prometheus-client", "hub"),
     "psutil": ("psutil", "kiosk"),
+    "pyarrow": ("pyarrow", "batch"),
     "rerun": ("rerun-sdk", "rerun"),
+    "rich": ("rich", "batch"),
     "scipy": ("scipy", "worker"),
     "segno": ("segno", "kiosk"),
     "shtab": ("shtab", "completion"),

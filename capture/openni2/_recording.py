@@ -1,5 +1,6 @@
 """Recordings: read forward only, one frame for each read, and never past the last."""
 
+import math
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -49,6 +50,8 @@ class RecordingSource(OpenNI2Source):
         self._recorded = Recorded(path)
         super().__init__(str(path), chosen or self._recorded.calibration)
         self._unread = True
+        self._stopped_s = math.inf
+        """When the streams were stopped; infinite while they are not."""
         self._registered = self._recorded.depth.registered
         self._expected = {
             kind: node.frames for kind, node in
@@ -69,6 +72,7 @@ class RecordingSource(OpenNI2Source):
         self._unread = False
         self._pairer.clear()
         given = 0
+        self._stopped_s = math.inf
         streams.start()
         left = dict(self._expected)
         while max(left.values()) > 0 and self._streams is streams:
@@ -85,6 +89,7 @@ class RecordingSource(OpenNI2Source):
             if max(left.values()) <= 0:
                 # At the end the player's thread would busy-wait.
                 streams.stop()
+                self._stopped_s = time.monotonic()
             if pair := self._paired(kind, self._expected[kind] - left[kind], *image):
                 yield self._frame(pair, given)
                 given += 1
@@ -118,7 +123,8 @@ class RecordingSource(OpenNI2Source):
             # The player's thread reads the list of streams without a lock, and crashes when one
             # is destroyed meanwhile. While all are stopped, it sleeps 10 ms a round.
             self._streams.stop()
-            time.sleep(_SETTLE_S)
+            settled_s = min(self._stopped_s, time.monotonic()) + _SETTLE_S
+            time.sleep(max(0.0, settled_s - time.monotonic()))
         super().close()
 
     def _frame(self, pair: Pair[Any, Any], number: int) -> RgbdFrame:

@@ -16,6 +16,7 @@ exit status:
 
 EXAMPLES = {
     "reconstruct": "reconstruct recording.oni --frame 3 -o face.ply --preview face.png",
+    "batch": "batch recordings/ --out faces/ --every 10",
     "view": "view recording.oni --frame 3",
     "compare": "compare before.oni after.oni -o report.html",
     "evaluate": "evaluate recording.oni --truth scan.ply -o evaluation/",

@@ -35,7 +35,7 @@ _BRIEF = {"reconstruct", "press", "export", "get", "info", "list", "status", "wo
 """Commands that end soon, or say themselves when they have started."""
 _EXTRAS = {"capture": "capture", "hub": "hub", "kiosk": "kiosk", "worker": "worker",
            "warm": "worker", "up": "all", "calibrate": "capture", "doctor": "capture",
-           "live": "capture", "record": "capture"}
+           "live": "capture", "record": "capture", "batch": "batch"}
 """Command -> the extra with all that it needs; of the others, that of the module."""
 _LONGEST = 400
 """Characters of a word that are shown: a path of a system's longest is no line."""

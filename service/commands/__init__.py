@@ -11,6 +11,7 @@ __all__ = ["COMMANDS", "Command", "load"]
 
 COMMANDS = {
     "reconstruct": "make dense faces of frames in files and folders",
+    "batch": "make faces of archives, on many cores or machines, with a summary",
     "view": "look at faces, frames and recordings in a browser, or in rerun",
     "compare": "lay two faces on each other and say what changed",
     "evaluate": "measure how near faces are to a known true surface",
@@ -42,7 +43,7 @@ COMMANDS = {
 
 _SUBROOMS = (dict.fromkeys(("calibrate", "doctor", "record"), "sensor")
              | dict.fromkeys(("get", "list"), "captures")
-             | dict.fromkeys(("export", "info"), "files")
+             | dict.fromkeys(("batch", "export", "info"), "files")
              | dict.fromkeys(("compare", "evaluate"), "comparing")
              | dict.fromkeys(("bench", "completion", "install-units", "warm"), "machine"))
 """Where a command's module is, if not here."""

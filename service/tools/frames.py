@@ -101,13 +101,19 @@ class FrameReader:
         self._next = 0
         """Number of the frame that comes next."""
 
+    def count(self) -> int | None:
+        """Give how many frames there are at most, None where that is not known; errors likewise."""
+        return self._open().frame_count
+
+    def goes_on(self) -> bool:
+        """Say whether a frame that cannot be read leaves the next ones; errors likewise."""
+        return isinstance(self._open(), _AT_ONCE)
+
     def read(self, number: int) -> RgbdFrame:
         """Read a frame by its number, from 0; errors as `read_frame`."""
-        source = self._source
-        if source is None or number < self._next:
+        if number < self._next:
             self.close()
-            source = self._source = _opened(self._path, self._choice)
-            self._frames, self._next = iter(source), 0
+        source = self._open()
         try:
             frame = self._reached(source, number)
             check_frame_size(frame.calibration, self._choice.max_pixels)
@@ -115,6 +121,13 @@ class FrameReader:
             self.close()  # what comes after an error is not known
             raise
         return frame
+
+    def _open(self) -> Source:
+        """Give the source, at its first frame where it was not open."""
+        if self._source is None:
+            self._source = _opened(self._path, self._choice)
+            self._frames, self._next = iter(self._source), 0
+        return self._source
 
     def close(self) -> None:
         """Close the file; a further `read` opens it again."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from denseface.service.tools.frames import FrameChoice
 
-__all__ = ["add_calibration", "add_pair", "frame_choice"]
+__all__ = ["add_calibration", "add_pair", "add_reading", "frame_choice"]
 
 
 def add_pair(parser: argparse.ArgumentParser) -> None:
@@ -16,6 +16,11 @@ def add_pair(parser: argparse.ArgumentParser) -> None:
                         help="instead of INPUT: a depth image, .png .tiff .exr or .npy")
     parser.add_argument("--color", type=Path, metavar="C.png",
                         help="its colour image, .png .jpg .webp or .npy")
+    add_reading(parser)
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """Add how image files are to be understood."""
     parser.add_argument("--unit", metavar="UNIT",
                         help="what 1 stands for in a depth image: mm, 100um, 0.2mm (TUM RGB-D) or "
                              "m (default: guessed where only one makes sense)")

@@ -19,11 +19,11 @@ ALL = sorted(path.relative_to(ROOT).as_posix()
              for path in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")))
 RUN = {page: {"sh", "python"} for page in PAGES} | {
     page: {"sh", "python", "diff"} for page in HOW_TOS} | {
-    page: {"console"} for page in CONSOLES} | {SESSION: {"python"}}
+    page: {"console"} for page in CONSOLES} | {SESSION: {"python"}, "docs/batch.md": {"sh"}}
 """Kinds of blocks that a test of each page runs; `json` is checked below."""
 SITE = {"{toctree}", "{include}", "{eval-rst}", "{decisions}", "math"}
 """What `script/docs` reads; a mistake there is one of its errors."""
-NOT_RUN = 27
+NOT_RUN = 31
 """Blocks that say why they are not."""
 
 

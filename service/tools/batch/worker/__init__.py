@@ -1,0 +1,1 @@
+"""What happens in a worker's process: frames are read, faces made and written, and recorded."""
