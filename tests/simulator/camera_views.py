@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from denseface.capture.calibration import CameraModel
 from tests.simulator.kinect import KinectModel
 from tests.simulator.scene import Light, Scene
-from tests.simulator.world import Hits, World, build_world
+from tests.simulator.world import Hits, World, build_world, dot
 
 __all__ = ["SUPERSAMPLING", "DepthView", "color_view", "depth_view", "ray_directions", "shade"]
 
@@ -63,8 +63,8 @@ def _depth_view(scene: Scene, sensor: KinectModel) -> DepthView:
     lit = np.zeros(len(depth), bool)
     lit[hit] = world.visible(depth[hit, None] * directions[hit],
                              np.array(sensor.projector_mm, np.float32))
-    unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    slant = np.abs((world.normals(hits) * unit).sum(axis=1))
+    unit = directions / np.sqrt(dot(directions, directions))[:, None]
+    slant = np.abs(dot(world.normals(hits), unit))
     return DepthView(
         camera=camera, depth=depth.reshape(shape), labels=world.labels(hits).reshape(shape),
         lit=lit.reshape(shape), slant=slant.reshape(shape).astype(np.float32),
@@ -94,10 +94,10 @@ def shade(
 ) -> NDArray[np.float32]:
     """Give the colour of each hit, (n, 3) float32 RGB (sRGB) 0-255: Lambert and ambient."""
     normals = world.normals(hits)
-    away = np.sign((normals * directions).sum(axis=1, keepdims=True))
+    away = np.sign(dot(normals, directions))
     toward = np.array(light.toward) / np.linalg.norm(light.toward)
     facing = np.einsum("nd,d->n", normals, toward.astype(np.float32))
-    lambert = np.maximum(-away[:, 0] * facing, 0)
+    lambert = np.maximum(-away * facing, 0)
     brightness = light.ambient + light.intensity * lambert
     linear = world.colors(hits) * brightness[:, None].astype(np.float32)
     return np.asarray(255 * np.clip(linear, 0, 1) ** _GAMMA, np.float32)
