@@ -64,6 +64,8 @@ _REFINED_SHIFT = 0.1
 """How far their centres may be from the box's own, each way, by its width."""
 _MAX_WIDTH_PX = 640
 """Wider images are shrunk: cascades were trained on faces of 20-24 pixels and gain nothing."""
+_MIN_SIDE_PX = 20
+"""No cascade's window is smaller."""
 _DARK = 80
 """Grey level: where half of what is at a region's depth is brighter, equalised contrast is not
 tried. Of 206 faces of the choosing heads the eight that only it shows have 23-40."""
@@ -192,9 +194,11 @@ class Search:
         self.candidates: list[FaceCandidate] = []
         gray = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY)
         shrink = min(1.0, _MAX_WIDTH_PX / color.shape[1])
+        # Before cells are made: those of a strip of two columns are many times its pixels.
+        if min(color.shape[:2]) * shrink < _MIN_SIDE_PX:
+            height, width = color.shape[:2]
+            raise NoFaceError(f"no face found in a strip of {width}x{height} pixels")
         if shrink < 1:
-            if color.shape[0] * shrink < 1:
-                raise NoFaceError(f"no face found in a strip {color.shape[0]} pixels high")
             gray = cv2.resize(gray, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
         self.gray = np.asarray(gray, np.uint8)
         self.to_color = color.shape[1] / gray.shape[1]
