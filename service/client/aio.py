@@ -269,7 +269,9 @@ class AsyncClient(BaseClient):
             readable = self._readable_events[descriptor] = asyncio.Event()
             loop.add_reader(descriptor, readable.set)
             try:
-                await asyncio.wait_for(readable.wait(), left)
+                # Not `wait_for`: before 3.12 it forgets a cancellation that comes with a message.
+                async with asyncio.timeout(left):
+                    await readable.wait()
             except TimeoutError:
                 continue
             finally:

@@ -335,6 +335,29 @@ def test_an_iteration_that_is_cancelled_ends_its_subscription(hub):
     run(main())
 
 
+@pytest.mark.parametrize("turns", range(5))
+def test_an_iteration_that_is_cancelled_as_something_comes_ends_too(hub, turns):
+    """However many turns of the loop before: a camera would be asked for pictures for ever."""
+    async def main():
+        async with AsyncClient(hub.address) as client:
+            async def follow():
+                async for _ in client.previews():
+                    pass
+
+            task = asyncio.create_task(follow())
+            await waited(hub, lambda: hub.subscribers(Topic.PREVIEW) == 1)
+            came, = client._readable_events.values()
+            came.set()
+            for _ in range(turns):
+                await asyncio.sleep(0)
+            task.cancel()
+            await waited(hub, lambda: hub.subscribers(Topic.PREVIEW) == 0)
+            with pytest.raises(asyncio.CancelledError):
+                await task
+
+    run(main())
+
+
 def test_a_closed_client_ends_calls_and_iterations(hub):
     async def main():
         client = AsyncClient(hub.address)
