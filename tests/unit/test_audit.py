@@ -31,6 +31,13 @@ def test_licences(audit, expression, allowed):
     assert audit.is_allowed(expression) is allowed
 
 
+def test_what_tests_alone_may_use_is_not_handed_out(audit):
+    lock = (_SCRIPT.parents[1] / "requirements" / "run.txt").read_text()
+    assert "numpy==" in lock
+    for name in audit._TESTS_ALONE:
+        assert f"\n{name}==" not in lock
+
+
 def _answering(monkeypatch, *outputs):
     left = list(outputs)
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: subprocess.CompletedProcess(
