@@ -192,10 +192,10 @@ def build_world(scene: Scene) -> World:
     return World(scene)
 
 
-def dot(one: Floats, other: Floats) -> Floats:
+def dot(one: NDArray[np.floating], other: NDArray[np.floating]) -> NDArray[np.floating]:
     """Multiply vectors, (n, 3) each, and give (n,): NumPy's own sum over so few is slow."""
     x, y, z = (one * other).T
-    product: Floats = (x + y) + z
+    product: NDArray[np.floating] = (x + y) + z
     return product
 
 
