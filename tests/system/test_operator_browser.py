@@ -8,7 +8,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.operator_states import Operated, serving_operator
 from tests.system.running import REPOSITORY
-from tests.viewer_page import software_browser
+from tests.viewer_page import PLAIN_PAGES, software_browser
 from tests.waiting import LIMIT_MS, until
 
 AXE = REPOSITORY / "service/kiosk/frontend/node_modules/axe-core/axe.min.js"
@@ -19,7 +19,7 @@ expect.set_options(timeout=LIMIT_MS)
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    with software_browser() as chromium:
+    with software_browser(PLAIN_PAGES) as chromium:
         yield chromium
 
 

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
 
 from tests.system.running import REPOSITORY
-from tests.viewer_page import software_browser
+from tests.viewer_page import PLAIN_PAGES, software_browser
 from tests.waiting import LIMIT_MS
 
 __all__ = ["Visitor", "chromium", "visiting"]
@@ -36,7 +36,8 @@ _OUTSIDE = """() => [...document.querySelectorAll("button, h1, h2, p")].filter((
 @contextmanager
 def chromium() -> Iterator[Browser]:
     """Run a browser that renders by software."""
-    with software_browser("--disable-quic", "--disable-sync", "--js-flags=--expose-gc") as browser:
+    with software_browser(PLAIN_PAGES, "--disable-quic", "--disable-sync",
+                          "--js-flags=--expose-gc") as browser:
         yield browser
 
 
