@@ -1,11 +1,16 @@
-"""Contrast of an image changed for the cascades: faces in the dark, or half in shadow."""
+"""The image that cascades search: grey and small; its contrast changed in the dark."""
 
 import cv2
 import numpy as np
 
 from denseface.recon.arrays import Bytes
+from denseface.recon.errors import NoFaceError
 from denseface.recon.face import Box
 
+_MAX_WIDTH_PX = 640
+"""Wider images are shrunk: cascades were trained on faces of 20-24 pixels and gain nothing."""
+_MIN_SIDE_PX = 20
+"""No cascade's window is smaller."""
 _LOW, _HIGH = 2.0, 98.0
 """Percentiles of the samples' brightness that become black and white."""
 _MIN_RANGE = 8.0
@@ -14,6 +19,24 @@ _TILE_PX = (80, 60)
 """Width and height of CLAHE's tiles, pixels, about."""
 _CLIP_LIMIT = 4.0
 """CLAHE's limit of contrast (Zuiderveld, 1994)."""
+
+
+def gray_to_search(color: Bytes) -> Bytes:
+    """Give the brightness of (H, W, 3) RGB, uint8, shrunk where the image is wide.
+
+    Raises
+    ------
+    NoFaceError
+        Where it is narrower, or lower, than any cascade's window.
+    """
+    height, width = color.shape[:2]
+    shrink = min(1.0, _MAX_WIDTH_PX / width)
+    if min(height, width) * shrink < _MIN_SIDE_PX:
+        raise NoFaceError(f"no face found in a strip of {width}x{height} pixels")
+    gray = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY)
+    if shrink < 1:
+        gray = cv2.resize(gray, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
+    return np.asarray(gray, np.uint8)
 
 
 def equalize_contrast(gray: Bytes, roi: Box, samples: Bytes) -> Bytes:

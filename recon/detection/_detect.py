@@ -4,12 +4,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
 from denseface.recon.arrays import Bytes
 from denseface.recon.detection._cascades import CascadePass, CenterMask, run_pass
-from denseface.recon.detection._contrast import equalize_contrast, lift_shadows
+from denseface.recon.detection._contrast import (
+    equalize_contrast,
+    gray_to_search,
+    lift_shadows,
+)
 from denseface.recon.detection._head_regions import (
     LIKELY,
     MAYBE,
@@ -62,10 +65,6 @@ _REFINED_MM = (120.0, 205.0)
 """Widths of the boxes that are sought then."""
 _REFINED_SHIFT = 0.1
 """How far their centres may be from the box's own, each way, by its width."""
-_MAX_WIDTH_PX = 640
-"""Wider images are shrunk: cascades were trained on faces of 20-24 pixels and gain nothing."""
-_MIN_SIDE_PX = 20
-"""No cascade's window is smaller."""
 _DARK = 80
 """Grey level: where half of what is at a region's depth is brighter, equalised contrast is not
 tried. Of 206 faces of the choosing heads the eight that only it shows have 23-40."""
@@ -192,16 +191,9 @@ class Search:
         self.registered = registered
         self.focal_px = focal_px
         self.candidates: list[FaceCandidate] = []
-        gray = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY)
-        shrink = min(1.0, _MAX_WIDTH_PX / color.shape[1])
         # Before cells are made: those of a strip of two columns are many times its pixels.
-        if min(color.shape[:2]) * shrink < _MIN_SIDE_PX:
-            height, width = color.shape[:2]
-            raise NoFaceError(f"no face found in a strip of {width}x{height} pixels")
-        if shrink < 1:
-            gray = cv2.resize(gray, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
-        self.gray = np.asarray(gray, np.uint8)
-        self.to_color = color.shape[1] / gray.shape[1]
+        self.gray = gray_to_search(color)
+        self.to_color = color.shape[1] / self.gray.shape[1]
         self.shape = color.shape[:2]
         self.cells = depth_cells(registered, self.shape, focal_px)
         self.regions = head_regions(self.cells)
