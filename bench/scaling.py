@@ -1,11 +1,10 @@
 """How far `denseface batch` carries: what a task costs here, and a simulated schedule of many.
 
-`python -m bench.scaling` prints the tables of docs/scaling.md and of docs/benchmarks.md.
+`script/bench scaling` prints the tables of docs/scaling.md and of docs/benchmarks.md.
 """
 
 import argparse
 import os
-import subprocess
 import sys
 import tempfile
 import time
@@ -38,7 +37,7 @@ def main() -> None:
     parser.add_argument("--frame-ms", type=float, metavar="MS",
                         help="time of a frame on a worker, instead of the one measured")
     args = parser.parse_args()
-    print(describe("python -m bench.scaling", "distributed " + _version("distributed")), "\n")
+    print(describe("script/bench scaling", "distributed " + _version("distributed")), "\n")
     frame_s = _frame()
     if args.frame_ms:
         frame_s = args.frame_ms / 1000
@@ -186,7 +185,8 @@ def _run(client: Any, times_s: Sequence[float], window: int, size: int) -> float
     done = as_completed(first, with_results=True)
     del first
     for future, answer in done:
-        assert len(answer) == size + 8
+        if len(answer) != size + 8:
+            raise RuntimeError("a task gave another answer")
         future.release()
         if (more := next(following, None)) is not None:
             done.add(client.submit(_task, *more, size, pure=False))

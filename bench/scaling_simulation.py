@@ -11,7 +11,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 from itertools import count
 
-__all__ = ["Costs", "Fleet", "Outcome", "simulate"]
+__all__ = ["Costs", "Fleet", "Outcome", "simulate", "sized"]
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def simulate(
     times_s : of each task, seconds, instead of ones that are drawn
     cores : that scheduler, client and workers share for all but the frames; 0 where each has one
     """
-    choose = random.Random(seed)
+    choose = random.Random(seed)  # noqa: S311 - a simulation
     cores_s = [0.0] * cores
     scheduler, client = _Server(cores_s), _Server(cores_s)
     own = [_Server(cores_s) for _ in range(fleet.workers)]
@@ -106,7 +106,9 @@ def simulate(
     choose.shuffle(slow)
     queues: list[deque[float]] = [deque() for _ in slow]
     """Times of the tasks that wait at each worker."""
-    busy, sent, free_s = [False] * len(slow), [0] * len(slow), [0.0] * len(slow)
+    busy, load, free_s = [False] * len(slow), [0] * len(slow), [0.0] * len(slow)
+    hungry: list[int] = []
+    """Workers that came back and have nothing to do."""
     idle = list(range(fleet.workers)) * fleet.under_way
     events: list[tuple[float, int, str, int, float]] = []
     order = count()
@@ -124,6 +126,7 @@ def simulate(
             mean, fleet.spread * fleet.frame_s * math.sqrt(fleet.frames_a_task)))
 
     def send(now_s: float, worker: int, task_s: float) -> None:
+        load[worker] += 1
         ready_s = client.serve(now_s, costs.client / 2) + costs.way
         later(ready_s, "scheduler", worker, task_s)
 
@@ -144,7 +147,6 @@ def simulate(
     for worker in idle:
         if begun < tasks:
             begun += 1
-            sent[worker] += 1
             send(0.0, worker, draw())
     while done < tasks:
         now_s, _, what, worker, task_s = heapq.heappop(events)
@@ -159,14 +161,20 @@ def simulate(
             again = [task_s, *queues[worker]]
             lost += len(again)
             queues[worker].clear()
+            load[worker] -= len(again)
+            later(free_s[worker], "back", worker, 0.0)
             for one in again:  # to whom has the least to do, as a scheduler would
                 other = min(choose.sample(range(len(slow)), min(4, len(slow))),
-                            key=lambda at: (free_s[at] > now_s, len(queues[at]) + busy[at]))
+                            key=lambda at: (free_s[at] > now_s, load[at]))
                 send(now_s, other, one)
         elif what == "ended":
             later(own[worker].serve(now_s, costs.worker), "computed", worker, task_s)
+        elif what == "back":
+            hungry.extend([worker] * fleet.under_way)
+            start(now_s, worker)
         elif what == "computed":
             busy[worker] = False
+            load[worker] -= 1
             work_s += task_s
             start(now_s, worker)
             later(scheduler.serve(now_s + costs.way, costs.scheduler / 2) + costs.way,
@@ -178,7 +186,9 @@ def simulate(
             marks.append((now_s, task_s))
             if begun < tasks:
                 begun += 1
-                send(last_s, worker, draw())
+                # Who has more than others since one died gives back what it was given.
+                spare = hungry and load[worker] >= fleet.under_way
+                send(last_s, hungry.pop() if spare else worker, draw())
     tenth = max(1, tasks // 10)
     middle = marks[tenth:-tenth] or marks
     span = middle[-1][0] - middle[0][0]

@@ -27,7 +27,7 @@ _SHARE = 4
 """The file is written anew when what is not in it has a so many-th of its rows ..."""
 _MOST_RUNS = 64
 """... or as many runs as this, which all are open then ..."""
-_SMALL_BYTES, _FRESH_S = 8 * 2**20, 30.0
+_SMALL_BYTES, _FRESH_S = 8 * 2**20, 10.0
 """... or, where it has fewer bytes than that, so many seconds after the last time."""
 _KEPT_GROUPS = 8
 """Groups of rows of which the keys are kept in memory."""
