@@ -11,7 +11,7 @@ _MOST_WORKERS = 1024
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("inputs", metavar="INPUT", nargs="+",
+    parser.add_argument("inputs", metavar="INPUT", nargs="*",
                         help="a .npz frame, a .oni recording, or a folder: all frames, recordings "
                              "and folders of image pairs in it and below it")
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="DIR",
@@ -19,6 +19,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "there is gone on with")
     parser.add_argument("--every", type=_options.count, default=1, metavar="N",
                         help="each N-th frame of a recording or folder of pairs (default: 1)")
+    parser.add_argument("--summary", action="store_true",
+                        help="make no face: write summary.html of what DIR has")
     reading.add_reading(parser)
     reading.add_calibration(parser)
     _options.add_rotation(parser)
@@ -50,8 +52,13 @@ def run(args: argparse.Namespace) -> int:
     from denseface.service.errors import UsageError
     from denseface.service.tools.batch.engines.clusters import TlsFiles
     from denseface.service.tools.batch.plan import Plan
-    from denseface.service.tools.batch.running import Batch, Where, run_batch
+    from denseface.service.tools.batch.running import Batch, Where, run_batch, write_summary
 
+    if bool(args.inputs) == args.summary:
+        raise UsageError("expected INPUT or --summary, found "
+                         f"{'both' if args.summary else 'neither'}")
+    if args.summary:
+        return write_summary(args.out)
     tls = TlsFiles(args.tls_ca, args.tls_cert, args.tls_key)
     if args.scheduler is None and any(tls):
         raise UsageError("--tls-ca, --tls-cert or --tls-key: expected with --scheduler "

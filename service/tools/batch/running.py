@@ -35,7 +35,7 @@ from denseface.service.tools.batch.worker.work import run_task
 if TYPE_CHECKING:
     from denseface.service.tools.batch.summary.writer import SummaryWriter
 
-__all__ = ["Batch", "Where", "run_batch"]
+__all__ = ["Batch", "Where", "run_batch", "write_summary"]
 
 _FAILED, _UNREADABLE = 1, 2
 """Exit statuses."""
@@ -150,6 +150,22 @@ def run_batch(
         without = tally.total() - tally["face"]
         complain(f"denseface batch: {without} of {tally.total()} gave no face; {page} says why")
     return status
+
+
+def write_summary(folder: Path) -> int:
+    """Write `summary.html` of a batch's folder, also of one that goes on; give the exit status.
+
+    Raises
+    ------
+    MissingPackageError
+        The extra `batch` is not installed.
+    UsageError, CorruptFileError, StoreError
+        The folder has no summary, or it cannot be read or written.
+    """
+    with explained("batch"):
+        from denseface.service.tools.batch.summary.page import write_html
+    say(f"{write_html(folder.absolute())}: look at it")
+    return 0
 
 
 def _sources(names: dict[str, str], folder: Path) -> Iterator[Part]:

@@ -108,7 +108,10 @@ def _place(tmp_path, monkeypatch):
     (["view", "e.npz", "--save", "x.ply"], 2, "x.ply: expected a name that ends in .rrd"),
     (["view", "e.npz", "--preset", "x"], 2, "--preset: expected 'paper', 'faithful' or 'best'"),
 
-    (["batch"], 2, "required: INPUT, -o/--out"),
+    (["batch"], 2, "required: -o/--out"),
+    (["batch", "-o", "o"], 2, "expected INPUT or --summary, found neither"),
+    (["batch", "e.npz", "-o", "o", "--summary"], 2, "expected INPUT or --summary, found both"),
+    (["batch", "-o", "d", "--summary"], 2, "d: has no summary.parquet"),
     (["batch", "e.npz"], 2, "required: -o/--out"),
     (["batch", "none.npz", "-o", "o"], 2, "none.npz: no such file or folder"),
     (["batch", "", "-o", "o"], 2, "INPUT: "),
