@@ -9,7 +9,7 @@ from denseface.service.protocol.messages import Status
 from denseface.service.protocol.status import Restarts, SensorStatus
 from denseface.service.runtime.terminal import printable
 
-__all__ = ["as_json", "as_text", "ready_status"]
+__all__ = ["as_json", "as_text", "ready_status", "why_no_sensor", "why_not_ready"]
 
 _POLL_S = 0.1
 """Time between two requests, seconds."""
@@ -36,24 +36,25 @@ def ready_status(client: Client, timeout: float) -> Status:
         looked = now
         left = deadline - now
         if left <= 0:
-            raise ClientTimeoutError(_missing(status, timeout))
+            raise ClientTimeoutError(why_not_ready(status, f" after {timeout:g} s"))
         time.sleep(min(_POLL_S, left))
         status = client.status()
     return status
 
 
-def _missing(status: Status, timeout: float) -> str:
+def why_not_ready(status: Status, after: str = "") -> str:
+    """Say what is missing for a press to become a face; `after` is said of the time until now."""
     if status.obstacle:
-        return f"presses are still refused ({status.obstacle}) after {timeout:g} s"
+        return f"presses are still refused ({status.obstacle}){after}"
     if status.state != "serving":
-        return f"no hub is ready after {timeout:g} s"
+        return f"no hub is ready{after}"
     if status.has_frames:
-        return f"no worker is ready after {timeout:g} s{status.kernels and f': {status.kernels}'}"
+        return f"no worker is ready{after}{status.kernels and f': {status.kernels}'}"
     help_ = f"; {_HELP}" if _is_sensor_wrong(status) else ""
-    return f"no sensor is ready after {timeout:g} s: {_why_no_sensor(status)}{help_}"
+    return f"no sensor is ready{after}: {why_no_sensor(status)}{help_}"
 
 
-def _why_no_sensor(status: Status) -> str:
+def why_no_sensor(status: Status) -> str:
     """Say why there is none: as the sensors say, or as their processes ended."""
     if status.sensor_states:
         return "; ".join(f"{one.name} is {one.state}{one.reason and f': {one.reason}'}"
@@ -98,7 +99,7 @@ def as_text(address: str, status: Status) -> str:
     rows = {
         "hub": f"{status.hub_version} at {address}",
         "sensors": "; ".join(map(_sensor, status.sensor_states)) or (
-            ", ".join(status.sensors) or f"none: {_why_no_sensor(status)}"
+            ", ".join(status.sensors) or f"none: {why_no_sensor(status)}"
             if status.state == "serving" else "none"),
         "workers": "; ".join(filter(None, [", ".join(status.workers), status.kernels])) or "none",
         "now": f"{status.pressed} pressed, {status.queued} queued, {status.working} working",

@@ -14,6 +14,7 @@ from denseface.service.commands._options.values import (
     count,
     file_mode,
     millimetres,
+    part,
     percent,
     print_height,
     seconds,
@@ -29,7 +30,7 @@ from denseface.service.export.printing.choice import SOLIDS, Printing
 __all__ = [
     "add_client", "add_export", "add_hub", "add_keys", "add_log", "add_mode", "add_outputs",
     "add_printing", "add_recon", "add_rotation", "add_source", "burst", "client", "count",
-    "export_options", "file_mode", "millimetres", "operator", "percent", "recon_settings",
+    "export_options", "file_mode", "millimetres", "operator", "part", "percent", "recon_settings",
     "repeated", "seconds", "sensor_name", "service_settings", "timestamp", "warn", "whole",
 ]
 

@@ -52,7 +52,10 @@ def add_kiosk(parser: argparse.ArgumentParser) -> None:
 
 
 def kiosk_settings(args: argparse.Namespace) -> "KioskSettings":
-    """Read the flags and the environment; raises SettingsError, which names what is wrong."""
+    """Read the flags, where there are any, and the environment.
+
+    Raises SettingsError, which names what is wrong.
+    """
     from denseface.service.kiosk.settings import KioskSettings
 
     return KioskSettings.of(os.environ, **{
@@ -66,5 +69,5 @@ def repeated_kiosk(args: argparse.Namespace) -> list[str]:
 
 
 def _given(args: argparse.Namespace, name: str) -> str | None:
-    value: str | None = getattr(args, f"kiosk_{name.replace('-', '_')}")
+    value: str | None = getattr(args, f"kiosk_{name.replace('-', '_')}", None)
     return value

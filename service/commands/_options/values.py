@@ -8,8 +8,8 @@ from datetime import datetime
 
 from denseface.validation import PEER_NAME, TEXT_OF_PATTERN
 
-__all__ = ["burst", "count", "file_mode", "millimetres", "percent", "print_height", "seconds",
-           "sensor_name", "timestamp", "wall", "wanted", "whole"]
+__all__ = ["burst", "count", "file_mode", "millimetres", "part", "percent", "print_height",
+           "seconds", "sensor_name", "timestamp", "wall", "wanted", "whole"]
 
 _MOST = 10**12
 """Largest whole number that anything takes."""
@@ -98,6 +98,18 @@ def sensor_name(text: str) -> str:
     """Read the name of a sensor, as a hub takes it."""
     if not re.fullmatch(PEER_NAME, text):
         raise wanted(TEXT_OF_PATTERN[PEER_NAME], text)
+    return text
+
+
+_PARTS = ("service", "hub", "sensor", "worker", "kiosk")
+_NAMED = "sensor:"
+
+
+def part(text: str) -> str:
+    """Read a part of the service, of one sensor as `sensor:NAME`."""
+    if text not in _PARTS and not (text.startswith(_NAMED)
+                                   and re.fullmatch(PEER_NAME, text.removeprefix(_NAMED))):
+        raise wanted(f"one of {', '.join(_PARTS)}, or sensor:NAME", text)
     return text
 
 

@@ -3,10 +3,7 @@
 import errno
 import http.client
 import json
-import re
 import socket
-import subprocess
-import sys
 import threading
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -183,21 +180,3 @@ def test_places(given, place):
 def test_other_places_are_refused(given):
     with pytest.raises(ValueError, match="this machine alone"):
         parse_loopback_address(given)
-
-
-def health_check(address):
-    """Run what the image's Dockerfile says, as Docker would; give its status."""
-    line, = re.findall(r"^HEALTHCHECK .* CMD (.*)$", (REPOSITORY / "Dockerfile").read_text(), re.M)
-    program, *arguments = json.loads(line)
-    assert program == "python3"
-    return subprocess.run([sys.executable, *arguments], check=False, capture_output=True,
-                          env={"DENSEFACE_METRICS": address}, timeout=LIMIT_S).returncode
-
-
-def test_the_image_s_health_check_says_what_healthz_does(server, asked):
-    address = server.url.removeprefix("http://")
-    assert health_check(address) == 0
-    asked.success = False
-    assert health_check(address) == 1
-    server.server_close()
-    assert health_check(address) == 1

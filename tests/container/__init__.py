@@ -1,0 +1,1 @@
+"""A container's image is tried: `script/image`."""
