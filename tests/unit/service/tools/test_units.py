@@ -61,7 +61,7 @@ def drop_ins() -> list[tuple[str, str]]:
             if (path := re.match(r"# /etc/systemd/system/(\S+\.d/\S+\.conf)\n", one))]
 
 
-@pytest.mark.parametrize("homes", [(), ("/home/a", "/root/b")])
+@pytest.mark.parametrize("homes", [(), ("/homes/a", "/homes/b")])
 def test_systemd_reads_every_unit_and_finds_its_sandbox_tight(systemd, tmp_path, homes):
     services = written(tmp_path, render(Choice(3), Program("/bin/true", homes)))
     assert {path.name for path in services} == ALL
