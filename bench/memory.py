@@ -1,4 +1,4 @@
-"""Memory that one call needs beyond what the process holds."""
+"""Memory of a process, and what one call needs beyond what the process holds."""
 
 import ctypes
 import tracemalloc
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Extra", "extra_memory", "resident_mb"]
+__all__ = ["Extra", "extra_memory", "proportional_mb", "resident_mb"]
 
 _STATUS = Path("/proc/self/status")
 _CLEAR_REFS = Path("/proc/self/clear_refs")
@@ -48,8 +48,19 @@ def resident_mb() -> float:
     return _kilobytes("VmRSS") / _MB
 
 
-def _kilobytes(field: str) -> int:
-    for line in _STATUS.read_text().splitlines():
+def proportional_mb(pid: int) -> tuple[float, float]:
+    """Give what a process has with its share of what others have too, and what it alone has, MiB.
+
+    PSS and USS: the kernel counts both (proc(5), smaps_rollup).
+    """
+    rollup = Path(f"/proc/{pid}/smaps_rollup")
+    pss, *private = (_kilobytes(field, rollup) / _MB
+                     for field in ("Pss", "Private_Clean", "Private_Dirty"))
+    return pss, sum(private)
+
+
+def _kilobytes(field: str, file: Path = _STATUS) -> int:
+    for line in file.read_text().splitlines():
         if line.startswith(f"{field}:"):
             return int(line.split()[1])
-    raise RuntimeError(f"{_STATUS} has no {field}")
+    raise RuntimeError(f"{file} has no {field}")

@@ -5,7 +5,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,13 +82,15 @@ def kind_of(process: psutil.Process) -> str:
 
 @contextmanager
 def running(
-    source: Path | str, workers: int, env: Mapping[str, str] | None = None
+    source: Path | str, workers: int, env: Mapping[str, str] | None = None,
+    flags: Sequence[str] = ("--no-kiosk",),
 ) -> Iterator[Running]:
     """Run the service with the settings of every day, in folders of its own.
 
     Parameters
     ----------
     env : its environment; by default this process's
+    flags : more of `denseface up`
     """
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="df-")))
@@ -96,7 +98,7 @@ def running(
         with (folder / "log").open("wb") as log:
             process = subprocess.Popen(
                 [sys.executable, "-m", "denseface", "up", "--source", str(source), "--address",
-                 address, "--data", str(folder / "data"), "--workers", str(workers), "--no-kiosk"],
+                 address, "--data", str(folder / "data"), "--workers", str(workers), *flags],
                 stdin=subprocess.DEVNULL, stderr=log,
                 # Else nobody may measure its memory.
                 env={**(os.environ if env is None else env), "DENSEFACE_CORE_DUMPS": "1"})
