@@ -25,7 +25,7 @@ from denseface.recon.errors import (
     ReconstructionError,
     TooLittleDepthError,
 )
-from denseface.recon.face import Face, FaceCandidate, PointCloud, Report
+from denseface.recon.face import Face, FaceCandidate, PointCloud, Report, Seeds
 from denseface.recon.finding import Found, find_another, find_face
 from denseface.recon.fitting import plan_fit, surface_of
 from denseface.recon.judgement import (
@@ -37,11 +37,11 @@ from denseface.recon.judgement import (
     color_likeness,
     judge_shape,
 )
-from denseface.recon.noise import measure_noise
+from denseface.recon.noise import Noise, measure_noise
 from denseface.recon.numerics.threads import one_blas_thread
 from denseface.recon.openings import Openings, openings
 from denseface.recon.propagation import densify
-from denseface.recon.registration import register, sample_colors
+from denseface.recon.registration import own_readings, pooled, register, sample_colors
 from denseface.recon.segmentation import box_window, segment_face
 from denseface.recon.settings import Settings
 from denseface.recon.surface import MIN_SEEDS, mean_spacing
@@ -167,20 +167,23 @@ def _shape(settings: Settings, clock: "_Stopwatch", found: Found) -> Face:
     if not found.colored:
         settings = settings.model_copy(update={"shading": False})
     focal_px = frame.calibration.color.fx
-    registered = register(frame, *box_window(found.overview, box))
-    read = np.flatnonzero(registered.valid)
-    some = read[::max(1, len(read) // _READINGS)]
-    coarse = check_steps(registered.points.reshape(-1, 3)[some, 2], found.detection.depth_mm)
+    side = _pixels_each_way(settings, found)
+    window = box_window(found.overview, box, side)
+    coarse = check_steps(_some_readings(frame, window), found.detection.depth_mm)
+    seen = frame
+    if side > 1:
+        seen, window = pooled(frame, window, side)
+    registered = register(seen, *window)
     clock.lap("registration")
     seeds = segment_face(registered, box, focal_px)
     _check_seeds(seeds.points)
-    check_face(seeds.points, 1 / (frame.depth_camera.fx * frame.depth_camera.fy), box)
+    check_face(seeds.points, 1 / (seen.depth_camera.fx * seen.depth_camera.fy), box)
     clock.lap("segmentation")
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     clock.lap("neighbors")
-    sampler = partial(sample_colors, frame, registered)
-    noise = measure_noise(seeds.points, seeds.pixels, spacing)
-    plan = plan_fit(settings, noise, spacing)
+    sampler = partial(sample_colors, seen, registered)
+    noise = _noise(frame, seeds, spacing, side)
+    plan = plan_fit(settings, noise.averaged(side), spacing)
     surface = surface_of(seeds.points, spacing, settings, plan, sampler)
     clock.lap("rbf")
     judgement = judge_shape(surface)
@@ -215,6 +218,32 @@ def _shape(settings: Settings, clock: "_Stopwatch", found: Found) -> Face:
         warnings=_warnings(found, len(initial), doubts, left_open, score),
     )
     return Face(initial, dense, report)
+
+
+def _pixels_each_way(settings: Settings, found: Found) -> int:
+    """Say how many of the depth's pixels each way are averaged on the face."""
+    if settings.pixel_mm is None:
+        return 1
+    focal_px = max(found.frame.depth_camera.fx, found.frame.depth_camera.fy)
+    return max(1, int(settings.pixel_mm * focal_px / found.detection.depth_mm))
+
+
+def _noise(frame: RgbdFrame, seeds: Seeds, spacing: float, side: int) -> Noise:
+    """Measure the noise of the sensor's own pixels, of which seeds are so many each way."""
+    if side == 1:
+        return measure_noise(seeds.points, seeds.pixels, spacing)
+    points, pixels = own_readings(
+        frame, seeds.pixels, np.ascontiguousarray(seeds.points[:, 2]), side)
+    return measure_noise(points, pixels, spacing / side)
+
+
+def _some_readings(frame: RgbdFrame, window: tuple[slice, slice]) -> Floats:
+    """Give some of the depths that were read in a window, (n,) float32, mm."""
+    meaning = frame.depth_meaning
+    counts = frame.depth[window].ravel()
+    read = np.flatnonzero((counts > 0) & (counts <= meaning.max_count))
+    some = counts[read[::max(1, len(read) // _READINGS)]]
+    return some * np.float32(meaning.unit_um / 1000) + np.float32(meaning.offset_mm)
 
 
 def _of_origin(origin: FrameOrigin) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from denseface.recon.numerics.malloc import keep_freed_memory
 from denseface.recon.openings import openings
 from denseface.recon.prior import Heights, fit_face, mean_face
 from denseface.recon.propagation import densify
-from denseface.recon.registration import register, sample_colors
+from denseface.recon.registration import own_readings, pooled, register, sample_colors
 from denseface.recon.segmentation import segment_face
 from denseface.recon.settings import Settings
 from denseface.recon.surface import mean_spacing
@@ -48,6 +48,7 @@ def warm() -> None:
 def _run_every_stage() -> None:
     settings = Settings()
     frame = _ball()
+    pooled(frame, (slice(0, _HEIGHT), slice(0, _WIDTH)), 2)
     registered = register(frame)
     with suppress(NoFaceError):  # not even OpenCV sees one
         detect_face(frame.rgb, registered, _FOCAL_PX, score=score_quickly)
@@ -55,6 +56,7 @@ def _run_every_stage() -> None:
         detect_by_depth(frame, registered, score=score_quickly)
     judge_box(_BOX, registered, _FOCAL_PX)
     seeds = segment_face(registered, _BOX, _FOCAL_PX)
+    own_readings(frame, seeds.pixels, np.ascontiguousarray(seeds.points[:, 2]), 1)
     spacing = mean_spacing(seeds.points, seeds.pixels, settings.neighbors)
     sampler = partial(sample_colors, frame, registered)
     plan = plan_fit(settings, measure_noise(seeds.points, seeds.pixels, spacing), spacing)

@@ -66,6 +66,17 @@ class Noise:
         before = max(self.total_mm**2 - q * q / 12, 0.0)
         return q / (math.sqrt(2) * math.pi) * math.exp(-2 * math.pi**2 * before / (q * q))
 
+    def averaged(self, side: int) -> "Noise":
+        """Give what is left of it in the means of squares of `side` pixels each way.
+
+        A mean over k pixels is nearly a Gaussian of variance (k^2 - 1) / 12 along each axis. What
+        is smooth keeps its density in long waves, which its variance times its length squared is.
+        """
+        blur = (side * side - 1) / 12
+        length = math.sqrt(self.length_px**2 + blur)
+        return Noise(self.white_mm / side, self.smooth_mm * self.length_px / length, length / side,
+                     self.quantum_mm)
+
     @property
     def correlation_px(self) -> float:
         """The length, as far as noise is alike over it: 0 of white noise, pixels."""

@@ -124,26 +124,28 @@ def segment_face(registered: Registration, box: Box, focal_px: float) -> Seeds:
                  seed_colors(registered, face, solid(face)), pixels)
 
 
-def box_window(registered: Registration, box: Box) -> tuple[slice, slice]:
+def box_window(registered: Registration, box: Box, side: int = 1) -> tuple[slice, slice]:
     """Give the rows and columns of the depth image that hold all a face's box can show.
 
     Parameters
     ----------
     registered : every k-th pixel of the whole depth image
     box : x, y, width, height of the face; pixels of the colour image
+    side : pixels of the depth that will be one, each way
 
     Raises
     ------
     FaceWithoutDepthError
         Where nothing was measured in the box.
     """
+    margin = _WINDOW_MARGIN_PX * side
     crop = _measured_crop(registered, box)
     window = []
     for axis, part in ((1, registered.rows), (0, registered.columns)):
         step = part.step or 1
         inside = step * np.flatnonzero(crop.any(axis=axis))
-        window.append(slice(max(int(inside[0]) - step - _WINDOW_MARGIN_PX, 0),
-                            int(inside[-1]) + step + _WINDOW_MARGIN_PX + 1))
+        window.append(slice(max(int(inside[0]) - step - margin, 0),
+                            int(inside[-1]) + step + margin + 1))
     return window[0], window[1]
 
 

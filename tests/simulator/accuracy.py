@@ -1,5 +1,6 @@
 """How near a reconstructed face is to the true one."""
 
+import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -91,7 +92,11 @@ def _lost(face: Face, truth: Truth, frame: RgbdFrame) -> float:
         of_face = (truth.labels_at(points) == Label.FACE) & (
             np.abs(truth.depth_error(points)) < _READING_MM)
     kept = np.zeros(readings.shape, bool)
-    row_column: NDArray[np.int64] = np.rint(
-        frame.depth_camera.project(face.initial.points)[:, ::-1]).astype(np.int64)
-    kept[row_column[:, 0], row_column[:, 1]] = True
+    row_column = frame.depth_camera.project(face.initial.points)[:, ::-1]
+    # A point may be the mean of a square of readings: `Settings.pixel_mm`.
+    side = max(1, round(face.report.mean_spacing_mm * frame.depth_camera.fx
+                        / float(np.median(face.initial.points[:, 2]))))
+    for place in itertools.product(range(side), repeat=2):
+        row, column = np.rint(row_column + np.array(place) - (side - 1) / 2).astype(np.int64).T
+        kept[row, column] = True
     return float((~kept[readings][of_face]).mean())

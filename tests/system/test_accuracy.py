@@ -94,8 +94,9 @@ def test_hardly_a_point_is_far_off(taken):
 
 
 def test_nothing_of_the_face_is_cut_off_and_nothing_else_kept(taken):
-    for found in taken.accuracy.values():
-        assert found.lost <= 0.02
+    for preset, found in taken.accuracy.items():
+        # Of a larger pixel, most must be read.
+        assert found.lost <= (0.04 if preset is Preset.LIGHT else 0.02)
         assert found.elsewhere == 0
 
 
@@ -112,8 +113,10 @@ def test_about_ten_points_for_each_seed(taken):
 
 
 def test_each_preset_is_better_than_the_one_before(taken):
-    paper, faithful, best = (taken.accuracy[preset].mean_mm for preset in Preset)
+    paper, faithful, light, best = (taken.accuracy[preset].mean_mm for preset in Preset)
     assert best < faithful < paper < PAPER_MEAN_MM
+    # Larger pixels carry less noise and less detail.
+    assert light < min(1.12 * best, faithful)
 
 
 @pytest.mark.parametrize("taken", ["two_people"], indirect=True)

@@ -172,13 +172,14 @@ def add_mode(parser: argparse.ArgumentParser) -> None:
 
 
 SETTINGS = ("r0_factor", "smoothing", "detail_factor", "symmetry", "shading", "prior", "neighbors",
-            "ratio")
+            "pixel_mm", "ratio")
 """Fields of `Settings` beside the preset: the help is to be quick, and imports none of them."""
 
 
 def add_recon(parser: argparse.ArgumentParser) -> None:
     """Add `--preset` and `--set`: how faces are reconstructed."""
-    parser.add_argument("--preset", metavar="NAME", help="paper, faithful or best (default: best)")
+    parser.add_argument("--preset", metavar="NAME",
+                        help="paper, faithful, light or best (default: best)")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE",
                         help="change one setting of the reconstruction, such as smoothing=8; may "
                              f"be repeated: {', '.join(SETTINGS)} (docs/settings.md)")

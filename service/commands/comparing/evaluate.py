@@ -5,7 +5,7 @@ from pathlib import Path
 
 from denseface.service.commands import _options
 
-_PRESETS = ("paper", "faithful", "best")
+_PRESETS = ("paper", "faithful", "light", "best")
 _UNITS, _ALIGNMENTS = ("auto", "mm", "cm", "m"), ("auto", "always", "none")
 
 

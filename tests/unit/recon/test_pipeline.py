@@ -115,6 +115,28 @@ def test_the_papers_presets(preset, shot, face):
     assert one.report.r0_mm == pytest.approx(6 * one.report.mean_spacing_mm)
 
 
+def test_light_has_a_fourth_of_the_points_and_is_near_the_truth(shot, face):
+    one = reconstruct(shot.frame, Settings.of("light"))
+    check_sound(one)
+    found = measure(one, shot.truth, shot.frame)
+    check_near(found)
+    assert found.mean_mm < 0.75
+    assert found.covered > 0.92
+    assert len(one.initial) == pytest.approx(len(face.initial) / 4, rel=0.05)
+    assert one.report.mean_spacing_mm == pytest.approx(2 * face.report.mean_spacing_mm, rel=0.05)
+    # Two of these pixels fit into 3 mm each way, into 1.2 mm not one.
+    assert len(reconstruct(shot.frame, Settings.of("light", pixel_mm=1.2)).initial) == len(
+        reconstruct(shot.frame, Settings.of("light", pixel_mm=None)).initial)
+
+
+def test_coarse_depth_is_refused_however_large_pixels_are(shot):
+    """The mean of a square has finer steps than what was read."""
+    coarse = replace(shot.frame, depth=(shot.frame.depth // 16 * 16).astype(np.uint16))
+    for preset in ("best", "light"):
+        with pytest.raises(ReconstructionError, match="steps of 16 mm"):
+            reconstruct(coarse, Settings.of(preset))
+
+
 def test_the_clouds_show_the_same_face(face):
     assert apart(face.initial.points, face.dense.points) < 1.6
     # Both are coloured as skin, brows, lips are: alike where they are near each other.

@@ -31,6 +31,14 @@ def test_the_papers_presets_have_its_r0_and_its_trees(preset):
     assert settings.ratio == 10
 
 
+def test_light_is_best_with_larger_pixels():
+    light = Settings.of("light")
+    assert light.pixel_mm == 3
+    assert Settings().pixel_mm is None
+    assert light == Settings.of("light", **Settings().model_dump(exclude={
+        "preset", "pixel_mm", "detail_factor", "prior"}))
+
+
 def test_presets_differ_in_smoothing():
     assert Settings.of("paper").smoothing < Settings.of("faithful").smoothing
 
@@ -73,7 +81,7 @@ def test_settings_do_not_change():
 
 
 @pytest.mark.parametrize(("given", "name", "message"), [
-    ({"preset": "fastest"}, "preset", "'paper', 'faithful' or 'best'"),
+    ({"preset": "fastest"}, "preset", "'paper', 'faithful', 'light' or 'best'"),
     ({"r0": 6}, "r0", "no such field, expected one of preset, r0_factor, "),
     ({"r0_factor": 1.9}, "r0_factor", "at least 2"),
     ({"r0_factor": 41}, "r0_factor", "at most 40"),
@@ -84,6 +92,8 @@ def test_settings_do_not_change():
     ({"detail_factor": 0.4}, "detail_factor", "0.5"),
     ({"detail_factor": 11}, "detail_factor", "10"),
     ({"neighbors": "guessed"}, "neighbors", "'randomized', 'exact' or 'lattice'"),
+    ({"pixel_mm": 0.4}, "pixel_mm", "0.5"),
+    ({"pixel_mm": 7}, "pixel_mm", "6"),
     ({"ratio": 0}, "ratio", "1"),
     ({"ratio": 1000}, "ratio", "100"),
     ({"ratio": "ten"}, "ratio", "a number"),
@@ -103,10 +113,10 @@ def test_a_list_is_no_settings():
 
 
 @pytest.mark.parametrize(("given", "line"), [
-    ({"preset": "fast"}, "preset: expected 'paper', 'faithful' or 'best', found 'fast'"),
-    ({"preset": None}, "preset: expected 'paper', 'faithful' or 'best', found None"),
+    ({"preset": "fast"}, "preset: expected 'paper', 'faithful', 'light' or 'best', found 'fast'"),
+    ({"preset": None}, "preset: expected 'paper', 'faithful', 'light' or 'best', found None"),
     ({"smooting": 3}, "smooting: no such field, expected one of preset, r0_factor, smoothing, "
-                      "detail_factor, symmetry, shading, prior, neighbors, ratio"),
+                      "detail_factor, symmetry, shading, prior, neighbors, pixel_mm, ratio"),
     ({"ratio": 1e9}, "ratio: expected at most 100, found 1000000000.0"),
     ({"preset": "paper", "neighbors": [1]},
      "neighbors: expected 'randomized', 'exact' or 'lattice', found [1]"),

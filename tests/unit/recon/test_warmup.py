@@ -8,7 +8,7 @@ import sys
 import numba
 
 import denseface.recon
-from denseface.recon import reconstruct, warm
+from denseface.recon import Settings, reconstruct, warm
 
 MODULES = [importlib.import_module(found.name)
            for found in pkgutil.walk_packages(denseface.recon.__path__, "denseface.recon.")]
@@ -26,7 +26,8 @@ def test_once_warm_a_frame_compiles_nothing(shot):
     warm()
     before = compiled()
     assert len(before) >= 8
-    reconstruct(shot.frame)
+    for preset in ("best", "light"):
+        reconstruct(shot.frame, Settings.of(preset))
     assert compiled() == before
 
 

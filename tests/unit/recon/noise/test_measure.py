@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from denseface.recon.noise import measure_noise
+from denseface.recon.noise import Noise, measure_noise
 
 SPACING = 1.3
 ROWS, COLUMNS = 150, 110
@@ -93,3 +93,24 @@ def test_any_few_seeds_give_a_finite_answer(count, seed, spread):
               found.level_error_mm, found.correlation_px]
     assert np.isfinite(values).all()
     assert min(values) >= 0
+
+
+@pytest.mark.parametrize(("length", "side"), [(0, 2), (0, 3), (1.5, 2), (2.5, 3)])
+def test_what_means_of_squares_leave_of_it(length, side):
+    """Of a large field, whose means are taken: variance, and the density of long waves."""
+    rng = np.random.default_rng(5)
+    one = rng.standard_normal((600, 600))
+    if length:
+        one = cv2.GaussianBlur(one, (0, 0), length)
+    one /= one.std()
+    known = Noise(0.0, 1.0, length, 0.1) if length else Noise(1.0, 0.0, 2.0, 0.1)
+    left = known.averaged(side)
+    means = one.reshape(600 // side, side, 600 // side, side).mean(axis=(1, 3))
+    assert left.total_mm == pytest.approx(means.std(), rel=0.06)
+    assert left.quantum_mm == known.quantum_mm
+    if length:
+        long = cv2.GaussianBlur(means, (0, 0), 6).std()
+        again = rng.standard_normal(means.shape)
+        same = cv2.GaussianBlur(again, (0, 0), left.length_px)
+        same *= left.smooth_mm / same.std()
+        assert cv2.GaussianBlur(same, (0, 0), 6).std() == pytest.approx(long, rel=0.15)
