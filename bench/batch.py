@@ -166,7 +166,7 @@ def _nothing(plain: dict[str, object]) -> dict[str, object]:
                 thumbnail=b"\xff\xd8\xff" + bytes(2000)).as_dict() for part in task.parts]
     time.sleep(0.01)
     return {"rows": rows, "kept": [], "left": [], "again": [], "stop": "", "passing": False,
-            "looked": len(rows), "seconds": 0.35}
+            "full": False, "looked": len(rows), "seconds": 0.35}
 
 
 def _memory(args: argparse.Namespace, top: Path) -> None:

@@ -20,7 +20,8 @@ __all__ = [
     "FrameTooLargeError", "HubRunningError", "KeyFileError", "KeyRefusedError",
     "LocalProtocolError", "PressRefusedError", "ProtocolError", "RemoteProtocolError",
     "RequestFailedError", "ServiceError", "SettingsError", "StoreError", "UnknownCaptureError",
-    "UsageError", "first_error", "reason_of",
+    "UsageError", "first_error", "in_one_line", "is_full",
+    "reason_of",
 ]
 
 
@@ -187,6 +188,16 @@ def first_error(error: "ValidationError", *, found: bool = False) -> tuple[str, 
     """
     first = error.errors(include_url=False)[0]
     return ".".join(map(str, first["loc"])), complaint(first, found=found)
+
+
+def is_full(number: int | None) -> bool:
+    """Say whether the system's number of an error is of a disk without room, or over its quota."""
+    return number in (errno.ENOSPC, errno.EDQUOT)
+
+
+def in_one_line(error: object) -> str:
+    """Say what an error says, line breaks as spaces; its class where it says nothing."""
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 def reason_of(error: BaseException) -> str:

@@ -20,7 +20,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from denseface.files import open_regular, read_bounded
-from denseface.service.errors import CorruptFileError, DiskFullError, StoreError, reason_of
+from denseface.service.errors import (
+    CorruptFileError,
+    DiskFullError,
+    StoreError,
+    is_full,
+    reason_of,
+)
 from denseface.service.runtime.files import write_synced
 
 _MAGIC = b"denseface spool 3\n"
@@ -158,7 +164,7 @@ def wrap_os_errors(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         reason = f"{path}: {reason_of(error)}"
-        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        if is_full(error.errno):
             raise DiskFullError(f"no room on the disk ({reason})") from error
         if error.errno == errno.EIO:
             raise StoreError(f"the disk fails ({reason})") from error

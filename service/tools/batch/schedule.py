@@ -112,8 +112,7 @@ class Schedule:
     def _stop(self, unit: Unit, answer: dict[str, Any]) -> None:
         """End where nothing can be written, unless that may pass."""
         if not answer["passing"] or unit.tries >= ATTEMPTS:
-            full = "No space left" in answer["stop"] or "Disk quota" in answer["stop"]
-            raise (DiskFullError if full else StoreError)(answer["stop"])
+            raise (DiskFullError if answer["full"] else StoreError)(answer["stop"])
         self._urgent.append(replace(unit, tries=unit.tries + 1))
 
     def _fill(self) -> None:

@@ -1,17 +1,20 @@
 """What can go wrong with a file of the summary, in one line that names it."""
 
-import errno
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pyarrow as pa
 
-from denseface.service.errors import CorruptFileError, DiskFullError, StoreError, reason_of
+from denseface.service.errors import (
+    CorruptFileError,
+    DiskFullError,
+    StoreError,
+    is_full,
+    reason_of,
+)
 
-__all__ = ["NO_ROOM", "corrupt", "named"]
-
-NO_ROOM = errno.ENOSPC, errno.EDQUOT
+__all__ = ["corrupt", "named"]
 
 
 @contextmanager
@@ -26,7 +29,7 @@ def named(path: Path) -> Iterator[None]:
         number = getattr(error, "errno", None)
         if number is None:
             raise corrupt(path, str(error)) from error
-        kind = DiskFullError if number in NO_ROOM else StoreError
+        kind = DiskFullError if is_full(number) else StoreError
         raise kind(f"{path}: {reason_of(error)}") from error
 
 

@@ -9,7 +9,13 @@ from typing import Any, NamedTuple
 from denseface.capture import RgbdFrame
 from denseface.capture.errors import CaptureError
 from denseface.recon import ReconstructionError, reconstruct
-from denseface.service.errors import FrameTooLargeError, StoreError, UsageError, reason_of
+from denseface.service.errors import (
+    FrameTooLargeError,
+    StoreError,
+    UsageError,
+    is_full,
+    reason_of,
+)
 from denseface.service.tools.batch.parts import Part
 from denseface.service.tools.batch.plan import Plan
 from denseface.service.tools.batch.row import Row, State
@@ -37,11 +43,12 @@ class StoppedError(Exception):
     Attributes
     ----------
     passing : another try may end otherwise
+    full : the disk has no room
     """
 
-    def __init__(self, line: str, *, passing: bool) -> None:
+    def __init__(self, line: str, *, passing: bool, full: bool) -> None:
         super().__init__(line)
-        self.passing = passing
+        self.passing, self.full = passing, full
 
 
 class Made(NamedTuple):
@@ -145,7 +152,7 @@ class Maker:
                 raise
             line = str(error) if isinstance(error, StoreError) else (
                 f"{error.filename or self._folder}: {reason_of(error)}")
-            raise StoppedError(line, passing=number in _PASSING) from error
+            raise StoppedError(line, passing=number in _PASSING, full=is_full(number)) from error
         return record
 
     def _told(self, begun_s: float) -> dict[str, Any]:

@@ -51,8 +51,8 @@ def run_task(plain: dict[str, Any]) -> dict[str, Any]:
         did. `left`: parts that were not begun, or
         not to their end, as lists. `again`: likewise, parts whose frames another try may read.
         `looked`: at how many frames; `seconds`: that it all
-        took. `stop`: why nothing can be written, and `passing` whether that may pass; empty where
-        it can.
+        took. `stop`: why nothing can be written, `passing` whether that may pass, and `full`
+        whether the disk has no room; empty where it can.
 
     Raises
     ------
@@ -86,7 +86,8 @@ class _Run:
         """Of the frames so far."""
         self._looked = 0
         self._answer: dict[str, Any] = {
-            "rows": [], "kept": [], "left": [], "again": [], "stop": "", "passing": False}
+            "rows": [], "kept": [], "left": [], "again": [], "stop": "", "passing": False,
+            "full": False}
 
     def run(self) -> dict[str, Any]:
         try:
@@ -96,7 +97,7 @@ class _Run:
                     self._answer["left"] = [list(one) for one in (rest, *self._task.parts[at + 1:])]
                     break
         except StoppedError as stopped:
-            self._answer |= {"stop": str(stopped), "passing": stopped.passing}
+            self._answer |= {"stop": str(stopped), "passing": stopped.passing, "full": stopped.full}
         return self._answer | {"looked": self._looked, "seconds": self._passed_s()}
 
     def _part(self, part: Part) -> Part | None:

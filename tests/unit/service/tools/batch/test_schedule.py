@@ -39,7 +39,7 @@ class FakeEngine:
 
     def _do(self, task):
         answer = {"rows": [], "kept": [], "left": [], "again": [], "stop": "", "passing": False,
-                  "looked": 0, "seconds": 0.0}
+                  "full": False, "looked": 0, "seconds": 0.0}
         if self.refusals:
             return answer | self.refusals.pop(0)
         for at, part in enumerate(task.parts):
@@ -190,7 +190,7 @@ def test_a_source_that_kills_whoever_opens_it_ends(tmp_path):
 
 
 def test_a_full_disk_ends_it_and_one_that_may_recover_is_tried_again(tmp_path):
-    full = {"stop": "/out/x.ply: No space left on device"}
+    full = {"stop": "/out/x.ply: No space left on device", "full": True}
     engine = FakeEngine(tmp_path)
     engine.refusals = [full]
     with pytest.raises(DiskFullError, match=r"^/out/x.ply: No space left on device$"):

@@ -209,6 +209,7 @@ def test_where_nothing_can_be_written_the_task_says_so(
     part = Part(str(frame), "f", many=False)
     answer = do(tmp_path, part, part)
     assert (answer["rows"], answer["passing"]) == ([], passing)
+    assert answer["full"] == (number == errno.ENOSPC)
     assert answer["stop"] == f"{tmp_path / 'faces/f.ply'}: {os.strerror(number)}"
     assert list((tmp_path / "faces").iterdir()) == []
 
