@@ -23,7 +23,7 @@ from denseface.service.daemons._reader_supply import JudgedFrame, ReaderSupply
 from denseface.service.daemons._supply import Hinted, NotTaken, Picture, Supply, SupplyState, Taken
 from denseface.service.daemons.preview_picture import preview_jpeg
 from denseface.service.daemons.sensor import SensorReader
-from denseface.service.errors import FrameTooLargeError
+from denseface.service.errors import FrameTooLargeError, in_one_line
 from denseface.service.log.output import exit_now
 from denseface.service.protocol import messages
 from denseface.service.protocol.payload import PreviewHeader
@@ -68,7 +68,7 @@ def run(settings: ServiceSettings, uri: str, calibration: Path | None = None,
                     with HubConnection(settings, "capture", supervisor) as connection:
                         _Capture(settings, connection, supply, uri, name, supervisor).serve(stop)
                 except Exception as error:
-                    supervisor.say_why(" ".join(str(error).split()) or type(error).__name__)
+                    supervisor.say_why(in_one_line(error))
                     raise
                 finally:
                     if not supply.close():

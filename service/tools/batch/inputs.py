@@ -3,18 +3,21 @@
 import os
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 
-from denseface.capture.errors import CaptureError
-from denseface.capture.image_pair import FolderSource
 from denseface.service.errors import UsageError
 from denseface.service.tools.batch.parts import Part
+from denseface.service.tools.reconstruction.inputs import (
+    FRAME,
+    RECORDING,
+    SIDE,
+    is_of_pairs,
+    refuse_sensor,
+)
 
 __all__ = ["absolute", "input_names", "parts_of"]
 
-_RECORDING, _FRAME, _SIDE = ".oni", ".npz", ".calibration.json"
 _AT_ONCE = 10_000
 """Names of a folder that are in memory."""
 
@@ -35,15 +38,13 @@ def input_names(given: Sequence[str], known: Mapping[str, str]) -> dict[str, str
     """
     paths = []
     for one in given:
-        if one.lower().startswith("openni2:"):
-            raise UsageError(f"{one}: expected a .npz or .oni file or a folder; `denseface up` "
-                             "serves a sensor")
-        if one.lower().endswith(_SIDE):
+        refuse_sensor(one)
+        if one.lower().endswith(SIDE):
             continue
         path = Path(absolute(one))
         if not one or not path.exists():
             raise UsageError(f"{one or 'INPUT'}: no such file or folder")
-        if not path.is_dir() and path.suffix.lower() not in (_RECORDING, _FRAME):
+        if not path.is_dir() and path.suffix.lower() not in (RECORDING, FRAME):
             raise UsageError(f"{one}: expected a .npz or .oni file or a folder")
         paths.append(path)
     if not paths:
@@ -89,7 +90,7 @@ def parts_of(path: str, name: str, without: str = "") -> Iterator[Part]:
             yield part
         if none:
             yield Part(path, name, many=True)
-    elif path.lower().endswith(_RECORDING):
+    elif path.lower().endswith(RECORDING):
         yield Part(path, name, many=True)
     else:
         yield Part(path, name, many=False)
@@ -116,24 +117,21 @@ def _of_entry(entry: "os.DirEntry[str]", name: str, without: str) -> Iterator[Pa
     if entry.is_dir(follow_symlinks=False):
         if entry.path != without:
             yield from _in_folder(entry.path, f"{name}/{entry.name}", without)
-    elif ending.lower() == _RECORDING:
+    elif ending.lower() == RECORDING:
         # With its ending: a folder of that name would be another source.
         yield Part(entry.path, f"{name}/{entry.name}", many=True)
-    elif ending.lower() == _FRAME:
-        own = entry.name[:-len(ending)] if ending == _FRAME else entry.name
+    elif ending.lower() == FRAME:
+        own = entry.name[:-len(ending)] if ending == FRAME else entry.name
         yield Part(entry.path, f"{name}/{own}", many=False)
 
 
 def _has_files(folder: str) -> bool:
     with os.scandir(folder) as entries:
-        return any(entry.name.lower().endswith((_RECORDING, _FRAME)) for entry in entries)
+        return any(entry.name.lower().endswith((RECORDING, FRAME)) for entry in entries)
 
 
 def _is_of_pairs(folder: str) -> bool:
-    with suppress(CaptureError, OSError):
-        FolderSource(Path(folder)).close()
-        return True
-    return (Path(folder) / "depth").is_dir()
+    return is_of_pairs(Path(folder)) or (Path(folder) / "depth").is_dir()
 
 
 def _named(path: Path) -> str:

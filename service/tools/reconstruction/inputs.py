@@ -11,9 +11,10 @@ from denseface.capture.image_pair import FolderSource
 from denseface.capture.source import ReplayOptions
 from denseface.service.errors import UsageError, reason_of
 
-__all__ = ["Input", "find_inputs"]
+__all__ = ["FRAME", "RECORDING", "SIDE", "Input", "find_inputs", "is_of_pairs", "refuse_sensor"]
 
-_RECORDING, _FRAME, _SIDE = ".oni", ".npz", ".calibration.json"
+RECORDING, FRAME, SIDE = ".oni", ".npz", ".calibration.json"
+"""Endings of recordings, of frame files, and of calibrations beside either."""
 
 
 class Input(NamedTuple):
@@ -49,10 +50,8 @@ def find_inputs(given: Sequence[str]) -> list[Input]:
     """
     found: dict[Path, tuple[str, str]] = {}
     for one in given:
-        if one.lower().startswith("openni2:"):
-            raise UsageError(f"{one}: expected a .npz or .oni file or a folder; `denseface up` "
-                             "serves a sensor")
-        if one.lower().endswith(_SIDE) and len(given) > 1:
+        refuse_sensor(one)
+        if one.lower().endswith(SIDE) and len(given) > 1:
             continue
         for uri, problem in _sources(one):
             path = Path(uri)
@@ -60,6 +59,13 @@ def find_inputs(given: Sequence[str]) -> list[Input]:
     names = _names([uri for uri, _ in found.values()])
     return [Input(uri, name, problem)
             for (uri, problem), name in zip(found.values(), names, strict=True)]
+
+
+def refuse_sensor(given: str) -> None:
+    """Raise UsageError where a live sensor is named."""
+    if given.lower().startswith("openni2:"):
+        raise UsageError(f"{given}: expected a .npz or .oni file or a folder; `denseface up` "
+                         "serves a sensor")
 
 
 def _sources(given: str) -> list[tuple[str, str]]:
@@ -93,16 +99,21 @@ def _in_folder(top: Path) -> Iterator[tuple[str, str]]:
 def _own(folder: Path, entries: Sequence[Path]) -> list[Path]:
     """Give the sources that lie in a folder itself; it alone where it is one."""
     endings = {one.suffix.lower() for one in entries}
-    if _RECORDING in endings:
-        return [one for one in entries if one.suffix.lower() == _RECORDING
-                or (one.suffix.lower() == _FRAME and _may_be_frame(one))]
-    if _FRAME in endings or folder / "depth" in entries:
+    if RECORDING in endings:
+        return [one for one in entries if one.suffix.lower() == RECORDING
+                or (one.suffix.lower() == FRAME and _may_be_frame(one))]
+    if FRAME in endings or folder / "depth" in entries:
         return [folder]
+    return [folder] if is_of_pairs(folder) else []
+
+
+def is_of_pairs(folder: Path) -> bool:
+    """Say whether a folder has image pairs in a layout that is known."""
     try:
         FolderSource(folder).close()
     except (CaptureError, OSError):
-        return []
-    return [folder]
+        return False
+    return True
 
 
 def _may_be_frame(path: Path) -> bool:

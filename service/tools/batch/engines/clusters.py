@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
 from denseface.missing import explained
-from denseface.service.errors import KeyFileError, UsageError, reason_of
+from denseface.service.errors import KeyFileError, UsageError, in_one_line, reason_of
 from denseface.service.runtime.files import read_private_text
 from denseface.service.tools.batch.engines.engine import Engine, EngineError, Work
 
@@ -114,7 +114,7 @@ def local_engine(
         shutil.rmtree(scratch, ignore_errors=True)
         settings.__exit__(None, None, None)
         if isinstance(error, Exception):
-            raise EngineError(f"the local cluster does not start: {_said(error)}") from error
+            raise EngineError(f"the local cluster does not start: {in_one_line(error)}") from error
         raise
 
     def close(busy: bool) -> None:
@@ -195,7 +195,8 @@ def remote_engine(work: Work, address: str, files: TlsFiles) -> Engine:
     try:
         client = Client(address, security=security, set_as_default=False, timeout=_START_S)
     except (OSError, ValueError, TimeoutError) as error:
-        raise EngineError(f"{address}: no scheduler can be reached: {_said(error)}") from error
+        raise EngineError(f"{address}: no scheduler can be reached: {in_one_line(error)}"
+                          ) from error
     try:
         client.wait_for_workers(1, timeout=_WORKERS_S)
     except BaseException as error:
@@ -235,7 +236,3 @@ def _silence() -> None:
     """Let Dask log nothing: what matters to the user comes as an error."""
     for name in ("distributed", "tornado", "asyncio"):
         logging.getLogger(name).setLevel(_SILENT)
-
-
-def _said(error: object) -> str:
-    return " ".join(str(error).split()) or type(error).__name__

@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 
 from denseface.service.runtime.files import sync_folder
 from denseface.service.tools.batch.summary._failing import corrupt, named
+from denseface.service.tools.batch.summary._merge import key_at
 from denseface.service.tools.batch.summary.schema import COLUMNS, KEY, SCHEMA
 
 __all__ = ["GROUP_ROWS", "SummaryFile", "write_table"]
@@ -84,7 +85,7 @@ class SummaryFile:
 
     def firsts(self) -> list[tuple[str, int]]:
         """Give the key of each group's first row, a null as -1."""
-        return [_key(self.group(number, KEY).slice(0, 1)) for number in range(self.groups)]
+        return [key_at(self.group(number, KEY), 0) for number in range(self.groups)]
 
 
 def _folded(path: Path, schema: pa.Schema) -> int:
@@ -95,11 +96,6 @@ def _folded(path: Path, schema: pa.Schema) -> int:
     if not said.isdigit() or len(said) > 18:
         raise corrupt(path, "no number of runs")
     return int(said)
-
-
-def _key(table: pa.Table) -> tuple[str, int]:
-    source, frame = (table.column(name)[0].as_py() for name in KEY)
-    return source, -1 if frame is None else frame
 
 
 def write_table(

@@ -15,6 +15,7 @@ from typing import NamedTuple
 from denseface.files import read_bounded, write_whole
 from denseface.service.errors import FormatError
 from denseface.service.tools.batch.row import Row
+from denseface.service.tools.reconstruction.inputs import SIDE
 
 __all__ = ["FACES", "RECORDS", "Origin", "Record", "read_record", "write_record"]
 
@@ -23,7 +24,6 @@ FACES, RECORDS = "faces", "records"
 _MAX_BYTES = 1 << 16
 _KEPT = "face", "no_face"
 """States that another try would not change."""
-_SIDE = ".calibration.json"
 
 
 class Record(NamedTuple):
@@ -46,7 +46,7 @@ class Origin(NamedTuple):
     def of(cls, source: str) -> "Origin":
         """Look at a source."""
         stamp: tuple[int, ...] = ()
-        for path in (Path(source), Path(source).with_suffix(_SIDE)):
+        for path in (Path(source), Path(source).with_suffix(SIDE)):
             with suppress(OSError, ValueError):
                 status = path.stat()
                 stamp += status.st_size, status.st_mtime_ns
