@@ -83,6 +83,16 @@ def test_of_another_failure_the_end_of_what_was_said_is_shown_and_all_kept(boots
     assert (tmp_path / kept).read_text().startswith("word 0\n")
 
 
+def test_steps_that_end_at_once_end():
+    """The child that says how far a step is may not outlive it, however new it is."""
+    functions = (REPOSITORY / "script" / "bootstrap").read_text().split("\n# End with one line")[0]
+    ended = subprocess.run(
+        ["sh"], text=True, capture_output=True, timeout=LIMIT_S, cwd=REPOSITORY,
+        input=f"cd script\n{functions.replace('$0', '$PWD/bootstrap')}\n"
+              "for step in $(seq 300); do work say true; done; say ended\n")
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "bootstrap: ended\n", "")
+
+
 def test_ctrl_c_is_status_130_and_leaves_nothing_that_counts_as_installed(bootstrap, tmp_path):
     process = bootstrap("", "exec sleep 600")
     until(lambda: (tmp_path / "reached").exists())
