@@ -112,6 +112,11 @@ export class FaceViewer {
     this.#request();
   }
 
+  /** Whether all that is to be seen is drawn, and nothing moves. */
+  get resting(): boolean {
+    return !this.#frame && this.#settle === undefined;
+  }
+
   /** Whether the face turns by itself; a touch ends it. */
   get turning(): boolean {
     return this.#pose.turning;
@@ -255,6 +260,7 @@ export class FaceViewer {
       return;
     }
     clearTimeout(this.#settle);
+    this.#settle = undefined;
     if (elapsed) this.#detail.took(elapsed);
     const seconds = Math.min(MAX_STEP_S, (elapsed || 16) / 1000);
     const moving = this.#pose.step(seconds) && !this.#flat;  // a flat picture is of the front
@@ -269,7 +275,10 @@ export class FaceViewer {
     }
     this.#last = 0;
     this.#detail.rest();
-    this.#settle = setTimeout(() => this.#draw(true), STILL_MS);
+    this.#settle = setTimeout(() => {
+      this.#settle = undefined;
+      this.#draw(true);
+    }, STILL_MS);
   }
 
   /** Goes on from one mode's colours to the other's; returns whether it is not there yet. */

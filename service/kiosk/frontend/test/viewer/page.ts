@@ -142,14 +142,14 @@ class Page {
     return held;
   }
 
-  /** Waits until nothing was drawn for so many milliseconds; throws where that never comes. */
-  async still(forMs = 250, limitMs = 20_000): Promise<void> {
+  /** Waits until nothing moves and all of it is on the screen; throws where that never comes. */
+  async still(limitMs = 20_000): Promise<void> {
     const end = performance.now() + limitMs;
-    for (let before = -1; before !== this.drawings;) {
+    // A wheel's turn may come a frame after it was asked for.
+    for (await frames(2); !this.viewer!.resting; await frames(1)) {
       if (performance.now() > end) throw new Error("it never stands still");
-      before = this.drawings;
-      await new Promise((done) => setTimeout(done, forMs));
     }
+    await frames(2);
   }
 
   loseContext(): Promise<void> {
