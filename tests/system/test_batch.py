@@ -5,6 +5,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
@@ -16,14 +17,14 @@ from tests.system.running import RECORDINGS, REPOSITORY, denseface, run_here
 from tests.system.snippets import snippets
 from tests.waiting import LIMIT_S, until
 
-RECORDED = 8
+RECORDED = 6
 NAMES = "frontal_700", "side_light", "turned_18"
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(REPOSITORY)}
 
 
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory):
-    """Eight recordings, of three frames each: links."""
+    """Six recordings, of three frames each: links."""
     top = tmp_path_factory.mktemp("archive")
     for at in range(RECORDED):
         name = NAMES[at % 3]
@@ -42,22 +43,48 @@ def faces(out):
     return {path: path.stat().st_mtime_ns for path in (out / "faces").rglob("*.ply")}
 
 
-def test_ctrl_c_ends_it_and_leaves_what_is_done_and_nothing_else(archive, out):
+def recorded_of(out):
+    """Leave out a face without its record, as where the end came between: it is made again."""
+    recorded = {path.relative_to(out / "records").with_suffix("")
+                for path in (out / "records").rglob("*.json")}
+    return {path: at for path, at in faces(out).items()
+            if path.relative_to(out / "faces").with_suffix("") in recorded}
+
+
+@contextmanager
+def under_way(archive, out, more):
+    """Run it on a worker of its own until so many more faces are there; all of it must end."""
+    wanted = len(faces(out)) + more
     running = subprocess.Popen(
         [sys.executable, "-m", "denseface", "batch", archive, "--out", out, "--workers", "1"],
         cwd=REPOSITORY, env=ENVIRONMENT, start_new_session=True, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
-        until(lambda: len(faces(out)) >= 2 or running.poll() is not None)
+        until(lambda: len(faces(out)) >= wanted or running.poll() is not None)
         started = psutil.Process(running.pid).children(recursive=True)
-        os.killpg(running.pid, signal.SIGINT)  # as a terminal does
-        said, complained = running.communicate(timeout=LIMIT_S)
+        assert started
+        yield running
+        until(lambda: not any(process.is_running() for process in started))
     finally:
         running.kill()
+        running.communicate()
+
+
+def test_killed_it_leaves_no_process_and_what_is_done(archive, out):
+    with under_way(archive, out, 2) as running:
+        running.kill()
+    assert parquet.read_table(out / "summary.parquet").num_rows <= len(faces(out)) < 3 * RECORDED
+
+
+def test_ctrl_c_ends_it_and_leaves_what_is_done_and_nothing_else(archive, out):
+    before = recorded_of(out)
+    with under_way(archive, out, 1) as running:
+        os.killpg(running.pid, signal.SIGINT)  # as a terminal does
+        said, complained = running.communicate(timeout=LIMIT_S)
     assert (running.returncode, said) == (130, "")
     assert f"stopped; what is done stays in {out}, and the same command goes on" in complained
     assert "Traceback" not in complained
-    until(lambda: not any(process.is_running() for process in started))
+    assert before.items() <= faces(out).items()
     assert {path.name for path in out.iterdir()} == {
         "batch.json", "faces", "records", "summary.parquet"}
     assert 2 <= len(faces(out)) < 3 * RECORDED
@@ -84,11 +111,7 @@ def start(program, *arguments):
 def test_it_goes_on_on_a_cluster_of_other_processes_by_tls(archive, out, tmp_path):
     if shutil.which("openssl") is None:
         pytest.skip("openssl is not installed")
-    # Ctrl-C may have come between a face and its record: that one is made again, rightly.
-    recorded = {path.relative_to(out / "records").with_suffix("")
-                for path in (out / "records").rglob("*.json")}
-    before = {path: at for path, at in faces(out).items()
-              if path.relative_to(out / "faces").with_suffix("") in recorded}
+    before = recorded_of(out)
     short = next(iter(before))
     os.truncate(short, 1000)
     tls, port = certificates(tmp_path), free_port()
