@@ -158,13 +158,17 @@ def test_who_does_not_listen_is_cut_off(monkeypatch, tmp_path):
     monkeypatch.setattr(connections, "_ANSWER_S", 0.2)
     monkeypatch.setattr(module, "STATIC", tmp_path)
     (tmp_path / "large.js").write_bytes(bytes(15 * 2**20))
+    lost = connections.BoundedHttp.connection_lost
 
     async def main():
+        cut = asyncio.Event()
+        monkeypatch.setattr(connections.BoundedHttp, "connection_lost",
+                            lambda self, exc: (lost(self, exc), cut.set()))
         async with serving() as url:
             with socket.create_connection(_address(url)) as reader:
                 reader.sendall(request_to(url, "GET /static/large.js HTTP/1.1"))
                 reader.setblocking(False)
-                await asyncio.sleep(0.5)
+                await cut.wait()
                 loop, length = asyncio.get_running_loop(), 0
                 with contextlib.suppress(ConnectionResetError):
                     while got := await loop.sock_recv(reader, 2**20):
