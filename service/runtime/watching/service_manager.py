@@ -18,7 +18,8 @@ _MAX_STATUS = 200
 class ServiceManager(Closing):
     """Takes its variables from the environment, so that no child speaks for its parent.
 
-    Says nothing where there is no service manager, or it does not listen. Nothing waits.
+    Says nothing where there is no service manager, or it does not listen. Nothing waits: what a
+    busy one does not take at once is said again with the next sign of life.
 
     Parameters
     ----------
@@ -38,6 +39,8 @@ class ServiceManager(Closing):
         """When the last sign of life was given."""
         self._status = ""
         self._ready = False
+        self._unsaid: dict[str, str] = {}
+        """By variable, in order: the newest is what counts."""
         self._socket: socket.socket | None = None
         if address:
             self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -54,12 +57,14 @@ class ServiceManager(Closing):
 
     def alive(self) -> None:
         """Say that this process makes progress, as often as is needed: call it in the loop."""
+        self._say_what_is_unsaid()
         if self.limit_s is None:
             return
         now = self._clock()
         if self._fed is None or now - self._fed >= self.limit_s / _FEEDS:
             self._fed = now
             self._say("WATCHDOG=1")
+            self._unsaid.pop("WATCHDOG", None)  # what is late is no sign of life
 
     def step(self, status: str, within_s: float) -> None:
         """Say how far a start is; where that is news, the next step has so long, seconds.
@@ -96,6 +101,19 @@ class ServiceManager(Closing):
             self._socket = None
 
     def _say(self, state: str) -> None:
-        if self._socket is not None:
-            with suppress(OSError):
-                self._socket.send(state.encode(errors="replace"))
+        name, _, value = state.partition("=")
+        self._unsaid.pop(name, None)
+        self._unsaid[name] = value
+        self._say_what_is_unsaid()
+
+    def _say_what_is_unsaid(self) -> None:
+        while self._socket is not None and self._unsaid:
+            name, value = next(iter(self._unsaid.items()))
+            try:
+                self._socket.send(f"{name}={value}".encode(errors="replace"))
+            except BlockingIOError:
+                return
+            except OSError:
+                self._unsaid.clear()
+                return
+            del self._unsaid[name]

@@ -3,6 +3,7 @@
 import os
 import socket
 import threading
+from contextlib import suppress
 
 import pytest
 
@@ -46,6 +47,40 @@ def test_it_hears_that_the_supervisor_lives_is_ready_and_stops(systemd, tmp_path
     while heard[-1] != "STOPPING=1":
         heard.append(listening.recv(100).decode())
     assert heard.count("READY=1") == 1
+
+
+def test_what_is_not_taken_at_once_is_said_again_and_signs_of_life_are_not_heaped_up(systemd):
+    """Where systemd is busy, its queue is full: who is ready says so only once."""
+    listening, environment = systemd
+    with ServiceManager(environment | {"WATCHDOG_USEC": "1"}) as manager:
+        for _ in range(10_000):  # more than any queue holds
+            manager.alive()
+        manager.ready("first")
+        manager.status("second")
+        listening.setblocking(False)
+        taken = drain(listening)
+        assert set(taken) == {"WATCHDOG=1"}
+        manager.alive()
+        assert sorted(drain(listening)) == ["READY=1", "STATUS=second", "WATCHDOG=1"]
+        manager.alive()
+        assert drain(listening) == ["WATCHDOG=1"]
+
+
+def test_who_does_not_listen_any_more_costs_nothing(systemd):
+    listening, environment = systemd
+    with ServiceManager(environment) as manager:
+        listening.close()
+        manager.ready("first")
+        manager.status("second")
+        manager.alive()
+
+
+def drain(listening):
+    said = []
+    with suppress(BlockingIOError):
+        while True:
+            said.append(listening.recv(1000).decode())
+    return said
 
 
 class Said(ServiceManager):
