@@ -16,6 +16,7 @@ import psutil
 from denseface.service.cli import main
 from denseface.service.client import Client
 from denseface.service.protocol.messages import Status
+from denseface.service.runtime.failpoints import FAILPOINTS_VARIABLE, TOKENS_VARIABLE
 from tests.waiting import LIMIT_S, PATIENCE, until
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -23,6 +24,14 @@ RECORDINGS = REPOSITORY / "fixtures" / "recorded_oni"
 PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_LIVENESS": f"{min(15 * PATIENCE, 100):.0f}"}
 """Short heartbeats, so that a test soon sees a change; a process counts as gone after the default
 3 s, since a busy machine stops one for longer than three of these heartbeats."""
+
+
+_STOP = "worker.job.computing"
+
+
+def stopping(data: Path) -> dict[str, str]:
+    """Give the environment of a service that has `Service.stop_worker_amid_a_job`."""
+    return {FAILPOINTS_VARIABLE: f"{_STOP}=stop", TOKENS_VARIABLE: str(data.parent)}
 
 
 _SLOW = re.compile(
@@ -82,6 +91,15 @@ class Service:
 
         worker = until(only)
         assert worker
+        return worker
+
+    def stop_worker_amid_a_job(self) -> psutil.Process:
+        """Have the only worker stop itself at its next job, and give it; once, of `stopping`.
+
+        Stopped before, it could be gone for the hub before it is sent one.
+        """
+        worker = self.worker()
+        (self.data.parent / _STOP).touch()
         return worker
 
 

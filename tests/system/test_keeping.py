@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
+import psutil
 import pytest
 import zmq
 
@@ -28,7 +29,7 @@ from denseface.service.protocol.messages import (
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.wire import Packet, decode_from_hub, encode
 from denseface.service.storage import FolderStore
-from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, service
+from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, service, stopping
 from tests.unit.service.faces import small_face, small_frame
 from tests.unit.service.storing import accept, finish
 from tests.waiting import LIMIT_S, until
@@ -64,13 +65,13 @@ def files(data):
 
 @pytest.mark.timeout(300)  # a dozen commands one after the other
 def test_an_operator_s_day(tmp_path):
-    once = {"DENSEFACE_ATTEMPTS": "1"}
-    with service(RECORDINGS / "frontal_700.oni", tmp_path / "data", environment=once) as up, \
+    data = tmp_path / "data"
+    once = {"DENSEFACE_ATTEMPTS": "1"} | stopping(data)
+    with service(RECORDINGS / "frontal_700.oni", data, environment=once) as up, \
             up.client() as client:
-        worker = up.worker()
-        worker.suspend()
+        worker = up.stop_worker_amid_a_job()
         client.press("mishap")
-        until(lambda: client.status().working == 1)
+        until(lambda: worker.status() == psutil.STATUS_STOPPED)
         worker.kill()
         until(lambda: client.status().dead == 1)
         (line,) = up.run("dead", "list").stdout.splitlines()

@@ -13,15 +13,12 @@ import psutil
 import pytest
 
 from denseface.service.errors import UnknownCaptureError
-from denseface.service.runtime.failpoints import FAILPOINTS_VARIABLE, TOKENS_VARIABLE
 from tests.system.kiosk_pages import RawPage, is_closed, kiosk_service, kiosk_url, process_of
-from tests.system.running import RECORDINGS, REPOSITORY
+from tests.system.running import RECORDINGS, REPOSITORY, stopping
 from tests.unit.service.kiosk.button.test_button import DOWN, HELD, UP
 from tests.waiting import LIMIT_S, until
 
 SOURCE = f"{RECORDINGS / 'frontal_700.oni'}?rate=real"
-STOPPED = "worker.job.computing"
-"""A worker stops here once for each file of this name that is put beside the service's data."""
 
 
 @pytest.fixture(scope="module")
@@ -29,9 +26,9 @@ def kiosk(tmp_path_factory):
     """One service for all."""
     folder = tmp_path_factory.mktemp("kiosk")
     os.mkfifo(folder / "button")
-    stopping = {FAILPOINTS_VARIABLE: f"{STOPPED}=stop", TOKENS_VARIABLE: str(folder)}
     with kiosk_service(SOURCE, folder, "--kiosk-countdown", "0", "--metrics", "0",
-                       "--kiosk-button", folder / "button", environment=stopping) as running:
+                       "--kiosk-button", folder / "button",
+                       environment=stopping(folder / "data")) as running:
         yield running
 
 
@@ -143,8 +140,7 @@ def test_a_hub_that_is_killed_is_said_on_the_screen_and_all_is_back_by_itself(ki
 
 def test_a_worker_that_is_killed_while_it_makes_the_face_costs_a_moment(kiosk, page):
     running, _ = kiosk
-    worker = running.worker()
-    (running.data.parent / STOPPED).touch()
+    worker = running.stop_worker_amid_a_job()
     page.begin()
     page.until("reconstructing")
     until(lambda: worker.status() == psutil.STATUS_STOPPED)

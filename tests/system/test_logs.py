@@ -186,8 +186,9 @@ def test_a_log_without_ids_names_no_capture_in_any_process(tmp_path):
              "--source", str(RECORDINGS / "frontal_700.oni"), "--data", str(tmp_path / "data")],
             cwd=REPOSITORY, stderr=stderr, env=os.environ | PACE | {"DENSEFACE_LOG_IDS": "off"})
         try:
-            pressed = denseface("press", "--id", "Visitor-17", "--address", address)
-            assert pressed.returncode == 0, pressed.stderr
+            for command in (("status", "--wait", LIMIT_S), ("press", "--id", "Visitor-17")):
+                done = denseface(*command, "--address", address)
+                assert done.returncode == 0, done.stderr
         finally:
             process.terminate()
             assert process.wait(LIMIT_S) == 0

@@ -20,7 +20,15 @@ from denseface.service.errors import (
 )
 from denseface.service.export import load_face
 from tests.ports import free_port
-from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, service, sockets
+from tests.system.running import (
+    RECORDINGS,
+    REPOSITORY,
+    denseface,
+    hub_alone,
+    service,
+    sockets,
+    stopping,
+)
 from tests.system.snippets import SESSION, snippets
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.process import environment, play
@@ -29,7 +37,8 @@ from tests.waiting import LIMIT_S, until
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory):
-    with service(RECORDINGS / "frontal_700.oni", tmp_path_factory.mktemp("data") / "data") as up:
+    data = tmp_path_factory.mktemp("data") / "data"
+    with service(RECORDINGS / "frontal_700.oni", data, environment=stopping(data)) as up:
         yield up
 
 
@@ -113,11 +122,10 @@ def test_subscribers_get_every_face_in_order(running, tmp_path):
 
 
 def test_a_killed_worker_s_job_is_done_by_the_next(running):
-    worker = running.worker()
-    worker.suspend()
+    worker = running.stop_worker_amid_a_job()
     with running.client() as client:
         client.press("survivor")
-        until(lambda: client.status().working == 1)
+        until(lambda: worker.status() == psutil.STATUS_STOPPED)
         worker.kill()
         assert client.get("survivor", timeout=LIMIT_S).report.capture_id == "survivor"
 
