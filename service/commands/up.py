@@ -38,7 +38,8 @@ def run(args: argparse.Namespace) -> int:
 
     settings = _options.service_settings(args)
     check_settings(settings)
-    _options.recon_settings(args)
+    if args.preset or args.set:
+        _options.recon_settings(args)  # the hub's: what is wrong with them is said here
     table = process_table(
         args.workers,
         common=_options.repeated(args, "address", "log", "debug"),
@@ -55,10 +56,10 @@ def _welcome(
     args: argparse.Namespace, address: str, kiosk: list[str] | None
 ) -> AbstractContextManager[None]:
     """Say on a terminal when presses can be made, and what to type."""
-    from denseface.service.tools.welcome import next_steps, welcoming
-
     if not os.isatty(_STDERR) or args.log == "json":
         return nullcontext()
+    from denseface.service.tools.welcome import next_steps, welcoming
+
     page = None if kiosk is None else kiosk_settings(args)
     shown = page.url if page and page.address[1] else ""  # a free port is told by the log
     return welcoming(address, next_steps(address, shown))

@@ -17,12 +17,11 @@ from denseface.service.daemons._watched_process import (
 )
 from denseface.service.daemons.startup import ONE_THREAD
 from denseface.service.errors import AddressError
+from denseface.service.runtime.folder_lock import check_folder
 from denseface.service.runtime.signals import StopSignal
 from denseface.service.runtime.watching.service_manager import ServiceManager
 from denseface.service.settings import ServiceSettings
-from denseface.service.storage import check_folder
 from denseface.service.transport.addresses import check_bindable, is_local
-from denseface.service.transport.listeners import server_credentials
 
 __all__ = ["ProcessSpec", "Supervisor", "check_settings", "process_table"]
 
@@ -73,6 +72,9 @@ def check_settings(settings: ServiceSettings) -> None:
     check_bindable(settings.address)
     check_folder(settings.data)
     if settings.listen:
+        # With all that listens, which the supervisor has no other use for.
+        from denseface.service.transport.listeners import server_credentials
+
         server_credentials(settings)
 
 

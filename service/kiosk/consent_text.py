@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from denseface.files import read_bounded
 from denseface.service.errors import SettingsError, first_error, reason_of
 from denseface.service.kiosk.installed import LANGUAGES
-from denseface.service.kiosk.page_messages import Language
+from denseface.service.kiosk.language import Language
 from denseface.service.kiosk.settings import KioskSettings
 
 __all__ = ["ConsentText", "check_files", "load_consent_text"]

@@ -9,21 +9,19 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
+from denseface.service.kiosk.language import Language
 from denseface.service.protocol.hint import Code
 from denseface.service.protocol.message_base import CaptureId, Number
 
 __all__ = [
     "FACE", "FROM_PAGE", "MIRROR", "Again", "Arrow", "Begin", "Cancel", "Consent", "ConsentScreen",
     "CountdownScreen", "Delete", "Done", "Drawn", "FaceHead", "FailedScreen", "FromPage", "Hello",
-    "Keep", "KeepScreen", "Language", "Link", "Measurement", "MirrorHead", "Next", "PositionScreen",
+    "Keep", "KeepScreen", "Link", "Measurement", "MirrorHead", "Next", "PositionScreen",
     "Press", "ResultScreen", "Screen", "ScreenName", "ThanksScreen", "Touch", "Trouble",
 ]
 
 MIRROR, FACE = 1, 2
 """First byte of a binary message."""
-
-Language = Annotated[str, Field(pattern=r"^[a-z]{2,3}(-[A-Za-z0-9]{2,8})?$")]
-"""Name of a language as in BCP 47."""
 
 
 class _Said(BaseModel):

@@ -12,10 +12,10 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from denseface.folders import user_folder
 from denseface.service.errors import SettingsError, first_error
 from denseface.service.kiosk.certificates import tls_context
-from denseface.service.kiosk.page_messages import Language
-from denseface.service.protocol.message_base import PeerName
+from denseface.service.kiosk.language import Language
 from denseface.service.runtime.parsing import parse_address
 from denseface.service.settings import given_settings
+from denseface.validation import PEER_NAME
 
 __all__ = ["Address", "KioskSettings", "is_loopback"]
 
@@ -120,7 +120,7 @@ class KioskSettings(BaseModel):
     """Input device of a button, `/dev/input/by-id/...`; None for keyboard and screen alone."""
     button_grab: _Switch = False
     """Whether the button is taken from all other programs."""
-    sensor: PeerName | None = None
+    sensor: Annotated[str, Field(pattern=PEER_NAME)] | None = None
     """Name of the sensor above the screen, where the hub has several."""
     idle_s: _IdleS = 30.0
     """Time without a touch, or a face, until a visit ends before its result, seconds."""

@@ -10,9 +10,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any, Literal, TextIO
 
-import structlog
-from structlog.typing import EventDict, ExcInfo, Processor
-
+from denseface.service.log._structlog import EventDict, ExcInfo, Processor, structlog
 from denseface.service.log.ids import IdHider
 from denseface.service.log.limit import LogLimit
 from denseface.service.log.output import LogStream, process_log

@@ -3,7 +3,6 @@
 from denseface.service.storage._capture_rows import CaptureRow
 from denseface.service.storage._erasure import Erased, PendingErasure
 from denseface.service.storage._folder_layout import FolderLayout, kept_bytes
-from denseface.service.storage._folder_lock import check_folder
 from denseface.service.storage._recovery import Progress
 from denseface.service.storage.folder_store import FolderStore, OpeningStore
 from denseface.service.storage.records import (
@@ -30,7 +29,6 @@ __all__ = [
     "WriteResult",
     "Writer",
     "WriterThreads",
-    "check_folder",
     "kept_bytes",
     "read_face",
     "read_frame",

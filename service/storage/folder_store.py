@@ -23,6 +23,7 @@ from denseface.service.runtime.background import Background
 from denseface.service.runtime.closing import Closing
 from denseface.service.runtime.failpoints import failpoint
 from denseface.service.runtime.files import private_folder
+from denseface.service.runtime.folder_lock import check_folder, lock
 from denseface.service.storage._capture_rows import (
     CaptureRow,
     CaptureRows,
@@ -30,7 +31,6 @@ from denseface.service.storage._capture_rows import (
     NewOutcome,
 )
 from denseface.service.storage._folder_layout import FolderLayout
-from denseface.service.storage._folder_lock import check_folder, lock
 from denseface.service.storage._frame_cache import FrameCache
 from denseface.service.storage._record_file import wrap_os_errors
 from denseface.service.storage._recovery import Progress, recover

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from denseface.service.errors import ServiceError
-from denseface.service.kiosk.page_messages import Language
+from denseface.service.kiosk.language import Language
 from denseface.service.protocol.message_base import CaptureId, Digest
 
 __all__ = [

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, fields
 
-from denseface.service.kiosk.page_messages import Language
+from denseface.service.kiosk.language import Language
 
 __all__ = ["VisitOptions"]
 

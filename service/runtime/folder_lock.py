@@ -7,6 +7,8 @@ from pathlib import Path
 from denseface.service.errors import HubRunningError, SettingsError, reason_of
 from denseface.service.runtime.files import private_folder
 
+__all__ = ["check_folder", "lock"]
+
 
 def check_folder(folder: Path) -> None:
     """Create a data folder, or check that a hub could open it.
