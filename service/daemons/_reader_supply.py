@@ -5,7 +5,8 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import structlog
 
@@ -22,11 +23,13 @@ from denseface.service.daemons._supply import (
     Taken,
 )
 from denseface.service.daemons.sensor import SensorReader
-from denseface.service.gate.frame_judge import FrameJudge
 from denseface.service.gate.hinting import Judged
 from denseface.service.gate.pressing import Decision, GatedPress
 from denseface.service.protocol import messages
 from denseface.service.runtime.background import Background
+
+if TYPE_CHECKING:
+    from denseface.service.gate.frame_judge import FrameJudge
 
 _CLOSING_S = 3.0
 """Longest wait for the driver's last call when the process stops, seconds."""
@@ -64,7 +67,6 @@ class ReaderSupply(Supply):
         self._reader = reader
         self._timeout_s = timeout_s
         self._open = False
-        self._judge = FrameJudge(time.monotonic)
         self._presses: deque[_Press] = deque()
         """Captures that wait for their frame, oldest first."""
         self._preview_due = self._hint_due = False
@@ -162,6 +164,13 @@ class ReaderSupply(Supply):
     def _peek(self) -> JudgedFrame:
         frame = self._reader.peek()
         return frame, self._judge.judge(frame)
+
+    @cached_property
+    def _judge(self) -> "FrameJudge":
+        """What judges frames, in the driver's thread; a recording may never be asked for that."""
+        from denseface.service.gate.frame_judge import FrameJudge  # loads all that finds faces
+
+        return FrameJudge(time.monotonic)
 
     def hangs(self) -> str:
         seconds = self._driver.elapsed_s

@@ -5,7 +5,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denseface.capture import RgbdFrame
-from denseface.recon.registration import shaded_depth
 from denseface.service.protocol.payload import MAX_JPEG_BYTES, MAX_PREVIEW_SIDE
 
 __all__ = ["preview_jpeg"]
@@ -43,6 +42,8 @@ def _shrunk(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 def _relief(frame: RgbdFrame) -> NDArray[np.uint8]:
     """Shade the depth, thinned out: the smoothing within takes most of the time."""
+    from denseface.recon.registration import shaded_depth  # with the kernels beside it
+
     step = -(-max(frame.depth.shape) // _RELIEF_SIDE)
     unit_mm = frame.depth_meaning.unit_um / 1000
     return shaded_depth(frame.depth[::step, ::step], frame.depth_camera, unit_mm)

@@ -11,7 +11,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 from denseface.capture.live.sensor import LiveSensor, Shot
-from denseface.service.gate.frame_judge import FrameJudge
 from denseface.service.gate.hinting import Judged
 from denseface.service.gate.pressing import Decision, GatedPress
 from denseface.service.protocol import messages
@@ -83,6 +82,9 @@ class LiveGate:
         self._sensor = sensor
         self._wake = wake
         self._clock, self._cost_clock = clock, cost_clock
+        # Loads all that finds faces, before the first press: only a sensor's gate needs it so soon.
+        from denseface.service.gate.frame_judge import FrameJudge
+
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="gate")
         self._judge = FrameJudge(clock)
         self._call: Future[Judged] | None = None

@@ -10,6 +10,7 @@ from denseface.service.daemons import _live_supply, _reader_supply
 from denseface.service.daemons._live_supply import LiveSupply
 from denseface.service.daemons._reader_supply import ReaderSupply
 from denseface.service.daemons._supply import Hinted, NotTaken, Picture, Taken
+from denseface.service.gate import frame_judge
 from denseface.service.gate.faults import Fault
 from denseface.service.gate.hinting import Hinting, Judged
 from denseface.service.gate.live import NotPassed, Passed
@@ -211,7 +212,7 @@ class FakeJudge:
 
 @pytest.fixture
 def recording(monkeypatch):
-    monkeypatch.setattr(_reader_supply, "FrameJudge", FakeJudge)
+    monkeypatch.setattr(frame_judge, "FrameJudge", FakeJudge)
     monkeypatch.setattr(_reader_supply, "_PACE_S", 0.0)
     supply = ReaderSupply(FakeReader(live=False), Driver(), 1.0)
     ended(supply)
