@@ -3,8 +3,6 @@
 import contextlib
 import itertools
 import os
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,6 +20,7 @@ from denseface.service.protocol.roles import Role
 from denseface.service.protocol.wire import Packet, decode_from_hub, encode
 from denseface.service.security import KeyPair, allow, new_pair, read_pair, read_public
 from denseface.service.transport.addresses import publications_of
+from tests.nursery import Forked
 from tests.ports import free_port
 from tests.system.running import REPOSITORY
 from tests.unit.service.faces import small_face, small_frame
@@ -100,7 +99,7 @@ class Peer:
 class GuardedHub:
     """A running `denseface hub` with a local and a guarded listener."""
 
-    process: "subprocess.Popen[str]"
+    process: Forked
     local: str
     address: str
     keys: Path
@@ -156,13 +155,12 @@ def guarded_hub(folder: Path, host: str = "127.0.0.1", port: int | None = None,
         address = f"tcp://{host}:{port or free_port(host)}"
         log = folder / "hub.log"
         with log.open("w") as stderr:
-            process = subprocess.Popen(
-                [sys.executable, "-c", f"import sys\n{code}\n"
+            process = Forked(
+                ["-c", f"import sys\n{code}\n"
                  "from denseface.service.cli import main\nsys.exit(main(sys.argv[1:]))",
                  "hub", "--address", local, "--listen", address, "--keys", str(keys),
                  "--data", str(folder / "data")],
-                cwd=REPOSITORY, stderr=stderr, text=True,
-                env=os.environ | _PACE | environment)
+                cwd=REPOSITORY, stderr=stderr, env=os.environ | _PACE | environment)
         hub = GuardedHub(process, local, address, keys, log)
         try:
             until(lambda: "listening" in log.read_text() or process.poll() is not None)

@@ -1,14 +1,13 @@
 """A live sensor that fails, and the service: what the presser hears, and how all comes back."""
 
 import re
-import subprocess
-import sys
 from contextlib import contextmanager
 
 import pytest
 
 from denseface.service.client import Client, Operator
 from denseface.service.errors import PressRefusedError, RequestFailedError
+from tests.nursery import Forked
 from tests.system.running import REPOSITORY, hub_alone, service
 from tests.virtual_sensor.control import Call, Control, OpenFault
 from tests.virtual_sensor.process import environment, run_python
@@ -40,9 +39,9 @@ def hub(tmp_path):
 def capture_process(address, control, log):
     """Run the capture process alone, and give it."""
     with log.open("w") as stderr:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "denseface", "capture", "--source", "openni2:", "--address",
-             address], cwd=REPOSITORY, stderr=stderr, env=environment(controls=[control]))
+        process = Forked(
+            ["-m", "denseface", "capture", "--source", "openni2:", "--address", address],
+            cwd=REPOSITORY, stderr=stderr, env=environment(controls=[control]))
     try:
         yield process
     finally:

@@ -10,11 +10,13 @@ import subprocess
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Self
 
+from tests.nursery import Forked
 from tests.waiting import LIMIT_S, until
 
 _ROOT = Path(__file__).resolve().parents[2]
@@ -24,16 +26,15 @@ class Watched:
     """The process, from the test's side."""
 
     def __init__(self, env: dict[str, str], uri: str = "openni2:") -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "tests.system.watched_sensor", uri], cwd=_ROOT, text=True,
+        self.process = Forked(
+            ["-m", "tests.system.watched_sensor", uri], cwd=_ROOT,
             env=env | {"PYTHONPATH": str(_ROOT)}, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.process.kill()
-        self.process.communicate()
+        self.process.close()
 
     def ask(self, *words: object) -> Any:
         assert self.process.stdin is not None
@@ -51,13 +52,13 @@ class Watched:
         found = until(lambda: self.ask("state") if self.ask("state")[0] in wanted else None)
         return float(found[2])
 
-    def press(self) -> dict[str, Any]:
+    def press(self, number: int = 0) -> dict[str, Any]:
         """Take a frame: when it was asked for, what is known of it, its marks."""
-        return dict(self.ask("press"))
+        return dict(self.ask("press", number))
 
     def presses(self, count: int) -> list[dict[str, Any]]:
         """Press again and again, at any time within a frame's period."""
-        return [self.ask("press", number) for number in range(count)]
+        return [self.press(number) for number in range(count)]
 
     def states_since(self, since_s: float) -> list[str]:
         """Give the states that were entered since."""
@@ -68,6 +69,8 @@ def _serve(uri: str) -> None:
     import math
 
     from denseface.capture import identity
+    from denseface.capture.live.pairs import LivePairs
+    from denseface.capture.live.ring import Slot
     from denseface.capture.live.sensor import Shot, open_sensor
     from denseface.capture.openni2 import _devices, _sensor
     from tests.virtual_sensor.marks import read_mark
@@ -100,6 +103,15 @@ def _serve(uri: str) -> None:
         assert again is not None
         return told.wait(LIMIT_S)
 
+    arrived: dict[str, deque[int]] = {kind: deque(maxlen=8) for kind in ("depth", "color")}
+    """Stamps of the last frames of each stream, microseconds."""
+    add = LivePairs.add
+
+    def noted(pairs: LivePairs, kind: str, slot: Slot, stamp_us: int, at_s: float) -> Any:
+        arrived[kind].append(stamp_us)
+        return add(pairs, kind, slot, stamp_us, at_s)
+
+    LivePairs.add = noted  # type: ignore[method-assign]
     sensor.on_change = changed
     note()
 
@@ -126,7 +138,10 @@ def _serve(uri: str) -> None:
         frame, origin = shot.frame, shot.frame.origin
         marks = [read_mark(image, unit_um=frame.depth_meaning.unit_um)
                  for image in (frame.depth, frame.color) if image is not None]
+        zero_s = marks[0].exposed_ns / 1e9 - frame.depth_timestamp_us / 1e6
         return {
+            "arrived_s": {kind: [zero_s + us / 1e6 for us in [*stamps]]
+                          for kind, stamps in arrived.items()},
             "asked_s": asked_s, "got_s": got_s, "number": shot.number,
             "exposed_s": [mark.exposed_ns / 1e9 for mark in marks],
             "earliest_s": shot.earliest_s, "latest_s": shot.latest_s, "skew_us": frame.skew_us,

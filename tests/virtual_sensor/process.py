@@ -17,7 +17,6 @@ VIRTUAL_SENSOR_CONTROL              the files of control channels, separated by 
 
 import os
 import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,6 +24,7 @@ from typing import Any
 
 from denseface.capture.frame import RgbdFrame
 from denseface.capture.npz import load_frame
+from tests import nursery
 from tests.virtual_sensor.build import build
 from tests.virtual_sensor.control import Control
 from tests.waiting import LIMIT_S
@@ -80,10 +80,8 @@ def run_python(
     timeout_s: float = LIMIT_S,
 ) -> subprocess.CompletedProcess[str]:
     """Run Python code in a process of its own and give what it said."""
-    return subprocess.run(
-        [sys.executable, "-c", code, *map(str, arguments)], cwd=cwd,
-        env=env | {"PYTHONPATH": str(_ROOT)}, capture_output=True, text=True, timeout=timeout_s,
-        check=False)
+    return nursery.run(["-c", code, *arguments], cwd=cwd, env=env | {"PYTHONPATH": str(_ROOT)},
+                       timeout=timeout_s)
 
 
 def record_clip(

@@ -17,6 +17,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.nursery import Forked
 from tests.waiting import LIMIT_S
 
 __all__ = ["Raw"]
@@ -33,16 +34,15 @@ class Raw:
     """
 
     def __init__(self, env: dict[str, str]) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "tests.virtual_sensor.raw"], cwd=_ROOT, text=True,
-            env=env | {"PYTHONPATH": str(_ROOT)}, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        self.process = Forked(
+            ["-m", "tests.virtual_sensor.raw"], cwd=_ROOT, env=env | {"PYTHONPATH": str(_ROOT)},
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.process.kill()
-        self.process.communicate()
+        self.process.close()
 
     def ask(self, code: str) -> Any:
         """Have an expression evaluated, or a statement executed.
