@@ -28,9 +28,18 @@ _CSS = """body { margin: 0; background: #101418 }
 canvas { display: block; width: 100vw; height: 100vh }"""
 _POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
            "connect-src 'self'; base-uri 'none'")
+_LEFT_OUT = (
+    "WebUIOmniboxAimPopup", "WebUIOmniboxPopup",
+    "AimEnabled", "AvoidCorsURLLoaderRestartOnRedirect", "AvoidUnnecessaryBeforeUnloadCheckSync",
+    "DestroyProfileOnBrowserClose", "HttpsFirstBalancedModeAutoEnable", "HttpsUpgrades",
+    "LensOverlay", "MediaRouter", "NetworkTimeServiceQuerying", "OptimizationHints",
+    "PaintHolding", "PreconnectToSearch", "ThirdPartyStoragePartitioning")
+"""Features of Chromium. The first two are pages of the address bar, which it loads for each window,
+also where there is none to be seen: a second of work. The others are what Playwright leaves out,
+whose list this one takes the place of."""
 _ARGUMENTS = ("--no-sandbox", "--no-first-run", "--disable-background-networking",
               "--disable-component-update", "--use-angle=swiftshader",
-              "--enable-unsafe-swiftshader")
+              "--enable-unsafe-swiftshader", f"--disable-features={','.join(_LEFT_OUT)}")
 PLAIN_PAGES = "--disable-gpu-compositing"
 """The page around a face is put together without WebGL's software: a third less work. Chromium then
 warns that it reads the canvas back, so it is not for tests that count warnings of the viewer."""
