@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -43,27 +44,43 @@ def test_what_a_page_shows_runs(page, sensor):
 @pytest.mark.parametrize("page", HOW_TOS)
 def test_a_how_to_does_what_it_says(page, sensor, tmp_path):
     """In a copy of the code: files are made, rows are added, and what is shown then runs."""
-    copy = tmp_path / "copy"
-    copy.mkdir()
-    for name in ("capture", "recon", "service", "denseface", "tests", "docs", "script"):
-        # Compiled kernels too.
-        shutil.copytree(REPOSITORY / name, copy / name, symlinks=True,
-                        ignore=shutil.ignore_patterns("node_modules"))
-    shutil.copy(REPOSITORY / "pyproject.toml", copy)
-    for name in ("README.md", "fixtures"):
-        (copy / name).symlink_to(REPOSITORY / name)
+    copy = copied(tmp_path / "copy")
     with reader(copy, sensor) as (_, variables):
         blocks = snippets(REPOSITORY / page)
         assert any(block.language == "diff" for block in blocks), "ends in one row of a table"
         done = run_all(blocks, copy, variables | {"PYTHONPATH": str(copy)}, _TIMEOUT_S)
         assert done.returncode == 0, f"{page}: {done.stderr}{done.stdout}"
+
+
+def test_what_how_tos_add_obeys_the_rules_of_the_code(tmp_path):
+    """All at once: no rule is kept by an addition that it would not be kept without."""
+    copy = copied(tmp_path / "copy")
+    blocks = [block for page in HOW_TOS for block in snippets(REPOSITORY / page)
+              if block.file or block.language == "diff"]
+    assert len(blocks) > len(HOW_TOS)
+    variables = os.environ | {"PYTHONPATH": str(copy)}
+    with reader(copy, variables) as (_, variables):
+        done = run_all(blocks, copy, variables, _TIMEOUT_S)
+        assert done.returncode == 0, done.stderr
         checks = [Snippet("sh", """
             ruff check --no-cache capture recon service
             lint-imports --no-cache
             python -m pytest -q -p no:cacheprovider tests/unit/test_rooms.py
             """, 0)]
-        done = run_all(checks, copy, variables | {"PYTHONPATH": str(copy)}, _TIMEOUT_S)
-        assert done.returncode == 0, f"{page} leaves: {done.stderr}{done.stdout}"
+        done = run_all(checks, copy, variables, _TIMEOUT_S)
+        assert done.returncode == 0, f"how-tos leave: {done.stderr}{done.stdout}"
+
+
+def copied(copy: Path) -> Path:
+    """Copy the code, compiled kernels too."""
+    copy.mkdir()
+    for name in ("capture", "recon", "service", "denseface", "tests", "docs", "script"):
+        shutil.copytree(REPOSITORY / name, copy / name, symlinks=True,
+                        ignore=shutil.ignore_patterns("node_modules"))
+    shutil.copy(REPOSITORY / "pyproject.toml", copy)
+    for name in ("README.md", "fixtures"):
+        (copy / name).symlink_to(REPOSITORY / name)
+    return copy
 
 
 def test_a_failing_block_is_named_and_ends_what_runs(tmp_path):
