@@ -15,8 +15,12 @@ import psutil
 
 from denseface.service.cli import main
 from denseface.service.client import Client
+from denseface.service.errors import ServiceError
 from denseface.service.protocol.messages import Status
 from denseface.service.runtime.failpoints import FAILPOINTS_VARIABLE, TOKENS_VARIABLE
+from denseface.service.tools.status import ready_status
+from tests import nursery
+from tests.nursery import Forked
 from tests.waiting import LIMIT_S, PATIENCE, until
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -41,9 +45,8 @@ _SLOW = re.compile(
 
 def denseface(*arguments: object, **environment: str) -> "subprocess.CompletedProcess[str]":
     """Run one command to its end; its stderr is without what is said of a slow machine."""
-    done = subprocess.run(
-        [sys.executable, "-m", "denseface", *map(str, arguments)], cwd=REPOSITORY, check=False,
-        capture_output=True, text=True, timeout=1.5 * LIMIT_S, env=os.environ | environment)
+    done = nursery.run(["-m", "denseface", *arguments], cwd=REPOSITORY, timeout=1.5 * LIMIT_S,
+                       env=os.environ | environment)
     done.stderr = _SLOW.sub("", done.stderr)
     return done
 
@@ -58,6 +61,12 @@ def run_here(*arguments: object) -> "subprocess.CompletedProcess[str]":
         except SystemExit as exited:
             status = int(exited.code or 0)
     return subprocess.CompletedProcess(given, status, out.getvalue(), err.getvalue())
+
+
+def wait_ready(address: str) -> Status:
+    """Wait until a press would become a face, as `denseface status --wait` does."""
+    with Client(address) as client:
+        return ready_status(client, LIMIT_S)
 
 
 @dataclass
@@ -121,8 +130,10 @@ def service(
         running = Service(process, address, data, log)
         try:
             if ready:
-                waited = running.run("status", "--wait", LIMIT_S)
-                assert waited.returncode == 0, waited.stderr + log.read_text()
+                try:
+                    wait_ready(address)
+                except ServiceError as error:
+                    raise AssertionError(f"{error}\n{log.read_text()}") from error
             yield running
         finally:
             if process.poll() is None:
@@ -146,9 +157,8 @@ def hub_alone(address: str, data: Path, *arguments: str) -> Iterator[Path]:
     """Run `denseface hub`, give its log, and stop it in order."""
     log = data.with_suffix(".log")
     with log.open("w") as stderr:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "denseface", "hub", "--address", address, "--data", str(data),
-             *arguments], cwd=REPOSITORY, stderr=stderr)
+        process = Forked(["-m", "denseface", "hub", "--address", address, "--data", data,
+                          *arguments], cwd=REPOSITORY, stderr=stderr)
     try:
         yield log
     finally:

@@ -10,7 +10,7 @@ import zmq
 
 from denseface.service.protocol.status import Restarts
 from denseface.service.runtime.failpoints import FAILPOINTS_VARIABLE, TOKENS_VARIABLE
-from tests.system.running import RECORDINGS, Service, service
+from tests.system.running import RECORDINGS, Service, service, wait_ready
 from tests.waiting import LIMIT_MS, LIMIT_S, PATIENCE, until
 
 _LIMIT_S = 2 * PATIENCE
@@ -61,8 +61,7 @@ def test_whoever_is_stopped_is_replaced(up, name, row):
     stopped = one_of(up, name)
     stopped.suspend()
     until(lambda: not stopped.is_running())
-    waited = up.run("status", "--wait", LIMIT_S)
-    assert waited.returncode == 0, waited.stderr
+    wait_ready(up.address)
     press_gives_a_face(up, f"after-{name}")
     assert until(lambda: up.status().restarts.get(row)).hung >= 1
     assert f"{row} hung " in up.run("status").stdout

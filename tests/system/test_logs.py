@@ -15,7 +15,7 @@ import pytest
 
 from denseface.service.protocol import messages
 from tests.system.guarded import FRAME, FRAME_ARRAYS, Peer, guarded_hub
-from tests.system.running import PACE, RECORDINGS, REPOSITORY, denseface
+from tests.system.running import PACE, RECORDINGS, REPOSITORY, denseface, wait_ready
 from tests.waiting import LIMIT_S, until
 
 _PIPE_BYTES = 4096
@@ -89,8 +89,7 @@ def test_a_service_whose_log_is_broken_makes_faces_and_stops_in_order(how, tmp_p
              "--source", str(RECORDINGS / "frontal_700.oni"), "--data", str(tmp_path / "data")],
             cwd=REPOSITORY, stderr=stderr, env=os.environ | PACE)
         try:
-            waited = denseface("status", "--wait", LIMIT_S, "--address", address)
-            assert waited.returncode == 0, waited.stderr
+            wait_ready(address)
             pressed = denseface("press", "--address", address)
             assert pressed.returncode in (0, 1), pressed.stderr
             status = json.loads(denseface("status", "--json", "--address", address).stdout)
@@ -186,9 +185,9 @@ def test_a_log_without_ids_names_no_capture_in_any_process(tmp_path):
              "--source", str(RECORDINGS / "frontal_700.oni"), "--data", str(tmp_path / "data")],
             cwd=REPOSITORY, stderr=stderr, env=os.environ | PACE | {"DENSEFACE_LOG_IDS": "off"})
         try:
-            for command in (("status", "--wait", LIMIT_S), ("press", "--id", "Visitor-17")):
-                done = denseface(*command, "--address", address)
-                assert done.returncode == 0, done.stderr
+            wait_ready(address)
+            pressed = denseface("press", "--id", "Visitor-17", "--address", address)
+            assert pressed.returncode == 0, pressed.stderr
         finally:
             process.terminate()
             assert process.wait(LIMIT_S) == 0
