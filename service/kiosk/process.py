@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import structlog
 from starlette.routing import Route
@@ -21,7 +21,6 @@ from denseface.service.kiosk.conductor.hub_watch import watch_hub
 from denseface.service.kiosk.conductor.kept_withdrawals import KeptWithdrawals
 from denseface.service.kiosk.conductor.measuring import prepare
 from denseface.service.kiosk.consent_text import load_consent_text
-from denseface.service.kiosk.links.links import links_of
 from denseface.service.kiosk.operator.opening import operator_routes
 from denseface.service.kiosk.page_messages import Hello
 from denseface.service.kiosk.settings import KioskSettings
@@ -35,6 +34,9 @@ from denseface.service.runtime.watching.service_manager import ServiceManager
 from denseface.service.runtime.watching.supervisor_link import SupervisorLink
 from denseface.service.settings import ServiceSettings
 from denseface.version import VERSION
+
+if TYPE_CHECKING:
+    from denseface.service.kiosk.links.links import Links
 
 __all__ = ["run", "visit_options"]
 
@@ -84,7 +86,7 @@ async def _run(service: ServiceSettings, settings: KioskSettings, options: Visit
                   version=f"{VERSION}-{files.digest[:12]}")
     with closing(AsyncOperator(service.address, key=service.key, hub_key=service.hub_key)) as hub:
         kiosk = Kiosk(options, new_id=lambda: secrets.token_hex(16), utc=_utc)
-        links = links_of(settings, hub.get)
+        links = _links(settings, hub)
         conductor = Conductor(
             kiosk, hub, kept, ConductorOptions(hello, settings.sensor, settings.measurements),
             links)
@@ -129,6 +131,16 @@ async def _serve_page(
     _log.info("the page for visitors", url=url)
     await serve(kiosk_app(conductor.page, origins, files, routes, asks_consent=settings.consent),
                 bound, tls, served=lambda: manager.ready(f"serves the page at {url}"))
+
+
+def _links(settings: KioskSettings, hub: AsyncOperator) -> "Links | None":
+    """Give the links to faces; None where they are off. Raises SettingsError."""
+    if settings.lan is None:
+        return None
+    # With what knows this machine's addresses and draws QR codes.
+    from denseface.service.kiosk.links.links import links_of
+
+    return links_of(settings, hub.get)
 
 
 async def _no_links(_: str) -> None:

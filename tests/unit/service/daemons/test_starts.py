@@ -17,7 +17,7 @@ LOADS = {
     "denseface.service.daemons.hub": {"cv2", *DRAWS_PAGES, *COMPUTES},
     "denseface.service.daemons.capture": {"sqlite3", "primesense", *DRAWS_PAGES, *COMPUTES},
     "denseface.service.daemons.worker": {"sqlite3", *DRAWS_PAGES},
-    "denseface.service.kiosk.process": {"sqlite3", *COMPUTES},
+    "denseface.service.kiosk.process": {"sqlite3", "psutil", "segno", *COMPUTES},
 }
 """Module -> what it is to do without until somebody asks for that."""
 
