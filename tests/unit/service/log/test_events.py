@@ -1,12 +1,10 @@
 """The log: lines that a program can read, without image data."""
 
 import json
-import logging
 import math
 import re
 import subprocess
 import sys
-import threading
 
 import numpy as np
 import pytest
@@ -23,17 +21,6 @@ def lines(text):
         raise ValueError(word)
 
     return [json.loads(line, parse_constant=strict) for line in text.splitlines()]
-
-
-@pytest.fixture(autouse=True)
-def _as_before(monkeypatch):
-    for module, name in ((sys, "excepthook"), (sys, "unraisablehook"), (threading, "excepthook"),
-                         (sys, "stderr")):
-        monkeypatch.setattr(module, name, getattr(module, name))
-    before = logging.root.handlers[:]
-    yield
-    logging.root.handlers[:] = before
-    structlog.reset_defaults()
 
 
 @pytest.fixture
