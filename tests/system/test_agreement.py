@@ -52,10 +52,15 @@ def test_each_fault_is_found(name, fault):
         assert measure_agreement(mended).verdict is Verdict.AGREES
 
 
+@cache
+def moved_by(x_mm):
+    scene = Scene((Person("procedural", 750, offset_mm=(x_mm, 0)),), decor=41)
+    return simulate(scene, KINECT_DEFAULT, seed=5)[0].frame
+
+
 @pytest.mark.parametrize("moved_mm", [-40, 30])
 def test_colour_of_another_moment_is_warned_of(moved_mm):
-    then, now = (simulate(Scene((Person("procedural", 750, offset_mm=(x, 0)),), decor=41),
-                          KINECT_DEFAULT, seed=5)[0].frame for x in (0, moved_mm))
+    then, now = moved_by(0), moved_by(moved_mm)
     assert measure_agreement(now).verdict is Verdict.AGREES
     found = measure_agreement(replace(then, color=now.color))
     assert found.verdict is Verdict.DOUBTFUL

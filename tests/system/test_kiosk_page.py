@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 from denseface.service.kiosk.page_messages import FromPage
 from tests.kiosk_states import LANGUAGES, STATES, VECTORS, States, serving
 from tests.system.running import REPOSITORY
-from tests.viewer_page import PLAIN_PAGES, software_browser
+from tests.viewer_page import KEEPS_PICTURES, PLAIN_PAGES, software_browser
 from tests.waiting import LIMIT_MS, until
 
 _SIZES = [(800, 480), (480, 800), (1280, 800)]
@@ -23,7 +23,7 @@ _ALIKE = {"position_right", "position_up", "position_down", "position_closer", "
 _SEEN = [name for name in STATES if name not in _ALIKE]
 _KEPT = {"de", "ar"}
 _PICTURES = REPOSITORY / "out" / "kiosk" / "states"
-"""Where screenshots of every state are kept, for those who look at them."""
+"""Where screenshots of every state are kept: see `KEEPS_PICTURES`."""
 _EXPECTED = ("WebSocket connection to", "a face cannot be shown FaceGridError", "[.WebGL-")
 """What a browser's console may say: of a server that is gone, a damaged face, slow rendering."""
 _AXE = REPOSITORY / "service/kiosk/frontend/node_modules/axe-core/axe.min.js"
@@ -114,7 +114,8 @@ def shown(context: BrowserContext) -> Iterator[tuple[Page, States]]:
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_nothing_is_cut_or_hidden_at_any_size(context, language):
-    _PICTURES.mkdir(parents=True, exist_ok=True)
+    if KEEPS_PICTURES:
+        _PICTURES.mkdir(parents=True, exist_ok=True)
     with serving(languages=(language, *(each for each in LANGUAGES if each != language))) as states:
         page = _open(context, states)
         faults = []
@@ -125,7 +126,7 @@ def test_nothing_is_cut_or_hidden_at_any_size(context, language):
             for width, height in _SIZES:
                 page.set_viewport_size({"width": width, "height": height})
                 faults += [f"{name} {width}x{height}: {fault}" for fault in page.evaluate(_LAYOUT)]
-                if language in _KEPT and (width, height) == _SIZES[-1]:
+                if KEEPS_PICTURES and language in _KEPT and (width, height) == _SIZES[-1]:
                     page.screenshot(path=_PICTURES / f"{name}_{language}_{width}x{height}.png")
         assert faults == []
 

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from denseface.capture.live.clock import TRANSPORT_S
 from tests.system.watched_sensor import Watched
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.control import Control, DeviceState, Format, Mode, OpenFault, Stamps
@@ -234,7 +235,9 @@ def test_stamps_of_any_kind_give_no_old_frame(control, sensor, stamps):
     control.depth.stamps = control.color.stamps = stamps
     sensor.wait_state("streaming")
     presses = sensor.presses(20)
-    assert not stale(presses)
+    # A busy machine delivers later than any sensor does, and such stamps do not tell.
+    assert not [press for press in stale(presses)
+                if press["latest_s"] - min(press["exposed_s"]) <= TRANSPORT_S]
     known = {Stamps.NONE: "arrival"}.get(stamps, "stamps")
     if sensor.ask("figures")["clock_jumps"]:
         # Of a busy machine that delivered two frames at once, by whose stamps time jumped.

@@ -8,7 +8,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.operator_states import Operated, serving_operator
 from tests.system.running import REPOSITORY
-from tests.viewer_page import PLAIN_PAGES, software_browser
+from tests.viewer_page import KEEPS_PICTURES, PLAIN_PAGES, software_browser
 from tests.waiting import LIMIT_MS, until
 
 AXE = REPOSITORY / "service/kiosk/frontend/node_modules/axe-core/axe.min.js"
@@ -65,7 +65,8 @@ def log_in(page: Page, operated: Operated) -> None:
 
 def check(page: Page, pictures: Path, name: str) -> None:
     """Look at a state: nobody is kept out of it, nothing lies beyond the edge."""
-    page.screenshot(path=pictures / f"{name}.png", full_page=True)
+    if KEEPS_PICTURES:
+        page.screenshot(path=pictures / f"{name}.png", full_page=True)
     page.evaluate(AXE.read_text())
     found = page.evaluate(f"axe.run(document, {RULES})")["violations"]
     assert [(one["id"], [node["html"] for node in one["nodes"]]) for one in found] == []

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
 
 from tests.system.running import REPOSITORY
-from tests.viewer_page import PLAIN_PAGES, software_browser
+from tests.viewer_page import KEEPS_PICTURES, PLAIN_PAGES, software_browser
 from tests.waiting import LIMIT_MS
 
 __all__ = ["Visitor", "chromium", "visiting"]
@@ -17,7 +17,7 @@ __all__ = ["Visitor", "chromium", "visiting"]
 _AXE = REPOSITORY / "service/kiosk/frontend/node_modules/axe-core/axe.min.js"
 _TAGS = ["wcag2a", "wcag2aa", "wcag21aa", "wcag22aa"]
 _PICTURES = REPOSITORY / "out" / "kiosk"
-"""Where screenshots of every state are kept."""
+"""Where screenshots of every state are kept: see `KEEPS_PICTURES`."""
 _RUN_AXE = """(tags) => axe.run(document, {runOnly: {type: "tag", values: tags}}).then((found) =>
   found.violations.map((one) => `${one.id}: ${one.nodes.map((node) => node.html).join(" ")}`))"""
 _TARGETS = """() => [...document.querySelectorAll("button, input, a")].map((one) => {
@@ -100,15 +100,16 @@ class Visitor:
         raise AssertionError(f"{action} is not reached by Tab")
 
     def picture(self, state: str) -> None:
-        """Keep a screenshot, when what fades in has done so."""
+        """Wait until what fades in has done so, and keep a screenshot if they are kept."""
         self.page.evaluate(
             "() => Promise.allSettled(document.getAnimations().filter((one) =>"
             " one.effect?.getComputedTiming().endTime < 5000).map((one) => one.finished))")
-        _PICTURES.mkdir(parents=True, exist_ok=True)
-        self.page.screenshot(path=_PICTURES / f"{self.name}_{state}.png", timeout=LIMIT_MS)
+        if KEEPS_PICTURES:
+            _PICTURES.mkdir(parents=True, exist_ok=True)
+            self.page.screenshot(path=_PICTURES / f"{self.name}_{state}.png", timeout=LIMIT_MS)
 
     def check(self, state: str) -> None:
-        """Keep a screenshot; no rule of WCAG is broken, no target small, nothing cut off."""
+        """Keep a picture; no rule of WCAG is broken, no target small, nothing cut off."""
         self.picture(state)
         if self.axe:
             if not self.page.evaluate("() => 'axe' in window"):
