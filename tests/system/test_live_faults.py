@@ -203,7 +203,7 @@ def test_streams_of_any_rate_are_paired_by_the_nearest_exposure(
         since_s = min(depth_s, color_s) - 1.2 / min(depth_fps, color_fps)
         if press["skew_known_by"] == "stamps" and all(
                 b - a < 1.5 / fps for kind, fps in (("depth", depth_fps), ("color", color_fps))
-                for a, b in pairwise(press["arrived_s"][kind]) if a > since_s):
+                for a, b in pairwise(press["arrived_s"][kind]) if b > since_s):
             seen += 1
             assert abs(depth_s - color_s) < 1.06 * apart_s + 1e-3
             assert press["skew_us"] / 1e6 == pytest.approx(depth_s - color_s, abs=1e-3)
