@@ -4,6 +4,7 @@ import inspect
 import os
 import signal
 import sys
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import settings
@@ -57,3 +58,11 @@ def pytest_itemcollected(item: pytest.Item) -> None:
         seconds, = mark.args
         item.add_marker(pytest.mark.timeout(seconds * PATIENCE), append=False)
         break
+
+
+@pytest.fixture
+def heard_sighup() -> Iterator[None]:
+    """Have SIGHUP heard where the tests were started by `nohup`."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)

@@ -38,6 +38,7 @@ finally:
 """`denseface`, interrupted at one of its steps."""
 
 
+@pytest.mark.usefixtures("heard_sighup")
 @pytest.mark.parametrize(("number", "kind", "status"), ANSWERS)
 def test_a_signal_is_raised_and_handlers_are_as_before(number, kind, status):
     before = signal.getsignal(number)

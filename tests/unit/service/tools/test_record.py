@@ -104,6 +104,7 @@ def test_frames_that_come_faster_than_they_can_be_written_are_counted(
     assert "were lost; as long as asked for" in said
 
 
+@pytest.mark.usefixtures("heard_sighup")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_before_the_first_frame(folder, tmp_path, monkeypatch, capsys, number):
     (folder / "0.npz").rename(folder / "late")
