@@ -20,8 +20,7 @@ __all__ = [
     "FrameTooLargeError", "HubRunningError", "KeyFileError", "KeyRefusedError",
     "LocalProtocolError", "PressRefusedError", "ProtocolError", "RemoteProtocolError",
     "RequestFailedError", "ServiceError", "SettingsError", "StoreError", "UnknownCaptureError",
-    "UsageError", "first_error", "in_one_line", "is_full",
-    "reason_of",
+    "UsageError", "first_error", "in_one_line", "is_full", "reason_of",
 ]
 
 
