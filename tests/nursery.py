@@ -24,7 +24,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import IO, Any
 
-__all__ = ["Forked", "run"]
+__all__ = ["Forked", "die_with_the_parent", "run"]
 
 _ROOT = Path(__file__).resolve().parents[1]
 _PRELOADED = (
@@ -228,7 +228,7 @@ def _serve(given: socket.socket) -> dict[str, Any]:
 
 def _keep(wanted: dict[str, Any], files: list[int]) -> None:
     """Fork once more, and say the process's id and its end; returns in the process itself."""
-    _die_with_the_parent()
+    die_with_the_parent()
     *files, answers = files
     keeper = os.getpid()
     child = os.fork()
@@ -243,7 +243,7 @@ def _keep(wanted: dict[str, Any], files: list[int]) -> None:
         with contextlib.suppress(OSError):  # nobody asks any more
             os.write(answers, b"%d\n" % status)
         os._exit(0)
-    _die_with_the_parent()
+    die_with_the_parent()
     if os.getppid() != keeper:
         os._exit(1)
     os.close(answers)
@@ -256,7 +256,8 @@ def _keep(wanted: dict[str, Any], files: list[int]) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def _die_with_the_parent() -> None:
+def die_with_the_parent() -> None:
+    """Have the kernel send SIGKILL to this process when the one that forked it is gone."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
 
 

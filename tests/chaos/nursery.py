@@ -12,9 +12,9 @@ import sys
 import traceback
 from typing import NoReturn
 
-__all__: list[str] = []
+from tests.nursery import die_with_the_parent
 
-_PR_SET_PDEATHSIG = 1
+__all__: list[str] = []
 
 
 def _main() -> None:
@@ -46,7 +46,7 @@ def _become(wanted: dict[str, object]) -> NoReturn:
     """Be `denseface ARGUMENTS` in a group of its own, until the nursery dies."""
     status = 1
     try:
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        die_with_the_parent()
         os.setpgid(0, 0)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         signal.signal(signal.SIGINT, signal.default_int_handler)

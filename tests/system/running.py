@@ -31,6 +31,7 @@ PACE = {"DENSEFACE_HEARTBEAT_S": "0.2", "DENSEFACE_LIVENESS": f"{min(15 * PATIEN
 
 
 _STOP = "worker.job.computing"
+"""Where a worker stops once for each file of this name beside the service's data."""
 
 
 def stopping(data: Path) -> dict[str, str]:
@@ -103,9 +104,10 @@ class Service:
         return worker
 
     def stop_worker_amid_a_job(self) -> psutil.Process:
-        """Have the only worker stop itself at its next job, and give it; once, of `stopping`.
+        """Have the only worker stop itself at its next job, and give it.
 
-        Stopped before, it could be gone for the hub before it is sent one.
+        The service has the environment of `stopping`. Stopped by the test before the job, the
+        worker could be gone for the hub by then.
         """
         worker = self.worker()
         (self.data.parent / _STOP).touch()
