@@ -10,6 +10,7 @@ import pytest
 from hypothesis import settings
 
 from denseface.service.client import AsyncClient, Client, Operator
+from tests import stuck
 from tests.waiting import PATIENCE, SERVICE
 
 # No time limit for one example: a machine that is busy for a moment proves nothing. The same
@@ -45,6 +46,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """Let a slow machine take longer for a test; who names --timeout means it."""
     if config.option.timeout is None:
         config.option.timeout = float(config.getini("timeout")) * PATIENCE
+    config.pluginmanager.register(stuck)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

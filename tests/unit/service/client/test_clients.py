@@ -260,7 +260,9 @@ def test_of_several_sensors_the_one_that_is_asked_for_is_followed(hub, kind):
             return await first
 
     assert run(main()).sensor == "s"
-    with Client(hub.address) as client, closing(getattr(client, kind)(sensor="o")) as following, \
+    hub.wait(lambda: hub.subscribers(topic) == 0)  # the first is gone: the one below is the second
+    with Client(hub.address) as client, \
+            closing(getattr(client, kind)(sensor="o", timeout=LIMIT_S)) as following, \
             ThreadPoolExecutor() as pool:
         first = pool.submit(next, following)
         hub.wait(lambda: hub.subscribers(topic) == 1)
