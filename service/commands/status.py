@@ -36,9 +36,9 @@ def _tell_health(args: argparse.Namespace) -> int:
         raise UsageError("--healthy: expected neither --json nor --wait with it")
     if args.healthy == "kiosk":
         from denseface.service.commands._options.kiosk import kiosk_settings
-        from denseface.service.kiosk.answering import why_silent
+        from denseface.service.kiosk.answering import ask
 
-        ailment = why_silent(kiosk_settings(args))
+        ailment = ask(kiosk_settings(args)).ailment
     else:
         from denseface.service.tools.healthy import what_ails
 

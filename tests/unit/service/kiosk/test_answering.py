@@ -7,14 +7,15 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
 
-from denseface.service.kiosk.answering import why_silent
+from denseface.service.kiosk.answering import Answer, ask
 from denseface.service.kiosk.settings import KioskSettings
 from tests.ports import free_port
+from tests.unit.service.kiosk.links.certificate_files import make_certificate
 
 
 @contextmanager
-def answering(status, body):
-    """Answer so; gives the address, and the hosts that were asked for."""
+def answering(status, body, tls=None):
+    """Answer so; gives the port, and the hosts that were asked for."""
     hosts = []
 
     class Handler(BaseHTTPRequestHandler):
@@ -28,6 +29,8 @@ def answering(status, body):
             """Say nothing."""
 
     server = HTTPServer(("127.0.0.1", 0), Handler)
+    if tls:
+        server.socket = tls.wrap_socket(server.socket, server_side=True)
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
     thread.start()
     try:
@@ -40,25 +43,38 @@ def answering(status, body):
 
 def test_one_that_serves():
     with answering(200, b'{"serving": true, "consent": true}') as (port, hosts):
-        assert why_silent(KioskSettings(address=("127.0.0.1", port))) == ""
+        assert ask(KioskSettings(address=("127.0.0.1", port))) == Answer("", asks_consent=True)
         # Every address of a container: asked on its loopback, by a name that the page knows.
-        assert why_silent(KioskSettings(address=("0.0.0.0", port),  # noqa: S104
-                                        proxy=("http://localhost:1",))) == ""
+        assert not ask(KioskSettings(address=("0.0.0.0", port),  # noqa: S104
+                                     proxy=("http://localhost:1",))).ailment
     assert hosts[0] == f"127.0.0.1:{port}"
     assert hosts[1] in (f"127.0.0.1:{port}", "localhost:1")
+
+
+def test_one_with_a_certificate_for_the_name_that_visitors_use(tmp_path):
+    make_certificate(tmp_path, "page")
+    files = {"certificate": tmp_path / "page.pem", "key": tmp_path / "page.key"}
+    tls = KioskSettings(**files).tls()
+    with answering(200, b'{"serving": true, "consent": false}', tls) as (port, _):
+        assert ask(KioskSettings(address=("127.0.0.1", port), **files)) == Answer(
+            "", asks_consent=False)
 
 
 @pytest.mark.parametrize(("status", "body", "why"), [
     (403, b"", "answers with status 403"), (200, b"hello", "what answers there is no kiosk"),
     (200, b"[]", "what answers there is no kiosk"),
+    (200, b"\xff", "what answers there is no kiosk"),
+    (200, b'{"serving": true, "consent": "maybe"}', "what answers there is no kiosk"),
     (200, b'{"serving": false}', "what answers there is no kiosk")])
 def test_what_is_no_kiosk(status, body, why):
     with answering(status, body) as (port, _):
-        assert why_silent(KioskSettings(address=("127.0.0.1", port))) == (
-            f"http://127.0.0.1:{port}: {why}")
+        assert ask(KioskSettings(address=("127.0.0.1", port))) == Answer(
+            f"http://127.0.0.1:{port}: {why}", another=True)
 
 
 def test_nobody():
     address = "127.0.0.1", free_port()
-    assert why_silent(KioskSettings(address=address)).endswith(": Connection refused")
-    assert re.search("any free port", why_silent(KioskSettings(address=("127.0.0.1", 0))))
+    nobody = ask(KioskSettings(address=address))
+    assert nobody.ailment.endswith(": Connection refused")
+    assert not nobody.another
+    assert re.search("any free port", ask(KioskSettings(address=("127.0.0.1", 0))).ailment)
