@@ -255,7 +255,7 @@ def save_frame(
             arrays[name] = np.array(text[:_MAX_LINE])
     data = io.BytesIO()
     (np.savez if quickly else np.savez_compressed)(data, allow_pickle=False, **arrays)
-    write_whole(path, [data.getbuffer()], mode=mode, synced=not quickly)
+    write_whole(path, [data.getvalue()], mode=mode, synced=not quickly)
 
 
 def _rounding(text: str) -> DepthRounding:
