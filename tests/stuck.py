@@ -27,18 +27,31 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[_stderr] = os.dup(2)
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Have so much time for what is undone only now, after an error within pytest.
+
+    A time-out leads to one that comes while pytest writes down how a test failed.
+    """
+    _end_in(session.config, float(session.config.option.timeout))
+
+
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Give it back."""
+    faulthandler.cancel_dump_traceback_later()
     os.close(config.stash[_stderr])
+
+
+def _end_in(config: pytest.Config, seconds: float) -> None:
+    if seconds:
+        faulthandler.dump_traceback_later(
+            seconds + MORE_S, exit=True, file=config.stash[_stderr])
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def _ended_in_time(item: pytest.Item) -> Generator[None, object, object]:
     mark = item.get_closest_marker("timeout")
-    seconds = float(mark.args[0] if mark else item.config.option.timeout)
-    if seconds:
-        faulthandler.dump_traceback_later(
-            seconds + MORE_S, exit=True, file=item.config.stash[_stderr])
+    _end_in(item.config, float(mark.args[0] if mark else item.config.option.timeout))
     try:
         return (yield)
     finally:

@@ -30,6 +30,11 @@ def test_that_waits():
     for _ in range(2):
         ctypes.PyDLL(None).pthread_mutex_lock(mutex)
 """
+_AFTER_AN_ERROR_WITHIN_PYTEST = """
+def pytest_runtest_makereport(call):
+    if call.when == "call":
+        raise TimeoutError
+"""
 _PYTEST = """
 import sys, pytest, tests.stuck
 tests.stuck.MORE_S = -57.0
@@ -42,11 +47,13 @@ sys.exit(77)
 
 def test_whatever_waits_for_ever_is_ended_and_where_is_said(tmp_path):
     running = []
-    for number, test in enumerate(
-            [_BY_A_THREAD, _IN_WHAT_IS_UNDONE, _WITH_THE_INTERPRETER_LOCKED]):
+    for number, (test, hooks) in enumerate([
+            (_BY_A_THREAD, ""), (_IN_WHAT_IS_UNDONE, ""), (_WITH_THE_INTERPRETER_LOCKED, ""),
+            (_IN_WHAT_IS_UNDONE, _AFTER_AN_ERROR_WITHIN_PYTEST)]):
         file = tmp_path / str(number) / "test_of_others.py"
         file.parent.mkdir()
         file.write_text(_HEAD + test)
+        (file.parent / "conftest.py").write_text(_HEAD + hooks)
         running.append(subprocess.Popen(
             [sys.executable, "-c", _PYTEST, file.parent], text=True, stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE))
