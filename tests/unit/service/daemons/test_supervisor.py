@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 import threading
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ from denseface.service.daemons._watched_process import (
 )
 from denseface.service.daemons.supervisor import Supervisor, process_table
 from tests.system.running import RECORDINGS
-from tests.waiting import LIMIT_S, PATIENCE, until
+from tests.waiting import LIMIT_S, until
 
 _WATCHED = "denseface.service.daemons._watched_process"
 
@@ -25,8 +26,23 @@ _WATCHED = "denseface.service.daemons._watched_process"
 def run_in_turn(tmp_path, monkeypatch):
     """Have a supervisor run one program after the other in place of `denseface`; give its status.
 
-    In each, `say` says a sign of life, and `kill` sends a signal to itself.
+    In each, `say` says a sign of life, and `kill` sends a signal to itself. However long this
+    machine takes to start it, time passes where it says so: a look of the supervisor's at
+    `look()`, and all of them from `looks_on()` until its end.
     """
+    waiting, looks = tmp_path / "waiting", tmp_path / "looks"
+    waiting.mkdir()
+    looks.touch()
+    waited = 0.0
+
+    def told_time():
+        nonlocal waited
+        waited += any(Path("/proc", one.name).exists() for one in waiting.iterdir())
+        return waited + looks.stat().st_size
+
+    monkeypatch.setattr("denseface.service.daemons.supervisor.AttendedClock",
+                        partial(AttendedClock, clock=told_time))
+
     def run(*programs, hang_timeout_s=60.0):
         fake = tmp_path / "fake"
         fake.write_text("\n".join([
@@ -34,6 +50,8 @@ def run_in_turn(tmp_path, monkeypatch):
             f"turn = os.open({str(tmp_path / 'turn')!r}, os.O_CREAT | os.O_WRONLY | os.O_APPEND)",
             "os.write(turn, b'.')",
             "def say(beat): os.write(int(os.environ['DENSEFACE_SUPERVISOR']), beat)",
+            f"def look(): open({str(looks)!r}, 'a').write('.')",
+            f"def looks_on(): open({str(waiting)!r} + f'/{{os.getpid()}}', 'x')",
             "def kill(number): os.kill(os.getpid(), number)",
             f"exec({programs!r}[os.fstat(turn).st_size - 1])"]))
         fake.chmod(0o700)
@@ -156,24 +174,23 @@ def test_a_package_of_our_name_in_the_working_directory_is_not_run(tmp_path, mon
     assert Supervisor([ProcessSpec("x", ("no-such-command",))]).run() == 2
 
 
-HANGS = "say(b'i'); kill(signal.SIGSTOP)"
+HANGS = "say(b'i'); looks_on(); kill(signal.SIGSTOP)"
 DIES_AT_WORK = "say(b'i'); say(b'h'); kill(signal.SIGKILL)"
 DIES = "say(b'h'); say(b'i'); kill(signal.SIGKILL)"
 ENOUGH = "os._exit(2)"
 
 
 def test_what_hangs_is_killed_and_started_again(run_in_turn, capsys):
-    assert run_in_turn(HANGS, "say(b'h'); time.sleep(600)", ENOUGH,
-                       hang_timeout_s=0.4 * PATIENCE) == 2
+    assert run_in_turn(HANGS, "say(b'h'); looks_on(); time.sleep(600)", ENOUGH,
+                       hang_timeout_s=0.4) == 2
     said = capsys.readouterr().out
     assert said.count("hangs, killed") == 2
     assert said.count("reason=hung") == 2
 
 
 def test_who_says_that_it_lives_is_left_alone(run_in_turn):
-    lives = "\n".join([f"for _ in range({60 * PATIENCE:.0f}):", " say(b'i'); time.sleep(0.02)",
-                       ENOUGH])
-    assert run_in_turn(lives, "os._exit(3)", hang_timeout_s=0.4 * PATIENCE) == 2
+    lives = f"for _ in range(60):\n say(b'i'); look(); time.sleep(0.02)\n{ENOUGH}"
+    assert run_in_turn(lives, "os._exit(3)", hang_timeout_s=0.4) == 2
 
 
 def test_death_at_work_is_no_storm(run_in_turn, monkeypatch):
@@ -232,7 +249,7 @@ def test_who_does_nothing_hangs_from_the_start(starting):
 
 
 def test_what_is_stopped_before_its_first_word_is_replaced(run_in_turn, capsys):
-    assert run_in_turn("kill(signal.SIGSTOP)", ENOUGH, hang_timeout_s=0.4 * PATIENCE) == 2
+    assert run_in_turn("looks_on(); kill(signal.SIGSTOP)", ENOUGH, hang_timeout_s=0.4) == 2
     assert "hangs, killed" in capsys.readouterr().out
 
 
