@@ -21,6 +21,12 @@ from tests.unit import frames
 from tests.waiting import LIMIT_S, until
 
 
+@pytest.fixture(autouse=True)
+def _patient(monkeypatch):
+    """Whose reader takes long to end ends its process, which is this one."""
+    monkeypatch.setattr(_recording, "_CLOSING_S", LIMIT_S)
+
+
 @pytest.fixture
 def folder(tmp_path):
     folder = tmp_path / "shown"
