@@ -3,6 +3,7 @@
 import os
 import sys
 import threading
+from contextlib import suppress
 from types import SimpleNamespace
 
 import pytest
@@ -11,7 +12,7 @@ from denseface.service.runtime.terminal import _lines, complain, say
 from denseface.service.tools.batch.row import Row
 from denseface.service.tools.batch.summary import progress
 from denseface.service.tools.batch.summary.progress import BatchProgress, Rate
-from tests.waiting import until
+from tests.waiting import LIMIT_S, until
 
 FACE = Row(source="a", frame=0, state="face")
 NONE = Row(source="a", frame=1, state="no_face", why="nobody")
@@ -74,6 +75,18 @@ def test_where_no_line_can_move_there_is_a_plain_one_now_and_then(monkeypatch, c
 def test_on_a_terminal_a_bar_moves_below_what_is_said_and_is_gone_at_the_end(monkeypatch, capsys):
     ours, theirs = os.openpty()
     terminal = os.fdopen(theirs, "w", encoding="utf-8")
+    shown = []
+
+    def look():
+        with suppress(OSError):  # it is closed
+            while True:
+                shown.append(os.read(ours, 4096))
+
+    def seen():
+        return b"".join(shown).decode(errors="replace")
+
+    looking = threading.Thread(target=look, daemon=True)
+    looking.start()
     monkeypatch.setattr(sys, "stderr", terminal)
     for name in ("TERM", "COLUMNS"):
         monkeypatch.setenv(name, {"TERM": "xterm", "COLUMNS": "120"}[name])
@@ -82,22 +95,19 @@ def test_on_a_terminal_a_bar_moves_below_what_is_said_and_is_gone_at_the_end(mon
     monkeypatch.setattr(progress, "sys", stderr)
     with BatchProgress(4) as line:
         line.add(NONE)
-        seen = os.read(ours, 4096).decode()
-        while "1 without a face" not in seen:
-            seen += os.read(ours, 4096).decode()
+        until(lambda: "1 without a face" in seen())
         complain("a.oni, frame 3: cannot be read")
         say("a result")
         line.add(FACE)
-        after = os.read(ours, 4096).decode()
-        while "2 of 4 frames" not in after.rpartition("cannot be read")[2]:
-            after += os.read(ours, 4096).decode()
+        until(lambda: "2 of 4 frames" in seen().rpartition("cannot be read")[2])
     terminal.close()
-    assert "━" in seen
-    assert "a.oni, frame 3: cannot be read\r\n" in after
-    assert "a result" not in after
-    assert capsys.readouterr().out == "a result\n"
-    rest = os.read(ours, 4096).decode()
+    looking.join(LIMIT_S)
     os.close(ours)
-    assert rest.rstrip("\r\n").endswith("\x1b[2K")  # its last line is empty
+    before, _, after = seen().partition("a.oni, frame 3: cannot be read\r\n")
+    assert "━" in before
+    assert after
+    assert "a result" not in seen()
+    assert capsys.readouterr().out == "a result\n"
+    assert after.rstrip("\r\n").endswith("\x1b[2K")  # its last line is empty
     assert _lines._aside is not None
     complain("after")  # nothing of the bar is left that would step aside

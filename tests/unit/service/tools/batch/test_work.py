@@ -18,6 +18,7 @@ from denseface.service.tools.batch.row import Row
 from denseface.service.tools.batch.worker import making, work
 from denseface.service.tools.batch.worker.words import WORDS, last_words
 from denseface.service.tools.frames import FrameChoice
+from tests.waiting import LIMIT_S
 
 ROOT = Path(__file__).resolve().parents[5]
 FRONTAL = ROOT / "fixtures" / "recorded_oni" / "frontal_700.oni"
@@ -229,7 +230,7 @@ SAYING = """
 import ctypes, os, sys
 from pathlib import Path
 from denseface.service.tools.batch.worker.words import LastWords
-with LastWords(Path(sys.argv[1])).about("s.oni", 3, "in/s.oni/00003", 0.2):
+with LastWords(Path(sys.argv[1])).about("s.oni", 3, "in/s.oni/00003", float(sys.argv[2])):
     {how}
 """
 
@@ -241,7 +242,8 @@ with LastWords(Path(sys.argv[1])).about("s.oni", 3, "in/s.oni/00003", 0.2):
     ("pass", None, None),
 ], ids=["crash", "hang", "kill", "end"])
 def test_the_last_words_of_a_process_say_what_it_had_and_how_it_ended(tmp_path, how, error, why):
-    ended = subprocess.run([sys.executable, "-c", SAYING.format(how=how), tmp_path],
+    limit_s = 0.2 if error == "TimeLimit" else LIMIT_S
+    ended = subprocess.run([sys.executable, "-c", SAYING.format(how=how), tmp_path, str(limit_s)],
                            check=False, cwd=ROOT, capture_output=True)
     said = list(last_words(tmp_path))
     assert (ended.returncode == 0) == (error is None)
