@@ -1,6 +1,7 @@
 """Presses with a gate, and hints, of a live sensor and of a recording."""
 
 from collections import deque
+from types import SimpleNamespace
 
 import pytest
 
@@ -68,6 +69,7 @@ def sensor():
 @pytest.fixture
 def supply(sensor, monkeypatch):
     monkeypatch.setattr(_live_supply, "LiveGate", FakeGate)
+    monkeypatch.setattr(_live_supply, "time", SimpleNamespace(monotonic=lambda: 100.0))
     supply = LiveSupply(sensor, 5.0)
     yield supply
     supply.wake.close()
@@ -213,7 +215,8 @@ class FakeJudge:
 @pytest.fixture
 def recording(monkeypatch):
     monkeypatch.setattr(frame_judge, "FrameJudge", FakeJudge)
-    monkeypatch.setattr(_reader_supply, "_PACE_S", 0.0)
+    monkeypatch.setattr(_reader_supply, "time", SimpleNamespace(
+        monotonic=lambda: 100.0, sleep=lambda _: None))
     supply = ReaderSupply(FakeReader(live=False), Driver(), 1.0)
     ended(supply)
     return supply

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -53,7 +54,7 @@ def sensor():
 @pytest.fixture
 def now(monkeypatch):
     clock = [100.0]
-    monkeypatch.setattr(_live_supply.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(_live_supply, "time", SimpleNamespace(monotonic=lambda: clock[0]))
     return clock
 
 

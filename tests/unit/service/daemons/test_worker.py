@@ -63,7 +63,7 @@ class Connection:
                 yield None
             elif one is BOTH_DONE:
                 self.gate.release(2)
-                assert self.compute._calls[-1].exception(20) is None
+                assert self.compute._calls[-1].exception(LIMIT_S) is None
                 yield None
             elif isinstance(one, bool):
                 self.up = one
@@ -83,6 +83,7 @@ def run(monkeypatch):
         return small_face()
 
     monkeypatch.setattr(worker, "_reconstruct", reconstruct)
+    monkeypatch.setattr(worker, "_FINISH_S", LIMIT_S)
     with Background("recon") as compute:
         def serve(*script):
             connection = Connection(compute, script, gate)
@@ -186,7 +187,7 @@ def test_told_to_stop_it_answers_what_it_has_begun_and_begins_nothing(run):
 def test_told_to_stop_it_finishes_the_job_that_followed_too(run):
     worker, connection = run(job("a"), job("b"))
     connection.gate.release()
-    worker.compute._calls[0].result(20)
+    worker.compute._calls[0].result(LIMIT_S)
     while not worker.compute._calls[1].running():
         pass
     worker.finish()  # b may end at the first heartbeat

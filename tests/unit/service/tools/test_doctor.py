@@ -2,7 +2,9 @@
 
 import json
 import platform
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -18,7 +20,7 @@ from denseface.service.tools.doctor.findings import (
     warning,
     worst,
 )
-from tests.waiting import LIMIT_S
+from tests.waiting import LIMIT_S, until
 
 XTION = UsbDevice("1-4.2", 0x1D27, 0x0601, 1, 17, speed_mbit=480)
 KINECT = UsbDevice("2-1", 0x045E, 0x02AE, 2, 4, "A00367A01433047A", 480, ("gspca_kinect",))
@@ -199,8 +201,8 @@ def test_a_sensor_that_the_service_has():
 
 
 @pytest.mark.parametrize(("script", "text"), [
-    ("echo '{\"step\": \"opening\"}'; exec sleep 600",
-     "hangs while it is opened (given up after 2 s)"),
+    ("echo '{\"step\": \"opening\"}'; touch $0.hangs; exec sleep 600",
+     "hangs while it is opened (given up after 1 s)"),
     ("echo '{\"step\": \"opening\"}'; kill -ABRT $$", "crashes while it is opened: SIGABRT"),
     ("echo noise of a driver; echo '{\"step\": \"closing\"}'; echo ValueError: no >&2; exit 1",
      "crashes while it is closed: ValueError: no"),
@@ -211,7 +213,15 @@ def test_a_driver_that_hangs_or_crashes(script, text, monkeypatch, tmp_path):
     interpreter.write_text(f"#!/bin/sh\n{script}\n")
     interpreter.chmod(0o700)
     monkeypatch.setattr(sensor.sys, "executable", str(interpreter))
-    limit_s = 2.0 if "sleep" in script else LIMIT_S
+    hangs = "sleep" in script
+
+    class Watched(subprocess.Popen):
+        def communicate(self, *given, **named):
+            until(lambda: not hangs or Path(f"{interpreter}.hangs").exists())
+            return super().communicate(*given, **named)
+
+    monkeypatch.setattr(sensor.subprocess, "Popen", Watched)
+    limit_s = 1.0 if hangs else LIMIT_S
     assert of_level(sensor.look_at_frame("S1", sensor.ask("uri", limit_s), [])) == [text]
 
 
