@@ -25,6 +25,9 @@ _RETRY_S, _MAX_RETRY_S = 1.0, 5.0
 in a row, and the longest, seconds."""
 _SILENT_PERIODS, _SILENT_S = 5, 0.3
 """A sensor without a new pair for so many periods, and so many seconds, is silent."""
+_MAX_AWAY_S = 5.0
+"""So long may looks take more than twice a slice, in all, before that is a silence: it is the
+driver then that does not come back from them, and not this machine that stood still."""
 
 
 class WatchedSensor(LiveSensor):
@@ -72,6 +75,10 @@ class WatchedSensor(LiveSensor):
         """Whether somebody asked for a pair since the last one came. What was given may not be new
         enough, and others may have asked too."""
         self._last_pair_s = 0.0
+        self._looked_s = 0.0
+        """When the driver's thread last looked for a pair."""
+        self._away_s = 0.0
+        """How long it did not look since the last one came, as where this machine stood still."""
         self._called_s = time.monotonic()
         """When the driver's thread last showed itself."""
         self._stop = threading.Event()
@@ -203,7 +210,7 @@ class WatchedSensor(LiveSensor):
         self._past += LiveFigures(reconnects=int(self._known_as is not None))
         self._known_as = source.known_as
         self._usb.know(usb_devices())
-        self._last_pair_s = time.monotonic()
+        self._last_pair_s = self._looked_s = time.monotonic()
         self._advance(LiveEvent.OPENED, "the sensor was just opened and is warming up")
 
     def _serve(self) -> None:
@@ -219,10 +226,16 @@ class WatchedSensor(LiveSensor):
         except SensorError as error:
             self._advance(LiveEvent.LOST, str(error))
             return
+        now_s = time.monotonic()
+        away_s, self._looked_s = now_s - self._looked_s, now_s
         if pair is not None:
+            self._away_s = 0.0
             self._take(source, pair)
             return
-        now_s = time.monotonic()
+        if away_s > 2 * _SLICE_S and self._away_s < _MAX_AWAY_S:
+            self._away_s += away_s
+            self._last_pair_s += away_s
+            return
         if self._states.state is LiveState.STREAMING and (
                 now_s - self._last_pair_s > max(_SILENT_PERIODS * source.period_s, _SILENT_S)):
             self._log.clear()

@@ -4,6 +4,8 @@ The sensor looks after itself here as in the capture process; `test_live_service
 """
 
 import shutil
+import signal
+import time
 from itertools import pairwise
 
 import numpy as np
@@ -135,6 +137,18 @@ def test_short_glitches_are_waited_out(control, sensor):
             stream.silent = False
         sensor.wait_state("streaming")
     assert control.loads == 1
+
+
+def test_a_machine_that_stands_still_hears_of_no_silence(control, sensor):
+    since_s = sensor.wait_state("streaming")
+    for _ in range(3):
+        control.wait_frames(4)
+        sensor.process.send_signal(signal.SIGSTOP)
+        time.sleep(0.7)  # longer than a silence takes to be noticed
+        sensor.process.send_signal(signal.SIGCONT)
+    assert not stale(sensor.presses(3))
+    assert sensor.states_since(since_s + 1e-6) == []
+    assert sensor.ask("figures")["stalls"] == 0
 
 
 def test_a_frame_of_a_wrong_size_is_dropped_and_counted(control, sensor):
