@@ -41,15 +41,17 @@ class Watched:
         assert self.process.stdout is not None
         timer = threading.Timer(LIMIT_S, self.process.kill)
         timer.start()
-        print(*words, file=self.process.stdin, flush=True)
-        answer = self.process.stdout.readline()
-        timer.cancel()
+        try:
+            print(*words, file=self.process.stdin, flush=True)
+            answer = self.process.stdout.readline()
+        finally:
+            timer.cancel()
         assert answer, "the process ended"
         return json.loads(answer)
 
     def wait_state(self, *wanted: str) -> float:
         """Wait for one of some states and give when it was entered."""
-        found = until(lambda: self.ask("state") if self.ask("state")[0] in wanted else None)
+        found = until(lambda: said if (said := self.ask("state"))[0] in wanted else None)
         return float(found[2])
 
     def press(self, number: int = 0) -> dict[str, Any]:
@@ -72,6 +74,7 @@ def _serve(uri: str) -> None:
     from denseface.capture.live.pairs import LivePairs
     from denseface.capture.live.ring import Slot
     from denseface.capture.live.sensor import Shot, open_sensor
+    from denseface.capture.live.states import LiveStates
     from denseface.capture.openni2 import _devices, _sensor
     from tests.virtual_sensor.marks import read_mark
 
@@ -79,19 +82,28 @@ def _serve(uri: str) -> None:
         _devices.usb_devices = _sensor.usb_devices = lambda: identity.usb_devices(Path(fake))
 
     history: list[tuple[str, str, float]] = []
+    """States, why and since when; by the thread that enters them: a look from outside could find
+    the reason of one state with the next, and miss what lasts a moment."""
+    explain, noting = LiveStates.explain, threading.Lock()
+
+    def note(states: Any) -> None:
+        with noting:
+            now = states.state.value, states.reason
+            if not history or history[-1][:2] != now:
+                history.append((*now, time.monotonic()))
+
+    def explained(states: LiveStates, reason: str) -> None:
+        explain(states, reason)
+        note(states)
+
+    LiveStates.explain = explained  # type: ignore[method-assign]
     sensor = open_sensor(uri)
     assert sensor is not None
-
-    def note() -> None:
-        now = sensor.state.value, sensor.reason
-        if not history or history[-1][:2] != now:
-            history.append((*now, time.monotonic()))
-
     told = threading.Event()
 
     def changed() -> None:
         told.set()
-        note()
+        note(sensor)
 
     def told_again() -> bool:
         """Ask for the newest pair, and again in between, and wait to be told of the next."""
@@ -113,18 +125,16 @@ def _serve(uri: str) -> None:
 
     LivePairs.add = noted  # type: ignore[method-assign]
     sensor.on_change = changed
-    note()
-
-    def state() -> Any:
-        note()
-        return history[-1]
+    note(sensor)
 
     def taken(find: Callable[[], Shot | None]) -> Any:
         deadline = time.monotonic() + LIMIT_S
+        asked_in = len(history) - 1
         while (shot := find()) is None:
-            if sensor.state.value not in ("opening", "warming", "streaming", "stalled") or (
-                    time.monotonic() > deadline):
-                return {"refused": sensor.reason, "state": sensor.state.value}
+            late = time.monotonic() > deadline
+            for state, reason, _ in history[asked_in:]:
+                if late or state not in ("opening", "warming", "streaming", "stalled"):
+                    return {"refused": reason, "state": state}
             time.sleep(0.001)
         return shot
 
@@ -162,7 +172,7 @@ def _serve(uri: str) -> None:
         _sensor._RETRY_S = _sensor._MAX_RETRY_S = seconds
 
     calls: dict[str, Callable[..., Any]] = {
-        "state": state, "press": press, "burst": burst, "history": lambda: history,
+        "state": lambda: history[-1], "press": press, "burst": burst, "history": lambda: history,
         "told_again": told_again, "figures": lambda: asdict(sensor.figures),
         "identity": lambda: sensor.identity,
         "stuck": sensor.needs_new_process, "close": sensor.close,
