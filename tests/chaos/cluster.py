@@ -112,9 +112,9 @@ class Part:
         self._lock = threading.Lock()
 
     def start(self) -> None:
-        """Start, unless it runs."""
+        """Start, unless it runs or is not wanted any more."""
         with self._lock:
-            if self._handle == -1:
+            if self._handle == -1 and self.wanted:
                 self.starts += 1
                 self.pid = self._nursery.fork(self._spec)
                 with contextlib.suppress(ProcessLookupError):  # it has ended already
@@ -146,7 +146,8 @@ class Part:
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> None:
         """Stop for good and wait for it."""
-        self.wanted = False
+        with self._lock:  # who is just starting it comes before or not at all
+            self.wanted = False
         self.send(signal.SIGCONT)
         self.send(number)
         until(lambda: not self.running(), f"end of {self.name}")
