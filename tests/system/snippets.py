@@ -6,13 +6,15 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
+import psutil
 from markdown_it import MarkdownIt
 
 from tests.system.running import PACE, REPOSITORY
+from tests.waiting import LIMIT_S
 
 __all__ = ["CONSOLES", "HOW_TOS", "PAGES", "SESSION", "Snippet", "reader", "run_all", "snippets"]
 
@@ -109,11 +111,13 @@ def reader(checkout: Path, environment: dict[str, str]) -> Iterator[tuple[Path, 
 
 
 def run_all(
-    blocks: list[Snippet], desk: Path, environment: dict[str, str], timeout_s: float
+    blocks: list[Snippet], desk: Path, environment: dict[str, str], timeout_s: float,
+    grace_s: float = LIMIT_S,
 ) -> "subprocess.CompletedProcess[str]":
     """Run shell and Python blocks one after the other, as in one terminal; save files and patches.
 
-    Before each block its line is printed, so that the last such line names what failed.
+    Before each block its line is printed, so that the last such line names what failed. After
+    `timeout_s` all is told to end, and killed after `grace_s` more.
     """
     script = [_PRELUDE]
     for number, block in enumerate(blocks):
@@ -141,8 +145,26 @@ def run_all(
             out, error = shell.communicate(timeout=timeout_s)
         except subprocess.TimeoutExpired:
             shell.terminate()  # its trap ends what it started
-            out, error = shell.communicate()
+            try:
+                out, error = shell.communicate(timeout=grace_s)
+            except subprocess.TimeoutExpired:
+                _kill(shell.pid)
+                out, error = shell.communicate()
             error += f"not done after {timeout_s} s\n"
+        except BaseException:
+            _kill(shell.pid)
+            raise
     return subprocess.CompletedProcess(shell.args, shell.returncode, out, error)
 
 
+def _kill(session: int) -> None:
+    """Kill all processes of a session, those too that begin meanwhile."""
+    left = True
+    while left:
+        left = False
+        for process in psutil.process_iter():
+            with suppress(ProcessLookupError, psutil.NoSuchProcess):
+                if os.getsid(process.pid) == session and (
+                        process.status() != psutil.STATUS_ZOMBIE):
+                    process.kill()
+                    left = True

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 from pathlib import Path
 
 import pytest
@@ -91,3 +92,11 @@ def test_a_failing_block_is_named_and_ends_what_runs(tmp_path):
     lines = [line for line in done.stderr.splitlines() if line.startswith("line ")]
     assert lines == ["line 3", "line 8"]
     assert not (tmp_path / "never").exists()
+
+
+def test_what_does_not_end_when_it_is_told_to_is_killed(tmp_path):
+    """It would be waited for as long as it lasts, whatever the time-out of the test."""
+    blocks = [Snippet("sh", "(trap '' TERM; while :; do sleep 600; done) &\nwait\n", 3)]
+    done = run_all(blocks, tmp_path, dict(os.environ), 0.5, grace_s=0.5)
+    assert done.returncode == -signal.SIGKILL
+    assert done.stderr == "line 3\nnot done after 0.5 s\n"
