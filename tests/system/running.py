@@ -52,6 +52,19 @@ def denseface(*arguments: object, **environment: str) -> "subprocess.CompletedPr
     return done
 
 
+@contextmanager
+def killed_at_the_end(process: "subprocess.Popen[str]") -> Iterator["subprocess.Popen[str]"]:
+    """Give a process, and kill it at the end, whatever ends the block.
+
+    `Popen` alone waits there: for ever, where a test failed that the process waits for.
+    """
+    with process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
 def run_here(*arguments: object) -> "subprocess.CompletedProcess[str]":
     """Run one command in this process, which is warm: a second or two less."""
     given = [str(one) for one in arguments]

@@ -7,10 +7,11 @@ import sys
 import numpy as np
 import pytest
 
-from tests.system.running import REPOSITORY
+from tests.system.running import REPOSITORY, killed_at_the_end
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.control import Control, OpenFault
 from tests.virtual_sensor.process import environment, play, run_python
+from tests.waiting import LIMIT_S
 
 PERIOD_US = 33_333
 START_US = 1_000_000
@@ -173,9 +174,10 @@ def test_a_sensor_that_was_busy_can_be_opened_later_in_the_same_process(
             f"        {opens}\n"
             "        print('open', flush=True)\n"
             "    except SensorError as error: print(error, flush=True)\n")
-    with Control(tmp_path / "sensor", clip, serial="S1") as sensor, subprocess.Popen(
-            [sys.executable, "-c", code], env=environment(controls=[sensor]), cwd=REPOSITORY,
-            text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+    with Control(tmp_path / "sensor", clip, serial="S1") as sensor, killed_at_the_end(
+            subprocess.Popen(
+                [sys.executable, "-c", code], env=environment(controls=[sensor]), cwd=REPOSITORY,
+                text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE)) as process:
         said = []
         for fault in (OpenFault.BUSY, OpenFault.BUSY, OpenFault.NONE, OpenFault.NONE):
             sensor.open_fault = fault
@@ -183,8 +185,8 @@ def test_a_sensor_that_was_busy_can_be_opened_later_in_the_same_process(
             process.stdin.flush()
             said.append(process.stdout.readline().strip())
         process.stdin.close()
+        assert process.wait(LIMIT_S) == 0
     assert said == [busy, busy, "open", "open"]
-    assert process.returncode == 0
 
 
 @pytest.mark.parametrize("uri", ["nothing", "ä", "/dev/null"])

@@ -16,7 +16,7 @@ from denseface.service.protocol.messages import FROM_HUB, TO_HUB
 from denseface.service.transport.addresses import publications_of
 from tests.ports import free_port
 from tests.system.programs import LANGUAGES, NODE, Program, program
-from tests.system.running import REPOSITORY
+from tests.system.running import REPOSITORY, killed_at_the_end
 from tests.waiting import LIMIT_MS, until
 
 _VECTORS = REPOSITORY / "docs" / "vectors"
@@ -87,8 +87,9 @@ def served(
         context = zmq.Context()
         done.callback(context.destroy, linger=0)
         router, publisher = bound(context, address)
-        with subprocess.Popen([*command, address], cwd=folder, text=True,
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        with killed_at_the_end(subprocess.Popen(
+                [*command, address], cwd=folder, text=True, stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE)) as process:
             while process.poll() is None:
                 if not router.poll(20):
                     continue

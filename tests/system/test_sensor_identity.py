@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from tests.simulator import KINECT_DEFAULT
-from tests.system.running import REPOSITORY
+from tests.system.running import REPOSITORY, killed_at_the_end
 from tests.unit.usb import plug
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.control import Control, Driver
 from tests.virtual_sensor.process import environment, run_python
 from tests.virtual_sensor.scenes import cheap_frames
+from tests.waiting import LIMIT_S
 
 DEPTH, COLOR = cheap_frames(1)[0]
 _OPEN = """
@@ -113,9 +114,9 @@ sys.stdin.readline()
 until(lambda: sensor.latest())
 print(sensor.latest().frame.origin.sensor, sensor.close(), flush=True)
 """
-    with subprocess.Popen(
+    with killed_at_the_end(subprocess.Popen(
             [sys.executable, "-c", code], env=environment(controls=pair), cwd=REPOSITORY,
-            text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+            text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE)) as process:
         def go_on():
             process.stdin.write("\n")
             process.stdin.flush()
@@ -127,6 +128,7 @@ print(sensor.latest().frame.origin.sensor, sensor.close(), flush=True)
         pair[1].replug("1d27/0601@1/9")
         go_on()
         assert [process.stdout.readline().strip() for _ in range(2)] == ["True", "B2 True"]
+        assert process.wait(LIMIT_S) == 0
     assert pair[0].depth.frames == 0
 
 

@@ -17,7 +17,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from denseface.service.export import save_face
-from tests.system.running import RECORDINGS, REPOSITORY
+from tests.system.running import RECORDINGS, REPOSITORY, killed_at_the_end
 from tests.system.test_operator_browser import check
 from tests.unit.service.faces import small_face
 from tests.viewer_page import software_browser
@@ -33,10 +33,10 @@ _Running = tuple["subprocess.Popen[str]", str]
 @contextmanager
 def viewing(*arguments: object, **environment: str) -> Iterator[_Running]:
     """Run the command, and give where its page is."""
-    with subprocess.Popen(
+    with killed_at_the_end(subprocess.Popen(
             [sys.executable, "-m", "denseface", "view", *map(str, arguments)], cwd=REPOSITORY,
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-            env=os.environ | environment) as process:
+            env=os.environ | environment)) as process:
         try:
             url = process.stdout.readline().strip()
             assert url.startswith("http://127.0.0.1:"), process.stderr.read()
