@@ -106,12 +106,17 @@ def test_a_sensor_that_goes_away_leaves_its_figures(clip, tmp_path):
             [sys.executable, "-m", "denseface", "live", "--json"], cwd=REPOSITORY, text=True,
             stdout=subprocess.PIPE, stderr=theirs, env=environment(controls=[control]))
         os.close(theirs)
-        shown = os.read(ours, 4096)  # the status line: it is under way
-        control.unplug()
-        with suppress(OSError):  # it has ended
-            while more := os.read(ours, 4096):
-                shown += more
-        out, _ = running.communicate(timeout=LIMIT_S)
+        shown = b""
+        try:
+            while b" frames, " not in shown:  # before the first one, the line says how long
+                shown += os.read(ours, 4096)
+            control.unplug()
+            with suppress(OSError):  # it has ended
+                while more := os.read(ours, 4096):
+                    shown += more
+            out, _ = running.communicate(timeout=LIMIT_S)
+        finally:
+            running.kill()
         os.close(ours)
     assert running.returncode == 1
     assert json.loads(out)["frames"] >= 1

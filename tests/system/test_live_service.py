@@ -58,6 +58,11 @@ def pressed(client):
     return ""
 
 
+def hung_s(step, log):
+    """Give for how long the driver hung when that was noticed, seconds."""
+    return float(re.search(rf"the driver hangs \({step} for (\d+\.\d) s\)", log.read_text())[1])
+
+
 def test_a_press_is_answered_though_the_stamps_are_below_zero(hub, control, tmp_path):
     """As of a clock that was set back: OpenNI2 gives them as numbers near 2**64."""
     for stream in (control.depth, control.color):
@@ -102,7 +107,7 @@ def test_a_driver_that_hangs_when_it_is_closed_ends_the_process(hub, control, tm
         control.hang = call
         control.unplug()
         assert process.wait(LIMIT_S) == 1
-    assert re.search(r"the driver hangs \(closing for [23]\.\d s\)", log.read_text())
+    assert hung_s("closing", log) >= 2
 
 
 @pytest.mark.parametrize("call", [Call.DESTROY_STREAM, Call.SHUTDOWN])
@@ -118,7 +123,7 @@ def test_a_driver_that_hangs_when_it_is_opened_ends_the_process(hub, control, tm
     control.hang = Call.OPEN
     with capture_process(hub, control, tmp_path / "log") as process:
         assert process.wait(LIMIT_S) == 1
-    assert "the driver hangs (opening for 10." in (tmp_path / "log").read_text()
+    assert hung_s("opening", tmp_path / "log") >= 10
 
 
 def test_a_process_alone_that_is_told_to_restart_opens_its_source_again(hub, control, tmp_path):

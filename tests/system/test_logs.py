@@ -18,6 +18,8 @@ from tests.system.guarded import FRAME, FRAME_ARRAYS, Peer, guarded_hub
 from tests.system.running import PACE, RECORDINGS, REPOSITORY, denseface, wait_ready
 from tests.waiting import LIMIT_S, until
 
+_PEERS = PACE | {"DENSEFACE_HEARTBEAT_S": "1", "DENSEFACE_LIVENESS": "100"}
+"""The peers here send no heartbeats: none is to count as gone before its test is through."""
 _PIPE_BYTES = 4096
 """Smallest buffer that Linux gives a pipe."""
 _SHORT_QUEUE = ("from denseface.service.log import output\n"
@@ -58,7 +60,7 @@ def test_a_hub_whose_log_is_broken_answers_presses_and_stops_in_order(how, tmp_p
             [*prefix, sys.executable, "-c", f"import sys\n{_SHORT_QUEUE}"
              "from denseface.service.cli import main\nsys.exit(main(sys.argv[1:]))",
              "hub", "--address", address, "--data", str(tmp_path / "data")],
-            cwd=REPOSITORY, stderr=stderr, env=os.environ | PACE)
+            cwd=REPOSITORY, stderr=stderr, env=os.environ | _PEERS)
         sensor, presser = Peer(address), Peer(address)
         try:
             sensor.send(messages.SensorReady(name="s", source="x"))

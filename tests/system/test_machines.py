@@ -94,7 +94,7 @@ def machines(request, tmp_path_factory):
             process = subprocess.Popen(
                 [*before, sys.executable, "-m", "denseface", *map(str, arguments)],
                 cwd=REPOSITORY, env=environment, stderr=running.enter_context(log.open("w")))
-            running.callback(process.wait, 20)
+            running.callback(process.wait, LIMIT_S)
             running.callback(process.terminate)
             return log
 
