@@ -120,8 +120,8 @@ class AsyncClient(BaseClient):
             while True:
                 until = deadline(timeout)
                 self._check_open()
-                while (news := watch.look(time.monotonic())) is None:
-                    if time.monotonic() >= until:
+                while (news := watch.look(now := time.monotonic())) is None:
+                    if now >= until:
                         raise self._nothing_published(subscription)
                     await self._readable(subscription.socket, LOOK_S)
                 yield news.status

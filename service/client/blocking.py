@@ -237,8 +237,8 @@ class Client(Closing, BaseClient):
             while True:
                 until = deadline(timeout)
                 self._check_open()
-                while (news := watch.look(time.monotonic())) is None:
-                    if time.monotonic() >= until:
+                while (news := watch.look(now := time.monotonic())) is None:
+                    if now >= until:
                         raise self._nothing_published(subscription)
                     subscription.socket.poll(int(LOOK_S * 1000))
                 yield news.status

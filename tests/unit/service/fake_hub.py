@@ -35,10 +35,16 @@ class FakeHub:
         self.refuse_reason: messages.PressReason = "disk"
         self.hint: Hint | None = None
         self.presses: list[messages.Press] = []
+        """Those that were answered."""
+        self.pressed: list[str] = []
+        """Captures, those of ignored presses too."""
         self.removals: list[tuple[int, bool]] = []
         """What the next purges are told."""
         self.received: list[str] = []
+        """Kinds of what was asked; a request that is repeated counts once."""
         self.subscriptions: list[bytes] = []
+        self._requests: dict[tuple[bytes, str, int], list[Packet]] = {}
+        """Peer, kind and number -> answers, none where the request was ignored."""
         self._context = zmq.Context()
         self._router = self._context.socket(zmq.ROUTER)
         self._publisher = self._context.socket(zmq.XPUB)
@@ -111,13 +117,22 @@ class FakeHub:
                     self.subscriptions.append(self._publisher.recv())
                 if self._router in ready:
                     peer, *parts = self._router.recv_multipart()
-                    message = decode_to_hub(parts).message
-                    self.received.append(message.kind)
-                    if message.kind not in self.ignored:
-                        for answer in self._answers(message):
-                            header, *arrays = encode(answer)
-                            self._router.send_multipart([peer, self.garble_header(header), *arrays])
+                    for answer in self._answered(peer, decode_to_hub(parts).message):
+                        header, *arrays = encode(answer)
+                        self._router.send_multipart([peer, self.garble_header(header), *arrays])
                 self._changed.notify_all()
+
+    def _answered(self, peer: bytes, message: BaseMessage) -> list[Packet]:
+        """Answer a request once: it is repeated where the machine stands still for a while."""
+        request = peer, message.kind, getattr(message, "request", 0)
+        if request not in self._requests:
+            self.received.append(message.kind)
+            if isinstance(message, messages.Press):
+                self.pressed.append(message.capture_id)
+        if not self._requests.get(request):
+            self._requests[request] = (
+                [] if message.kind in self.ignored else [*self._answers(message)])
+        return self._requests[request]
 
     def _answers(self, message: BaseMessage) -> Iterator[Packet]:
         request = getattr(message, "request", 0)

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from denseface.service.protocol.topics import Topic
 from tests.unit.service.fake_hub import fake_hub
 from tests.waiting import LIMIT_S
 
@@ -105,6 +106,7 @@ def test_a_client_is_not_for_a_forked_process(code):
                 stdout=subprocess.PIPE, text=True) as process:
             try:
                 assert process.stdout.readline() == "forked\n"
+                hub.wait(lambda: hub.subscribers(Topic.FACES) == 1)
                 hub.conclude("b")
                 hub.ignored.clear()
                 assert process.wait(LIMIT_S) == 0

@@ -13,6 +13,8 @@ from tests.unit.service.client.test_clients import run, waited
 from tests.unit.service.fake_hub import FakeHub, fake_hub
 from tests.waiting import LIMIT_S
 
+FIRST_S = "denseface.service.client.statuses._FIRST_S"
+
 
 @pytest.fixture
 def hub():
@@ -24,7 +26,9 @@ def tell(hub, **more):
     hub.publish(Topic.STATUS, Packet(hub.status(**more)))
 
 
-def test_each_is_given_then_that_the_hub_is_gone_once_then_that_it_is_back(hub):
+def test_each_is_given_then_that_the_hub_is_gone_once_then_that_it_is_back(hub, monkeypatch):
+    monkeypatch.setattr(FIRST_S, LIMIT_S)
+
     async def main():
         async with (AsyncClient(hub.address) as client,
                     aclosing(client.statuses(timeout=LIMIT_S)) as statuses):
@@ -48,7 +52,8 @@ def test_each_is_given_then_that_the_hub_is_gone_once_then_that_it_is_back(hub):
     run(main())
 
 
-def test_a_hub_that_is_silent_for_three_of_its_heartbeats_is_gone(hub):
+def test_a_hub_that_is_silent_for_three_of_its_heartbeats_is_gone(hub, monkeypatch):
+    monkeypatch.setattr(FIRST_S, 0.1)
     with (Client(hub.address) as client,
           closing(client.statuses(timeout=LIMIT_S)) as statuses):
         assert next(statuses) is None
@@ -60,15 +65,18 @@ def test_a_hub_that_is_silent_for_three_of_its_heartbeats_is_gone(hub):
         assert next(statuses)
 
 
-def test_where_there_is_no_hub_it_says_so_and_then_waits(tmp_path):
+def test_where_there_is_no_hub_it_says_so_and_then_waits(tmp_path, monkeypatch):
+    monkeypatch.setattr(FIRST_S, 0.1)
     with (Client(f"ipc://{tmp_path}/hub") as client,
-          closing(client.statuses(timeout=2.0)) as statuses):
+          closing(client.statuses(timeout=0.5)) as statuses):
         assert next(statuses) is None
         with pytest.raises(ClientTimeoutError, match="nothing was published"):
             next(statuses)
 
 
-def test_closing_the_client_ends_it(hub):
+def test_closing_the_client_ends_it(hub, monkeypatch):
+    monkeypatch.setattr(FIRST_S, 0.1)
+
     async def main():
         async with AsyncClient(hub.address) as client:
             async for known in client.statuses():

@@ -16,9 +16,10 @@ from prometheus_client import CollectorRegistry, Gauge, make_wsgi_app
 from structlog.testing import capture_logs
 
 from denseface.service.errors import AddressError
+from denseface.service.monitoring import http_server
 from denseface.service.monitoring.http_server import MetricsServer
 from denseface.service.runtime.parsing import parse_loopback_address
-from tests.waiting import LIMIT_S
+from tests.waiting import LIMIT_S, until
 
 REPOSITORY = Path(__file__).resolve().parents[4]
 REGISTRY = CollectorRegistry()
@@ -35,6 +36,14 @@ class Asked:
 
     def health(self):
         return self.success, {"missing": self.missing}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _patient():
+    """A machine that stands still for a while cuts nobody off, unless a test asks for that."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(http_server, "_REQUEST_S", LIMIT_S)
+        yield
 
 
 @pytest.fixture
@@ -122,43 +131,47 @@ def test_garbage_and_endless_requests_leave_no_trace(server, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_slow_clients_are_cut_off_and_hold_nobody_up(server):
+def test_slow_clients_are_cut_off_and_hold_nobody_up(server, monkeypatch):
     with ExitStack() as stack:
         slow = [stack.enter_context(socket.create_connection(place(server), timeout=LIMIT_S))
                 for _ in range(3)]
         for one in slow:
             one.sendall(b"GET /metr")
         assert get(server, "/metrics")[0] == 200
+        monkeypatch.setattr(http_server, "_REQUEST_S", 0.1)
         for one in slow:
             assert one.recv(100) == b""
 
 
-def test_a_client_that_sends_a_byte_now_and_then_is_cut_off_too(server):
+def test_a_client_that_sends_a_byte_now_and_then_is_cut_off_too(server, monkeypatch):
+    monkeypatch.setattr(http_server, "_REQUEST_S", 0.5)
     with socket.create_connection(place(server), timeout=LIMIT_S) as one:
         one.settimeout(0.02)
-        for _ in range(500):
+
+        def is_cut_off():
             try:
                 one.sendall(b"x")
-                if one.recv(1) == b"":
-                    break
+                return one.recv(1) == b""
             except TimeoutError:
-                continue
+                return False
             except OSError:
-                break
-        else:
-            pytest.fail("still connected")
+                return True
+
+        until(is_cut_off)
 
 
-def test_more_clients_than_there_is_room_for_are_turned_away(server):
+def test_more_clients_than_there_is_room_for_are_turned_away(server, monkeypatch):
     before = threading.active_count()
     with ExitStack() as stack:
         many = [stack.enter_context(socket.create_connection(place(server), timeout=LIMIT_S))
                 for _ in range(30)]
         assert threading.active_count() < before + 20
-        for one in many:
-            one.settimeout(LIMIT_S)
-            with suppress(ConnectionResetError):
-                assert one.recv(100) == b""
+        with monkeypatch.context() as patch:
+            patch.setattr(http_server, "_REQUEST_S", 0.0)
+            for one in many:
+                with suppress(ConnectionResetError):
+                    assert one.recv(100) == b""
+            until(lambda: not server._opened)  # a connection has its place until it is closed
     assert get(server, "/metrics")[0] == 200
 
 
