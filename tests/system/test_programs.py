@@ -64,7 +64,7 @@ class Ended:
     points: np.ndarray | None
     """What it wrote, if it did."""
     heard: list[str]
-    """Kinds of what it said."""
+    """Kinds of what it said; what it said again after its answer had been sent counts once."""
 
 
 def served(
@@ -81,6 +81,7 @@ def served(
     restart_after : kind of request behind whose answer the hub ends, and is there again
     """
     heard: list[str] = []
+    answered: dict[int, list[bytes]] = {}
     pressed = ""
     address = f"tcp://127.0.0.1:{free_port()}"
     with ExitStack() as done:
@@ -95,6 +96,10 @@ def served(
                     continue
                 peer, said = router.recv_multipart()
                 request = json.loads(said)
+                number = request["request"]
+                if number in answered:  # this was away for two seconds
+                    router.send_multipart([peer, *answered[number]])
+                    continue
                 heard.append(request["kind"])
                 pressed = request.get("capture_id", pressed)
                 given = answers[request["kind"]]
@@ -102,8 +107,9 @@ def served(
                 if not answer:
                     continue
                 header, *arrays = answer
-                router.send_multipart([peer, changed(
-                    header, request=request["request"], capture_id=pressed), *arrays])
+                answered[number] = [
+                    changed(header, request=number, capture_id=pressed), *arrays]
+                router.send_multipart([peer, *answered[number]])
                 if request["kind"] == restart_after:
                     restart_after = ""
                     router.close(linger=LIMIT_MS)

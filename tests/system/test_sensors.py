@@ -92,6 +92,14 @@ def address(tmp_path):
         yield address
 
 
+@pytest.fixture
+def lasting(tmp_path, monkeypatch):
+    """A hub to which a sensor counts as gone 100 s after its last word."""
+    monkeypatch.setenv("DENSEFACE_LIVENESS", "100")
+    with hub(tmp_path) as address:
+        yield address
+
+
 @contextmanager
 def raw(kind, address, topic=None):
     context = zmq.Context()
@@ -115,9 +123,9 @@ def known(client):
     return {one.name: one.state for one in client.status(timeout=LIMIT_S).sensor_states}
 
 
-def test_a_press_goes_to_the_sensor_of_its_name_and_hears_what_to_do(address):
-    with closing(RawSensor(address, "left")) as left, Client(address) as client, \
-            closing(RawSensor(address, "right")) as right:
+def test_a_press_goes_to_the_sensor_of_its_name_and_hears_what_to_do(lasting):
+    with closing(RawSensor(lasting, "left")) as left, Client(lasting) as client, \
+            closing(RawSensor(lasting, "right")) as right:
         until(lambda: known(client) == dict.fromkeys(("left", "right"), "streaming"))
         with pytest.raises(PressRefusedError, match="come closer") as refused:
             client.press(sensor="right", gate="wait", gate_timeout=2, frames=3)
@@ -125,10 +133,15 @@ def test_a_press_goes_to_the_sensor_of_its_name_and_hears_what_to_do(address):
         (take,) = right.takes()
         assert (take["gate"], take["gate_timeout"], take["frames"]) == ("wait", 2, 3)
         assert left.takes() == []
-        with pytest.raises(PressRefusedError, match="no sensor middle is connected; there: left"):
-            client.press(sensor="middle")
         one = client.status(timeout=LIMIT_S).sensor_states[0]
         assert (one.identity, one.figures.drops) == (f"serial {one.name}", 2)
+
+
+def test_a_press_for_a_sensor_that_is_not_there_hears_which_are(address):
+    with closing(RawSensor(address, "left")), Client(address) as client:
+        until(lambda: known(client))
+        with pytest.raises(PressRefusedError, match="no sensor middle is connected; there: left"):
+            client.press(sensor="middle")
 
 
 def test_a_press_hears_at_once_why_there_is_no_frame(address):
@@ -143,9 +156,9 @@ def test_a_press_hears_at_once_why_there_is_no_frame(address):
             refused.value)
 
 
-def test_what_an_older_client_says_is_taken_and_answered(address):
-    with closing(RawSensor(address, "s")) as sensor, raw(zmq.DEALER, address) as socket, \
-            Client(address) as client:
+def test_what_an_older_client_says_is_taken_and_answered(lasting):
+    with closing(RawSensor(lasting, "s")) as sensor, raw(zmq.DEALER, lasting) as socket, \
+            Client(lasting) as client:
         until(lambda: client.status(timeout=LIMIT_S).sensors)
         answer = ask(socket, kind="press", capture_id="a")
         assert (answer["kind"], answer["reason"]) == ("press_refused", "quality")
