@@ -1,5 +1,6 @@
 """The viewer of faces in a browser, by software WebGL and under the kiosk's own policy."""
 
+import time
 from collections.abc import Iterator
 
 import cv2
@@ -92,6 +93,15 @@ def test_it_turns_by_itself_until_it_is_touched(page: Page, by: str) -> None:
     page.evaluate("page.still()")
 
 
+def double_tap(page: Page) -> None:
+    """Tap twice within a tenth of a second, by the events' own stamps: however long that takes."""
+    session, began_s = page.context.new_cdp_session(page), time.time()
+    for number, kind in enumerate(("mousePressed", "mouseReleased") * 2):
+        session.send("Input.dispatchMouseEvent", {
+            "type": kind, "x": 200, "y": 160, "button": "left", "clickCount": 1 + number // 2,
+            "timestamp": began_s + 0.03 * number})
+
+
 def test_gestures_change_what_is_seen_and_a_double_tap_undoes_it(page: Page) -> None:
     def drag() -> None:
         page.mouse.move(200, 160)
@@ -109,7 +119,7 @@ def test_gestures_change_what_is_seen_and_a_double_tap_undoes_it(page: Page) -> 
     for gesture in (drag, lambda: page.mouse.wheel(0, -600), keys):
         gesture()
         assert np.abs(picture(page) - before).mean() > 2
-        page.mouse.dblclick(200, 160)
+        double_tap(page)
         assert np.abs(picture(page) - before).mean() < 1
 
 
