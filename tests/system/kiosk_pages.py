@@ -10,7 +10,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from denseface.service.kiosk.page_messages import FACE
-from tests.system.running import Service, service
+from tests.nursery import Forked
+from tests.system.running import REPOSITORY, Service, service
 from tests.waiting import LIMIT_S, until
 
 KIOSK = ("--kiosk-address", "0")
@@ -25,10 +26,31 @@ def kiosk_service(source, folder: Path, *arguments, environment=None):
         yield running, kiosk_url(running)
 
 
+@contextmanager
+def another_kiosk(running: Service, folder: Path, *arguments):
+    """Run one more kiosk of a service, with a page of its own, and give its URL."""
+    folder.mkdir()
+    log = folder / "log"
+    with log.open("w") as stderr:
+        process = Forked(
+            ["-m", "denseface", "kiosk", "--address", running.address, *KIOSK, "--kiosk-folder",
+             folder / "kiosk", *arguments], cwd=REPOSITORY, stderr=stderr)
+    try:
+        yield _url_in(log)
+        process.terminate()
+        assert process.wait(LIMIT_S) == 0
+    finally:
+        process.close()
+
+
 def kiosk_url(running: Service) -> str:
     """Wait until the newest kiosk serves, and give its URL."""
+    return _url_in(running.log)
+
+
+def _url_in(log: Path) -> str:
     def found() -> str | None:
-        urls = re.findall(r"the page for visitors .*url=(http\S+)", running.log.read_text())
+        urls = re.findall(r"the page for visitors .*url=(http\S+)", log.read_text())
         return urls[-1] if urls else None
 
     url = until(found)

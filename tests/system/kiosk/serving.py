@@ -13,7 +13,7 @@ from denseface.capture import open_source
 from denseface.service.client import Client
 from denseface.service.protocol.messages import Status
 from tests.simulator import KINECT_DEFAULT
-from tests.system.running import RECORDINGS, Service, service
+from tests.system.running import RECORDINGS, Service, service, stopping
 from tests.virtual_sensor.clip import write_clip
 from tests.virtual_sensor.control import Control
 from tests.virtual_sensor.process import environment
@@ -115,7 +115,8 @@ def serving(
     with Control(folder / "sensor", somebody(folder / "clip"), marks=marks) as control, service(
             "openni2:", folder / "data", "--kiosk-address", "127.0.0.1:0", "--kiosk-folder",
             str(folder / "kiosk"), *arguments,
-            environment={**environment(controls=[control]), "DENSEFACE_KIOSK": "on"} | variables,
+            environment={**environment(controls=[control]), **stopping(folder / "data"),
+                         "DENSEFACE_KIOSK": "on"} | variables,
     ) as up:
         url = until(lambda: _URL.search(up.log.read_text()))
         yield Served(up, control, url[1] if url else "")

@@ -2,6 +2,7 @@
 
 import gc
 
+import psutil
 import pytest
 from playwright.sync_api import expect
 
@@ -81,10 +82,12 @@ def test_the_sensor_is_unplugged_on_every_screen(served, browser):
 def test_a_worker_that_is_killed_costs_time_and_no_face(served, browser):
     with visiting(browser, served.url, "killed") as visitor:
         visitor.at("attract")
+        worker = served.up.stop_worker_amid_a_job()  # else the face may come before it is killed
         visitor.tap("begin")
         visitor.tap("agree")
-        visitor.at("countdown", "captured", "reconstructing")
-        served.process("worker").kill()
+        until(lambda: worker.status() == psutil.STATUS_STOPPED)
+        visitor.at("captured", "reconstructing")
+        worker.kill()
         visitor.at("result")
         visitor.seen()
         home(visitor)
