@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import os
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -58,19 +59,28 @@ class Peer:
 
     def receive(self, kind: str) -> Packet:
         """Wait for a message of a kind."""
-        while self.socket.poll(LIMIT_MS):
-            packet = decode_from_hub(self.socket.recv_multipart())
+        for packet in self._received():
             if packet.message.kind == kind:
                 return packet
         raise AssertionError(f"no {kind} came")
 
+    def take(self) -> BaseMessage:
+        """Wait for any message."""
+        for packet in self._received():
+            return packet.message
+        raise AssertionError("no message came")
+
     def request(self, message: BaseRequest) -> BaseMessage:
         self.send(message)
-        while self.socket.poll(LIMIT_MS):
-            answer = decode_from_hub(self.socket.recv_multipart()).message
-            if getattr(answer, "request", None) == message.request:
-                return answer
+        for packet in self._received():
+            if getattr(packet.message, "request", None) == message.request:
+                return packet.message
         raise AssertionError(f"no answer to {message.kind}")
+
+    def _received(self) -> Iterator[Packet]:
+        deadline = time.monotonic() + LIMIT_S
+        while self.socket.poll(max(0, round(1000 * (deadline - time.monotonic())))):
+            yield decode_from_hub(self.socket.recv_multipart())
 
     def status(self) -> messages.Status:
         answer = self.request(messages.GetStatus(request=99))
@@ -203,7 +213,8 @@ def press_through(hub: GuardedHub, capture_id: str) -> None:
             worker.send(messages.WorkerReady(name="w", credit=credit))
         assert presser.request(messages.GetFace(
             request=2, capture_id=capture_id, wait_s=10)).kind == "face_done"
-        until(lambda: subscriber.socket.recv_multipart()[0] == b"faces")
+        until(lambda: subscriber.socket.poll(LIMIT_MS)
+              and subscriber.socket.recv_multipart()[0] == b"faces")
     finally:
         leave(hub, sensor, worker)
         for one in (sensor, worker, presser, subscriber):

@@ -167,13 +167,27 @@ def sockets(running: Service) -> list[Path]:
     return [path for path in folder.iterdir() if path.is_socket()]
 
 
+PATIENT = {"DENSEFACE_LIVENESS": "100"}
+"""For a hub whose peers are of the test and say no more than they have to: none is soon gone."""
+
+
 @contextmanager
-def hub_alone(address: str, data: Path, *arguments: str) -> Iterator[Path]:
-    """Run `denseface hub`, give its log, and stop it in order."""
+def hub_alone(
+    address: str, data: Path, *arguments: str, code: str = "", **environment: str
+) -> Iterator[Path]:
+    """Run `denseface hub`, give its log, and stop it in order.
+
+    Parameters
+    ----------
+    code : Python that runs in the hub's process before the hub does
+    """
     log = data.with_suffix(".log")
     with log.open("w") as stderr:
-        process = Forked(["-m", "denseface", "hub", "--address", address, "--data", data,
-                          *arguments], cwd=REPOSITORY, stderr=stderr)
+        process = Forked(
+            ["-c", f"import sys\n{code}\n"
+             "from denseface.service.cli import main\nsys.exit(main(sys.argv[1:]))",
+             "hub", "--address", address, "--data", data, *arguments],
+            cwd=REPOSITORY, stderr=stderr, env=os.environ | environment)
     try:
         yield log
     finally:

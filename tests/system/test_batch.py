@@ -5,7 +5,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import psutil
@@ -51,14 +51,33 @@ def recorded_of(out):
             if path.relative_to(out / "faces").with_suffix("") in recorded}
 
 
+_HOLDS = """
+import os, sys, time
+from pathlib import Path
+faces, most = Path(os.environ["HELD_FACES"]), int(os.environ["HELD_AT"])
+def hold(event, arguments):
+    if event == "open" and arguments[2] & os.O_CREAT and str(arguments[0]).startswith(f"{faces}/"):
+        while len(list(faces.rglob("*.ply"))) >= most:
+            time.sleep(0.01)
+sys.addaudithook(hold)
+"""
+"""A `sitecustomize` with which no more faces are written than so many."""
+
+
 @contextmanager
-def under_way(archive, out, more):
-    """Run it on a worker of its own until so many more faces are there; all of it must end."""
+def under_way(archive, out, more, folder):
+    """Run it on a worker of its own until so many more faces are there; all of it must end.
+
+    Some further faces it writes, but never all: it is under way however late the test looks.
+    """
     wanted = len(faces(out)) + more
+    (folder / "sitecustomize.py").write_text(_HOLDS)
     running = subprocess.Popen(
         [sys.executable, "-m", "denseface", "batch", archive, "--out", out, "--workers", "1"],
-        cwd=REPOSITORY, env=ENVIRONMENT, start_new_session=True, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        cwd=REPOSITORY, start_new_session=True, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=ENVIRONMENT | {
+            "PYTHONPATH": f"{folder}:{REPOSITORY}", "HELD_FACES": str(out / "faces"),
+            "HELD_AT": str(wanted + 2)})
     try:
         until(lambda: len(faces(out)) >= wanted or running.poll() is not None)
         started = psutil.Process(running.pid).children(recursive=True)
@@ -66,19 +85,20 @@ def under_way(archive, out, more):
         yield running
         until(lambda: not any(process.is_running() for process in started))
     finally:
-        running.kill()
+        with suppress(ProcessLookupError):
+            os.killpg(running.pid, signal.SIGKILL)  # or whoever is left holds the pipes open
         running.communicate()
 
 
-def test_killed_it_leaves_no_process_and_what_is_done(archive, out):
-    with under_way(archive, out, 2) as running:
+def test_killed_it_leaves_no_process_and_what_is_done(archive, out, tmp_path):
+    with under_way(archive, out, 2, tmp_path) as running:
         running.kill()
     assert parquet.read_table(out / "summary.parquet").num_rows <= len(faces(out)) < 3 * RECORDED
 
 
-def test_ctrl_c_ends_it_and_leaves_what_is_done_and_nothing_else(archive, out):
+def test_ctrl_c_ends_it_and_leaves_what_is_done_and_nothing_else(archive, out, tmp_path):
     before = recorded_of(out)
-    with under_way(archive, out, 1) as running:
+    with under_way(archive, out, 1, tmp_path) as running:
         os.killpg(running.pid, signal.SIGINT)  # as a terminal does
         said, complained = running.communicate(timeout=LIMIT_S)
     assert (running.returncode, said) == (130, "")

@@ -36,7 +36,7 @@ def says_for_ever(socket: zmq.Socket[bytes], message: dict[str, object]):
 def hub(tmp_path):
     with guarded_hub(
             tmp_path, DENSEFACE_JOB_TIMEOUT_S=f"{PATIENCE:g}", DENSEFACE_ATTEMPTS="1",
-            DENSEFACE_HEARTBEAT_S=f"{_HEARTBEAT_S:g}", DENSEFACE_LIVENESS="50") as hub:
+            DENSEFACE_HEARTBEAT_S=f"{_HEARTBEAT_S:g}", DENSEFACE_LIVENESS="100") as hub:
         yield hub
 
 
@@ -66,7 +66,7 @@ def test_a_worker_that_holds_its_job_for_ever_loses_it(hub):
 
 def test_nobody_waits_for_a_disk_that_hangs(tmp_path):
     with guarded_hub(tmp_path, DENSEFACE_FAILPOINTS="hub.frame.written=hang",
-                     DENSEFACE_TAKE_TIMEOUT_S=f"{PATIENCE:g}") as hub, \
+                     DENSEFACE_TAKE_TIMEOUT_S=f"{5 * PATIENCE:g}") as hub, \
             closing(hub.peer("sensor")) as sensor, closing(hub.peer("presser")) as presser, \
             closing(hub.peer("operator")) as operator:
         try:

@@ -29,7 +29,15 @@ from denseface.service.protocol.messages import (
 from denseface.service.protocol.payload import FaceHeader, FrameHeader
 from denseface.service.protocol.wire import Packet, decode_from_hub, encode
 from denseface.service.storage import FolderStore
-from tests.system.running import RECORDINGS, REPOSITORY, denseface, hub_alone, service, stopping
+from tests.system.running import (
+    PATIENT,
+    RECORDINGS,
+    REPOSITORY,
+    denseface,
+    hub_alone,
+    service,
+    stopping,
+)
 from tests.unit.service.faces import small_face, small_frame
 from tests.unit.service.storing import accept, finish
 from tests.waiting import LIMIT_S, until
@@ -172,7 +180,7 @@ def test_a_full_disk_refuses_presses_and_no_more(tmp_path, address):
         ["unshare", "-m", "sh", "-c",
          'mount -t tmpfs -o size=4m,mode=700 none "$1" && exec "$2" -m denseface hub --data "$1"'
          ' --address "$3"', "sh", data, sys.executable, address],
-        cwd=REPOSITORY, env=os.environ | {"DENSEFACE_RESERVE_MIB": "0"})
+        cwd=REPOSITORY, env=os.environ | PATIENT | {"DENSEFACE_RESERVE_MIB": "0"})
     seen = Path(f"/proc/{hub.pid}/root") / data.relative_to("/")
     try:
         with sensor(address) as accepted, Operator(address) as client:
