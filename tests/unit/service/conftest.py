@@ -6,7 +6,14 @@ import pytest
 import structlog
 
 from denseface.service.log.output import process_log
+from denseface.service.runtime.terminal.progress import Progress
 from tests.waiting import LIMIT_S
+
+
+@pytest.fixture(autouse=True)
+def _nothing_takes_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What takes 2 s tells so on stderr: here that says how busy this machine is."""
+    monkeypatch.setitem(Progress.__init__.__kwdefaults__, "plain_after_s", LIMIT_S)
 
 
 @pytest.fixture(autouse=True)

@@ -10,11 +10,13 @@ import pytest
 from denseface.service.commands.sensor import _kiosk_findings
 from denseface.service.commands.sensor._kiosk_findings import look_at_kiosk
 from denseface.service.tools.doctor.findings import Level
+from tests.waiting import LIMIT_S
 
 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch):
     monkeypatch.setattr(_kiosk_findings, "why_not", lambda: None)
+    monkeypatch.setattr(_kiosk_findings, "_ANSWER_S", LIMIT_S)
 
 
 @contextmanager

@@ -13,7 +13,7 @@ import pytest
 
 from denseface.service.runtime.terminal import _lines, complain, progress, say
 from denseface.service.runtime.terminal.progress import Progress, duration
-from tests.waiting import LIMIT_S, until
+from tests.waiting import until
 
 
 class Clock:
@@ -167,7 +167,7 @@ def test_a_pipe_gets_one_plain_line(capsys):
 
 
 def test_what_is_done_soon_is_not_said(capsys):
-    with Progress("compiling", plain_after_s=LIMIT_S):
+    with Progress("compiling"):
         pass
     assert capsys.readouterr() == ("", "")
 
