@@ -191,7 +191,7 @@ def _stamp(path: Path) -> tuple[int, ...]:
         raise
     except OSError:  # a loop of links
         return ()
-    return found.st_ino, found.st_mtime_ns, found.st_ctime_ns, found.st_size
+    return found.st_ino, found.st_mode, found.st_mtime_ns, found.st_ctime_ns, found.st_size
 
 
 def _out_of_descriptors(error: BaseException | None) -> bool:

@@ -12,7 +12,7 @@ from denseface.service.protocol import messages
 from denseface.service.protocol.states import CaptureState
 from denseface.service.storage import FolderStore, InlineWriter, WriterThreads
 from tests.unit.service.hub.bench import CLIENT, SENSOR, SETTINGS, WORKER, Bench, kinds
-from tests.waiting import until
+from tests.waiting import LIMIT_S, until
 
 OPERATOR, ANOTHER = b"operator", b"another"
 
@@ -230,7 +230,7 @@ def test_a_thread_erases(data):
 
         def slowly(erasure):
             assert threading.current_thread() is not threading.main_thread()
-            assert free.wait(60)
+            assert free.wait(LIMIT_S)
             return erase(erasure)
 
         store.retention._eraser._erase = slowly

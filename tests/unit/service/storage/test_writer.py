@@ -106,7 +106,7 @@ def test_frames_do_not_wait_for_a_face_and_each_kind_stays_in_order(store, monke
             writer.start(one)
         done = []
         while len(done) < len(frames):
-            assert select.select([writer], [], [], 20)[0]
+            assert select.select([writer], [], [], LIMIT_S)[0]
             assert writer.has_results()
             done += writer.take_results()
         assert [one.pending for one in done] == frames

@@ -153,6 +153,7 @@ def test_a_hub_with_a_local_door_alone_has_its_limits_too(context, wakes, monkey
         dealer.send(b"hello")
         assert _until(listeners, lambda received: received)
         with socket.create_connection((host, int(port)), LIMIT_S) as silent:
+            assert silent.recv(1), "libzmq says something at once, to a connection that is there"
             ended = iter([3])
             monkeypatch.setattr(DescriptorGuard, "take_ended", lambda _: next(ended, 0))
             _until(listeners, lambda _: rejections.counts().get("connections"))

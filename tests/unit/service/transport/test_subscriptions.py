@@ -86,12 +86,13 @@ def test_who_never_subscribed_ends_nobody_s_subscription(listener, connect, unti
     assert watcher.socket.recv(100).endswith(b"picture")
 
 
-def test_who_subscribes_after_the_end_of_its_connection_does_not(connect, until, previews):
-    hasty = connect()
+def test_who_subscribes_after_the_end_of_its_connection_does_not(
+        listener, connect, until, previews):
+    hasty, last = connect(), connect()
     hasty.send(b"\1preview")
     hasty.close()
-    last = connect()
     last.send(b"\1status")
+    until(lambda: listener.subscriptions(Topic.STATUS) == 1)
     until(lambda: previews() == 0)
 
 
