@@ -77,12 +77,22 @@ def served(
     ----------
     answers : for each kind of request the answers, one after another, the last one repeated; ids
         and numbers become those of the request. An empty one is lost
-    published : what is published, once, where `get_next` found nothing newer
+    published : what is published, once, when `get_next` finds nothing newer
     restart_after : kind of request behind whose answer the hub ends, and is there again
     """
     heard: list[str] = []
     answered: dict[int, list[bytes]] = {}
-    pressed = ""
+    pressed, again = "", False
+
+    def publish() -> None:
+        nonlocal published
+        assert published
+        assert publisher.poll(LIMIT_MS)
+        assert publisher.recv() == b"\x01faces"
+        topic, face, *rest = published
+        publisher.send_multipart([topic, changed(face, capture_id=pressed), *rest])
+        published = None
+
     address = f"tcp://127.0.0.1:{free_port()}"
     with ExitStack() as done:
         context = zmq.Context()
@@ -107,21 +117,21 @@ def served(
                 if not answer:
                     continue
                 header, *arrays = answer
+                due = published and json.loads(header)["kind"] == "nothing_newer"
+                # After the answer, the program waits two seconds for it and asks again; but before,
+                # it does not subscribe again at a hub that was started again.
+                if due and not again:
+                    publish()
                 answered[number] = [
                     changed(header, request=number, capture_id=pressed), *arrays]
                 router.send_multipart([peer, *answered[number]])
+                if due and again:
+                    publish()
                 if request["kind"] == restart_after:
-                    restart_after = ""
+                    restart_after, again = "", True
                     router.close(linger=LIMIT_MS)
                     publisher.close()
                     router, publisher = bound(context, address)
-                if published and json.loads(header)["kind"] == "nothing_newer":
-                    assert publisher.poll(LIMIT_MS)
-                    assert publisher.recv() == b"\x01faces"
-                    topic, header, *arrays = published
-                    publisher.send_multipart(
-                        [topic, changed(header, capture_id=pressed), *arrays])
-                    published = None
             out, err = process.communicate()
     written = [np.loadtxt(path, ndmin=2) for path in folder.glob("*.xyz")]
     return Ended(process.returncode, out, err, written[0] if written else None, heard)
