@@ -203,7 +203,7 @@ class ReplaySensor(LiveSensor):
 
     def _run(self) -> None:
         """Play until told to stop; for the thread."""
-        start_s = time.monotonic()
+        start_s: float | None = None  # the first frame is never late
         try:
             while not self._stop.is_set():
                 for frame, due_s in paced(self._source.chosen(), start_s, wait=self._stop.wait):
@@ -211,11 +211,11 @@ class ReplaySensor(LiveSensor):
                         return
                     self._give(frame, due_s)
                     start_s = due_s + _PERIOD_S
-                # What begins late is left out; where that is all of it, it would be for ever.
-                start_s = max(start_s, time.monotonic())
                 if not self._count:
                     self._end("the recording holds no pair of depth and color")
                     return
+                # What begins late is left out; where that is all of it, it would be for ever.
+                start_s = max(start_s or 0.0, time.monotonic())
                 if not self._source.repeats:
                     self._end("the recording is at its end")
                     return

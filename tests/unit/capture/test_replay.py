@@ -178,6 +178,22 @@ def test_a_live_replay_whose_end_is_slow_goes_on(folder, monkeypatch):
     assert sensor.close(LIMIT_S)
 
 
+def test_a_live_replay_that_begins_late_begins_with_its_first_frame(folder, monkeypatch):
+    """As on a busy machine: all of a short recording was late, and it was said to hold nothing."""
+    chosen = Replay.chosen
+
+    def late(replay):
+        time.sleep(0.3)  # longer than the recording
+        return chosen(replay)
+
+    monkeypatch.setattr(Replay, "chosen", late)
+    sensor = ReplaySensor(f"{folder}?rate=real&end=stop")
+    until(lambda: sensor.state is LiveState.ABSENT)
+    assert sensor.reason.endswith(": the recording is at its end")
+    assert sensor.figures.frames > 0
+    assert sensor.close(LIMIT_S)
+
+
 def test_a_live_replay_that_ends(folder, monkeypatch):
     begin, changed = threading.Event(), threading.Event()
     now_s = time.monotonic()
