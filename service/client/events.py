@@ -102,7 +102,8 @@ class PublishedPreview:
     sensor : its name
     size : width and height, pixels, none above 640
     jpeg : the picture as a JPEG file; None where the sensor sent pixels
-    hint : of the same frame; None where it was not measured
+    hint : of the same frame or, where judging takes long, of one up to 2 s before, given once; None
+        where none is new
     """
 
     epoch: str

@@ -22,6 +22,9 @@ _HOPEFUL = (LiveState.OPENING, LiveState.WARMING, LiveState.STREAMING, LiveState
 _HOLD_S = 0.05
 """Age up to which a picture waits for its hint, seconds: half of the three frame periods that a
 mirror may lag. On a machine with time to spare that is long enough."""
+_LATE_S = 2.0
+"""A hint of a frame so much older than the picture says nothing of it any more, seconds. One that
+is younger goes with it: on a slow machine none would ever be as early as its own picture."""
 _LOOKED_AT_S = 1.0
 """After the last preview frames are judged for so long, seconds."""
 
@@ -64,6 +67,8 @@ class LiveSupply(Supply):
         self._preview_due = False
         self._shown_s = 0.0
         """`latest_s` of the pair that the last preview showed."""
+        self._hinted_s = 0.0
+        """The same of the pair whose hint was given last with one."""
         self._gate = LiveGate(sensor, self.wake.wake)
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="burst")
         sensor.on_change = self.wake.wake
@@ -115,17 +120,27 @@ class LiveSupply(Supply):
             yield from self._picture()
 
     def _picture(self) -> Iterator[Picture]:
-        """Give a picture that is newer than the last: the one with a hint of its own, if any."""
-        shot, hint = self._gate.last_hint() or (None, None)
+        """Give a picture that is newer than the last: the one with a hint of its own, if any.
+
+        The newest hint that none had goes with it also where it tells of one shown before.
+        """
+        judged, hint = self._gate.last_hint() or (None, None)
+        shot = judged
         if shot is None or shot.latest_s <= self._shown_s:
-            shot, hint = self._sensor.latest(), None  # asked, it tells of the next one
+            shot = self._sensor.latest()  # asked, it tells of the next one
             judging = self._gate.judging
             if (judging is not None and judging.latest_s > self._shown_s
                     and time.monotonic() - judging.latest_s < _HOLD_S):
                 return
-        if shot is not None and shot.latest_s > self._shown_s:
-            self._preview_due, self._shown_s = False, shot.latest_s
-            yield Picture(shot.frame, hint)
+        if shot is None or shot.latest_s <= self._shown_s:
+            return
+        self._preview_due, self._shown_s = False, shot.latest_s
+        oldest_s = max(self._hinted_s, shot.latest_s - _LATE_S)
+        if judged is not None and judged.latest_s > oldest_s:
+            self._hinted_s = judged.latest_s
+        else:
+            hint = None
+        yield Picture(shot.frame, hint)
 
     def _serve(self, press: _Press) -> Outcome | None:
         while len(press.shots) < press.wanted:

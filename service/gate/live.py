@@ -90,7 +90,7 @@ class LiveGate:
         self._call: Future[Judged] | None = None
         self._shot: Shot | None = None
         """The one that is judged, or was judged last."""
-        self._judged: Judged | None = None
+        self._last: tuple[Shot, Hint] | None = None
         self._cost_s = 0.0
         """Processor time of the frame that was judged last."""
         self._hints_until_s = self._looked_until_s = 0.0
@@ -122,22 +122,20 @@ class LiveGate:
 
     def last_hint(self) -> tuple[Shot, Hint] | None:
         """Give the frame that was judged last, with its hint."""
-        if self._shot is None or self._judged is None:
-            return None
-        return self._shot, self._judged.hint
+        return self._last
 
     def step(self) -> Iterator[Passed | NotPassed | Hinted]:
         """Give what became of presses, and hints; begin to judge the next frame that is due."""
         if self._call is not None and self._call.done() and self._shot is not None:
-            judged = self._judged = self._call.result()
-            self._call = None
+            judged = self._call.result()
+            self._call, self._last = None, (self._shot, judged.hint)
             yield from self._decide(self._shot, judged)
             if self._clock() < self._hints_until_s:
                 yield Hinted(judged.hint)
         if self._call is None and (due_s := self._due_s()) is not None:
             shot = self._sensor.first_after(due_s, closely=False)
             if shot is not None:
-                self._shot, self._judged = shot, None
+                self._shot = shot
                 self._call = self._pool.submit(self._judge_shot, shot)
                 self._call.add_done_callback(lambda _: self._wake())
 

@@ -110,7 +110,9 @@ def test_of_a_live_sensor_a_good_frame_is_taken_and_pictures_carry_their_hints(c
             for picture in previews:
                 if picture.hint is None:
                     continue
-                assert abs(picture.hint.timestamp_us - picture.timestamp_us) < 20_000
+                # Of the frame that is shown, unless judging it took longer than a mirror may lag.
+                late_us = picture.timestamp_us - picture.hint.timestamp_us
+                assert -20_000 < late_us < 2_020_000
                 seen.add("face" if "distance_mm" in picture.hint.measures else "nobody")
                 if len(seen) == 2:
                     break

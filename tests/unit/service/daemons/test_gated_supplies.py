@@ -186,6 +186,21 @@ def test_a_picture_does_not_wait_for_ever(supply, sensor, gate, monkeypatch):
     gate.judging, gate.hint = None, (sensor.shots[0], HINT)
     supply.preview()
     assert outcomes(supply) == []  # a mirror does not go back
+    sensor.shoot(99.2)
+    assert outcomes(supply) == [Picture(sensor.shots[2].frame, HINT)]  # and yet says what was found
+    sensor.shoot(99.3)
+    supply.preview()
+    assert outcomes(supply) == [Picture(sensor.shots[3].frame, None)]  # once
+
+
+def test_a_hint_that_comes_far_too_late_is_none(supply, sensor, gate):
+    sensor.shoot(99.0)
+    supply.preview()
+    assert outcomes(supply) == [Picture(sensor.shots[0].frame, None)]
+    gate.hint = sensor.shots[0], HINT
+    sensor.shoot(101.1)
+    supply.preview()
+    assert outcomes(supply) == [Picture(sensor.shots[1].frame, None)]
 
 
 def test_hints_are_asked_for_and_given(supply, gate):

@@ -43,7 +43,7 @@ class Gate:
         self.motion_mm = {}
         """By the frame's number, where it is not still."""
         monkeypatch.setattr(frame_judge, "measure", self.measure)
-        self.spent_s = self.costs_s = 0.0
+        self.spent_s = self.costs_s = self.takes_s = 0.0
         self.gate = LiveGate(self.sensor, lambda: None, clock=lambda: self.sensor.now,
                              cost_clock=lambda: self.spent_s)
 
@@ -51,6 +51,7 @@ class Gate:
         number = frame.depth_timestamp_us
         self.measured.append(number)
         self.spent_s += self.costs_s
+        self.sensor.now += self.takes_s
         assert at_us == round(self.sensor.shots[number].earliest_s * 1e6)
         if number < self.good_from:
             return Quality(number, somebody=False)
@@ -125,6 +126,15 @@ def test_while_previews_are_looked_at_frames_are_judged_and_no_hints_sent(gate):
     shot, hint = gate.gate.last_hint()
     assert hint.timestamp_us == shot.number == gate.sensor.shots[gate.measured[-1]].number
     assert gate.gate.judging is None
+
+
+def test_a_hint_stays_while_the_next_frame_is_judged(gate):
+    """On a slow machine one frame follows the other: there would be no hint at any time."""
+    gate.takes_s = 0.3
+    gate.gate.look(2.0)
+    gate.run(1.0)
+    assert gate.gate.judging.number == gate.measured[-1]
+    assert gate.gate.last_hint()[0].number == gate.measured[-2]
 
 
 def test_who_waits_gets_the_first_good_frame_and_no_other(gate):
