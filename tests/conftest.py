@@ -25,6 +25,9 @@ settings.load_profile("same")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
+# Set here and there, and not where somebody tries this first.
+os.environ.pop("PYTHONUNBUFFERED", None)
+
 # Many services run at once, and one port is enough for one page: who tests that asks for it.
 os.environ.setdefault("DENSEFACE_KIOSK", "off")
 

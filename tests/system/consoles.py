@@ -60,6 +60,8 @@ def run_consoles(
     for number, one in enumerate(commands):
         script += [f"printf '{_MARK}{number}\\n'", one.command]
     (desk / ".page").write_text("\n".join([*script, f"printf '{_MARK}{len(commands)}\\n'", ""]))
+    # On a terminal, lines on stdout and stderr come in the order in which they are printed.
+    environment = environment | {"PYTHONUNBUFFERED": "1"}
     with subprocess.Popen(
             ["bash", ".page"], cwd=desk, env=environment, stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE, text=True, start_new_session=True) as shell:
