@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from tests.simulator.landmarks import SCANS
 from tests.system.running import REPOSITORY
 from tests.waiting import LIMIT_S, PATIENCE
 
@@ -30,6 +31,15 @@ def test_heads_need_no_shared_folder(tmp_path):
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
     assert re.search(r"\d+ passed", done.stdout)
     assert "skipped" not in done.stdout
+
+
+def test_who_has_a_scanned_head_asks_whether_it_is_at_hand():
+    tests = {path.relative_to(REPOSITORY): path.read_text()
+             for folder in ("unit", "system")
+             for path in (REPOSITORY / "tests" / folder).rglob("*.py")}
+    naming = {path for path, text in tests.items() if any(f'"{scan}' in text for scan in SCANS)}
+    assert naming
+    assert {path for path in naming if "head_names()" not in tests[path]} == set()
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ from denseface.capture.frame import DepthMeaning, DepthRounding
 from denseface.recon import NoFaceError, reconstruct
 from denseface.recon.registration import shaded_depth, with_shaded_depth
 from tests.simulator import Person, Scene, measure, simulate
+from tests.simulator.heads import head_names
 from tests.unit.frames import camera
 
 
@@ -37,6 +38,8 @@ def test_colours_are_the_shades_of_the_relief(depth_alone):
 @pytest.mark.parametrize("person", [
     Person("ict_neutral", 600, yaw=45), Person("mh_cauc_m", 1000, pitch=8)])
 def test_turned_near_and_far(person):
+    if person.head not in head_names():
+        pytest.skip(f"the head {person.head} is not at hand: ../shared/faces")
     shot = simulate(Scene((person,)), seed=3)[0]
     face = reconstruct(replace(shot.frame, color=None))
     assert measure(face, shot.truth, shot.frame).mean_mm < 1.0
