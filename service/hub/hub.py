@@ -363,7 +363,7 @@ class Hub:
             yield refused
             return
         known, asked = self._peers.workers.get(peer), self._peers.was_asked(peer)
-        if known is None:
+        if known is None or known.away:
             self._status.note_change()
             self._log.info("worker ready", name=name, key=key or LOCAL)
         elif credit <= known.credit and not asked:

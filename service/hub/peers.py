@@ -86,6 +86,8 @@ class Peers:
         """Mark a worker as free, unless this credit was used before."""
         self.starting.pop(peer, None)
         worker = self.workers.setdefault(peer, WorkerPeer(peer, name, now, key))
+        if worker.away:  # by another connection that calls itself the same: its credit begins anew
+            worker.away, worker.name, worker.credit = False, name, -1
         if credit > worker.credit:
             worker.credit, worker.free, worker.seen = credit, True, now
 

@@ -98,7 +98,8 @@ def test_an_id_stays_with_the_key_that_brought_it(hub):
         assert thief.silent()
     # Its own key may have it again.
     with closing(hub.peer("worker", routing_id=b"worker-1")) as again:
-        again.send(messages.WorkerReady(name="again", credit=1))
+        again.send(messages.WorkerReady(name="again", credit=0))
+        until(lambda: hub.status().workers == ("again",))
         again.send(messages.Goodbye())
         until(lambda: not hub.status().workers)
         assert hub.refused("identity") == 1

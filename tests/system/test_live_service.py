@@ -144,8 +144,8 @@ def test_the_service_brings_back_a_sensor_whose_driver_hung_or_that_an_operator_
         control.hang = Call.CLOSE
         control.unplug()
         control.wait_hanging(Call.CLOSE)
+        until(lambda: control.loads >= 2)
         control.hang = Call.NONE
-        until(lambda: control.loads == 2 or pressed(client))
         control.replug()
         until(lambda: not pressed(client))
         loads = control.loads

@@ -102,6 +102,21 @@ def test_a_worker_elsewhere_may_come_back_with_its_face(bench, said):
     assert bench.published[-1].kind == "face_done"
 
 
+def test_a_worker_elsewhere_that_comes_back_by_the_same_id_is_there_again(bench, said):
+    """As a DEALER with an id of its own does: its credit begins anew, and that is no replay."""
+    bench.worker(WORKER, 3)
+    bench.hub.connection_ended(WORKER, local=False)
+    bench.now += 0.2
+    assert said._of(bench.hub.act(bench.now))[0].workers == ()
+    bench.now += 0.2
+    (back,) = said.by(WORKER, messages.WorkerReady(name="back", credit=0))
+    assert back.workers == ("back",)
+    assert bench.hub._rejections.counts() == {}
+    bench.accepted("a")
+    bench.result("a", WORKER)
+    assert bench.published[-1].kind == "face_done"
+
+
 def test_a_worker_elsewhere_that_does_not_come_back_loses_its_job(bench, said):
     bench.accepted("a")
     bench.worker(WORKER)
