@@ -1,15 +1,14 @@
 """What the doctor says of the kiosk."""
 
 import json
-import threading
 from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
 
 from denseface.service.commands.sensor import _kiosk_findings
 from denseface.service.commands.sensor._kiosk_findings import look_at_kiosk
 from denseface.service.tools.doctor.findings import Level
+from tests.unit.service.kiosk.health import answering
 from tests.waiting import LIMIT_S
 
 
@@ -21,26 +20,9 @@ def installed(monkeypatch):
 
 @contextmanager
 def kiosk(answer):
-    """One that answers so at `/healthz`; gives its address."""
-    class Handler(BaseHTTPRequestHandler):
-        def do_GET(self):
-            assert self.path == "/healthz"
-            self.send_response(200)
-            self.end_headers()
-            self.wfile.write(answer)
-
-        def log_message(self, *_):
-            """Say nothing."""
-
-    server = HTTPServer(("127.0.0.1", 0), Handler)
-    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
-    thread.start()
-    try:
-        yield f"127.0.0.1:{server.server_port}"
-    finally:
-        server.shutdown()
-        thread.join()
-        server.server_close()
+    """One that answers so; gives its address."""
+    with answering(200, answer) as (port, _):
+        yield f"127.0.0.1:{port}"
 
 
 def found(address="127.0.0.1:0", **environment):

@@ -1,44 +1,14 @@
 """Whether a kiosk answers, asked of its own machine."""
 
 import re
-import threading
-from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
 
 from denseface.service.kiosk.answering import Answer, ask
 from denseface.service.kiosk.settings import KioskSettings
 from tests.ports import free_port
+from tests.unit.service.kiosk.health import answering
 from tests.unit.service.kiosk.links.certificate_files import make_certificate
-
-
-@contextmanager
-def answering(status, body, tls=None):
-    """Answer so; gives the port, and the hosts that were asked for."""
-    hosts = []
-
-    class Handler(BaseHTTPRequestHandler):
-        def do_GET(self):
-            hosts.append(self.headers["Host"])
-            self.send_response(status if self.path == "/healthz" else 404)
-            self.end_headers()
-            self.wfile.write(body)
-
-        def log_message(self, *_):
-            """Say nothing."""
-
-    server = HTTPServer(("127.0.0.1", 0), Handler)
-    if tls:
-        server.socket = tls.wrap_socket(server.socket, server_side=True)
-    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
-    thread.start()
-    try:
-        yield server.server_port, hosts
-    finally:
-        server.shutdown()
-        thread.join()
-        server.server_close()
 
 
 def test_one_that_serves():
